@@ -146,6 +146,15 @@ def test_patches_do_not_reach_into_another_region():
         np.testing.assert_allclose(force, product, atol=1e-6 * np.abs(product).max())
 
 
+def test_patches_beside_a_body_of_a_law_without_a_bulk_modulus():
+    tissue = sp.HolzapfelGasserOgden(c10=3e3, bulk=3e5, k1=5e4, k2=3.0, directions=[[1, 0, 0]])
+    materials = [patched(sp.NeoHookean, 0.49), tissue]
+    bodies = [sp.Body(f"b{k}", MESH, material) for k, material in enumerate(materials)]
+    both, x = elasticity_of(build_system(sp.Scene(bodies))), deformed(3)
+    alone = sum(energy_of(material).value(x) for material in materials)
+    assert both.value(np.concatenate([x, x])) == pytest.approx(alone, rel=1e-12)
+
+
 def test_a_tet_of_a_patch_has_a_barrier_against_inversion():
     """The energy of an edge with several tets can be finite where one of them is flat, for every material."""
     for kind in MATERIALS:

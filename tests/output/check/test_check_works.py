@@ -68,6 +68,18 @@ def test_pins_that_work_against_the_barrier_against_inversion(tmp_path, order):
         assert checked(path).ok
 
 
+@pytest.mark.parametrize("share", [0.1, 0.9])
+def test_a_body_that_hits_the_floor_early_or_late_in_a_frame(tmp_path, corrupted, share):
+    """Late, its mean velocity is almost that before: contact, which stops it, does less work than on the whole way."""
+    box = sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1))
+    body = sp.Body("box", box, sp.EdgesAndVolume(), position=(0, 0.0505 + share * 2 / 60, 0), velocity=(0, -2, 0))
+    scene = sp.Scene([body], [sp.HalfSpace()], gravity=(0, 0, 0))
+    path = recorded(tmp_path / "hit.vtkhdf", scene, sp.XPBD(substeps=20), 1 / 60, 2, ["contact_force"])
+    assert checked(path).ok
+    report = checked(with_more_work(path, corrupted, "contact", 20.0))
+    assert "work of contact" in report["works"].message
+
+
 def test_works_need_every_frame(dragged):
     assert checked(dragged, every=2)["works"].message == "works are computed from one frame to the next only"
 
@@ -147,15 +159,15 @@ def driven(request, tmp_path_factory):
     return recorded(tmp_path_factory.mktemp("works") / "driven.vtkhdf", driven_scene(), solver, 1 / 120, 24)
 
 
-def with_more_work(path, corrupted, name):
-    """A copy in which the work of a name is half as large again, which is taken from the numerical one."""
+def with_more_work(path, corrupted, name, times=0.5):
+    """A copy in which the work of a name is half as large again (or more), which is taken from the numerical one."""
     with sp.read_recording(path) as recording:
         (names,) = (field.keys for field in recording.details.fields if field.name == "work")
     assert names is not None
 
     def shift(file, n):
         works = file["supple/frames/details/work"][:]
-        more = 0.5 * np.abs(works[:, names.index(name)])
+        more = times * np.abs(works[:, names.index(name)])
         works[:, names.index("numerical")] -= more
         works[:, names.index(name)] += more
         file["supple/frames/details/work"][:] = works

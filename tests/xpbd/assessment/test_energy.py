@@ -70,7 +70,7 @@ TIP = np.flatnonzero(BOX.vertices[:, 0] > 0.049)
 
 
 @pytest.mark.parametrize("material", [JELLY, CLASSIC], ids=["neo-hookean", "edges+volume"])
-@pytest.mark.parametrize("load", ["force", "soft target", "pin", "obstacle"])
+@pytest.mark.parametrize("load", ["force", "soft target", "pin", "obstacle", "stitched obstacle"])
 def test_the_work_of_loads_pins_and_obstacles_that_move_is_not_from_nowhere(material, load):
     body = sp.Body("box", BOX, material)
     more = {}
@@ -82,19 +82,40 @@ def test_the_work_of_loads_pins_and_obstacles_that_move_is_not_from_nowhere(mate
     elif load == "obstacle":
         push = sp.Keyframes(times=[0, 0.3, 1], displacements=[[0, 0, 0], [0.05, 0, 0], [-0.1, 0, 0]])
         more = {"obstacles": [sp.HalfSpace(point=(-0.06, 0, 0), normal=(1, 0, 0), motion=push)]}
+    elif load == "stitched obstacle":
+        pull = sp.Keyframes(times=[0, 0.3, 1], displacements=[[0, 0, 0], [0.05, 0, 0], [-0.1, 0.1, 0]])
+        plate = sp.SurfaceMesh([[-0.051, y, z] for y in (-0.05, 0.05) for z in (-0.05, 0.05)], [[0, 1, 2], [3, 2, 1]])
+        stitch = sp.VertexVertexStitch("box", "plate", max_distance=0.003, stiffness=100.0)
+        more = {"obstacles": [sp.TriangleObstacle(plate, name="plate", motion=pull)], "stitches": [stitch]}
     turn = sp.Keyframes(times=[0.0, 0.5, 1.0], angles=[0.0, 1.5, 0.0], axis=(0, 0, 1))
-    pins = [sp.Pin("box", motion=turn if load == "pin" else None, **HELD)] if load != "obstacle" else []
+    pins = [sp.Pin("box", motion=turn if load == "pin" else None, **HELD)] if not load.endswith("obstacle") else []
     scene = sp.Scene([body], pins=pins, gravity=(0, -5, 0) if pins else (0, 0, 0), **more)
     assert statuses(scene) == {"converged"}
 
 
-def test_energy_from_nowhere_is_found_and_named(caplog):
-    """A ball that is far too stiff for its substeps leaves the floor faster than it came."""
+@pytest.mark.parametrize("material", [JELLY, sp.EdgesAndVolume()], ids=["neo-hookean", "hard"])
+def test_pins_lift_what_is_stitched_to_their_body(material):
+    """All of the lower box moves up by 0.1 m in a second, and the upper one hangs on it."""
+    bodies = [sp.Body("low", BOX, material), sp.Body("high", BOX, JELLY, position=(0, 0.101, 0))]
+    stitch = sp.VertexVertexStitch("high", "low", max_distance=0.002, stiffness=200.0)
+    rise = sp.Keyframes(times=[0.0, 1.0], displacements=[[0, 0, 0], [0, 0.1, 0]])
+    pin = sp.Pin("low", np.arange(len(BOX.vertices)), motion=rise)
+    work = 0.0
+    for frame in sp.simulate(sp.Scene(bodies, pins=[pin], stitches=[stitch]), XPBD(), DT, 60):
+        assert frame.report.status == "converged"
+        work += frame.report.work["pins"]
+    assert work == pytest.approx(2.0 * 9.81 * 0.1, rel=0.05)
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_energy_from_nowhere_is_found_and_named(caplog, slides):
+    """A ball that is far too stiff for its substeps leaves the floor faster than it came, also where this moves."""
     ball = sp.Body(
         "ball", sp.shapes.sphere(radius=0.02, edge_length=0.006),
         sp.StableNeoHookean(youngs=5e5, poisson=0.4), position=(0, 0.1, 0),
     )  # fmt: skip
-    frames = list(sp.simulate(sp.Scene([ball], [sp.HalfSpace()]), XPBD(substeps=10), DT, 20))
+    floor = sp.HalfSpace(motion=(lambda t: (t, 0.0, 0.0)) if slides else None)
+    frames = list(sp.simulate(sp.Scene([ball], [floor]), XPBD(substeps=10), DT, 20))
     bad = [frame for frame in frames if frame.report.status == "energy_gained"]
     assert bad
     assert "of the energy came from nowhere, most in body 'ball'" in bad[0].report.message

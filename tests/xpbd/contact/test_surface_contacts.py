@@ -120,7 +120,7 @@ def test_the_legs_of_a_bent_beam_meet_and_do_not_cross(enabled):
         sp.HalfSpace(point=(0.07, 0, 0), normal=(-1, 0, 0), motion=lambda t: (-min(0.2 * t, 0.036), 0, 0)),
     ]
     scene = sp.Scene([body], squeeze, gravity=(0, 0, 0))
-    solver = XPBD(substeps=20, accuracy=0.9, contact=XPBDContact(self_collision=enabled))
+    solver = XPBD(substeps=40, accuracy=0.9, contact=XPBDContact(self_collision=enabled))
     worst, crossed = -1.0, 0
     for frame in sp.simulate(scene, solver, 1 / 60, 24):
         assert frame.report.status in ("converged", "intersecting")

@@ -129,8 +129,9 @@ def patches_of(
         kind = np.where(by_law, np.int32(_SQUARED), kind)
         mu, lam = np.where(by_law, 0.0, mu), np.where(by_law, rest, lam)
     edges = _edge_patches(tets, Dm_inv, volumes, region, (kind, mu, lam - rest))
-    laws = tuple(_edge_law(part, rows, volumes, rest, edges.of_tet) for part in material.elastic_laws)
-    edges = replace(edges, laws=tuple(part for part in laws if len(part.rows)))
+    # Other bodies may have a law without patches, and without a bulk modulus that could be lowered.
+    parts = [part for part in material.elastic_laws if np.isin(part.rows, rows).any()]
+    edges = replace(edges, laws=tuple(_edge_law(part, rows, volumes, rest, edges.of_tet) for part in parts))
     stars = partition(tets, region, edges.of_tet)
     return Patches(rows, tets, Dm_inv, volumes, edges, _star_patches(tets, volumes, stars, kind, rest))
 
@@ -144,8 +145,7 @@ def _edge_law(part: LawTets, rows, volumes, rest, of_tet) -> LawTets:
     shares, patch = np.repeat(volumes[tets] / 6.0, 6), of_tet[tets].ravel()
     numbers, inverse = np.unique(patch, return_inverse=True)
     patch = inverse.astype(np.int32)
-    means = [_means(patch, shares, np.repeat(column, 6)) for column in p.T] if len(tets) else []
-    return part.of(numbers, np.column_stack(means) if means else p)
+    return part.of(numbers, np.column_stack([_means(patch, shares, np.repeat(column, 6)) for column in p.T]))
 
 
 def _numbered(keys: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:

@@ -44,12 +44,12 @@ class ElasticEnergy:
                 if material.volume_compliance > 0.0:
                     lam[part.tets] = volumes / material.volume_compliance
                 else:
-                    hard_lam[part.tets] = 1.0 / np.maximum(_volume_slopes(system, part.tets), 1e-300) / volumes
+                    hard_lam[part.tets] = _inverse(_volume_slopes(system, part.tets)) / volumes
                 if material.edge_compliance > 0.0:
                     stiffness[part.edges] = 1.0 / material.edge_compliance
                 else:
                     slopes = system.inverse_masses[system.edges[part.edges]].sum(axis=1)
-                    hard_stiffness[part.edges] = np.where(slopes > 0.0, 1.0 / np.maximum(slopes, 1e-300), 0.0)
+                    hard_stiffness[part.edges] = _inverse(slopes)
             elif isinstance(material, Elastic) and not part.rigid:
                 each = material.per_tet(len(volumes))
                 mu[part.tets], lam[part.tets] = each.mu, each.lam
@@ -81,6 +81,11 @@ class ElasticEnergy:
         _energies_of_tets[parallel](points, self._tets, self._data, 1.0 / h**2, self._of_tets)
         _energies_of_edges(points, self._edges, self._springs, 1.0 / h**2, self._of_edges)
         return _sums(self._of_tets, self._tet_starts) + _sums(self._of_edges, self._edge_starts)
+
+
+def _inverse(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) of the slopes; 0 where nothing can move, so that nothing is given out."""
+    return np.divide(1.0, slopes, out=np.zeros_like(slopes), where=slopes > 0.0)
 
 
 def _volume_slopes(system: System, tets: slice) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
 """Energy from nowhere in a frame: what the bodies gained, less the work that was done on them.
 
 Kinetic, elastic and potential energy, and that of stitches, of all vertices; `Works` has the works of loads, actuators,
-motors and pins. The work of obstacles and of rigid bodies that are moved is not counted: a frame in which they touch
-something, or in which stitches or joints hold to them, is not judged.
+motors and pins. Contact does work where obstacles move: what it adds is theirs, as far as it exceeds what it takes. The
+work of joints that hold to what is moved is not known: such scenes are not judged.
 
 What violated hard constraints can give out counts where it falls, and not where it rises: it is an upper bound.
 
@@ -29,7 +29,7 @@ LEAST_STRAIN = 1e-6
 # Of the mean surface edge: energies below that of a fall by this height are not judged. Contact lifts what begins on a
 # floor by its skin.
 LEAST_FALL = 0.05
-# Of the work of pins in a frame: how much it may be off.
+# Of the works of pins and anchors in a frame: how much they may be off.
 PIN_TOLERANCE = 0.2
 # Works that take energy, and those that are not those of forces.
 _NOT_DRIVING = ("contact", "friction", "damping", NUMERICAL)
@@ -41,7 +41,7 @@ class EnergyBalance:
     Attributes
     ----------
     elastic : energy of the bodies
-    is_judged : whether the work of everything that moved in the frame is known
+    is_judged : whether the work of everything that moves is known
     """
 
     def __init__(self, system: System, edge_length: float) -> None:
@@ -54,31 +54,25 @@ class EnergyBalance:
                 held[pin.vertices] = True
         driven = {part.name for part in system.rigid_bodies if held[part.vertices].any()}
         moving = {str(obstacle.name) for obstacle in system.obstacles if obstacle.motion is not None}
-        self._obstacles_move = bool(moving or driven)
         joined = {name for joint in system.scene.joints for name in (joint.first, joint.second)}
-        self._anchors_move = bool(joined & (moving | driven)) or (bool(moving) and len(system.stitching.anchors) > 0)
+        self._obstacles_move = bool(moving)
+        self.is_judged = not joined & (moving | driven)
         fall = LEAST_FALL * edge_length * math.hypot(*system.gravity)
         self._least = LEAST_STRAIN**2 * _stiffness(system) + fall * float(self._masses.sum())
         self._begun = np.zeros(len(system.bodies))
         self._total = self._hard = self._h = 0.0
-        self.is_judged = True
 
     def begin(self, moment: Moment, h: float) -> None:
         """Begin a frame with substeps of h [s]."""
         self._h = h
-        self.is_judged = not self._anchors_move
         self._begun, self._total = self._measure(moment)
         self._hard = self._in_hard_constraints(moment)
-
-    def note_contacts(self, count: int) -> None:
-        """Take notice of the number of contacts in a substep."""
-        if count and self._obstacles_move:
-            self.is_judged = False
 
     def end(self, moment: Moment, works: Mapping[str, float]) -> tuple[float, float, int]:
         """What was gained in the frame [J], the energy to compare it with [J], and the body whose energy rose most."""
         work = sum(value for name, value in works.items() if name not in _NOT_DRIVING)
-        work += PIN_TOLERANCE * abs(works.get("pins", 0.0))
+        work += PIN_TOLERANCE * sum(abs(works.get(name, 0.0)) for name in ("pins", "anchors"))
+        work += max(0.0, works["contact"] + works["friction"]) if self._obstacles_move else 0.0
         ended, total = self._measure(moment)
         given_out = max(self._hard - self._in_hard_constraints(moment), 0.0)
         gain = total - self._total - work - given_out if self.is_judged else 0.0

@@ -1,7 +1,8 @@
 """The works of a frame: of each force over the displacements of its substep.
 
-Loads, actuators, damping and contact have forces. What pins do is what their motion adds to the elastic energy, the
-mean of that before and after the other vertices follow, and what balances all other forces on the pinned vertices.
+Loads, actuators, damping and contact have forces. What pins do is what their motion adds to the energy of tets and
+stitches, the mean of that before and after the other vertices follow, and what balances all other forces on the pinned
+vertices.
 What moving obstacles do by stitches is found likewise.
 """
 
@@ -48,6 +49,7 @@ class Works:
         held[welding.vertices[held[welding.control[:, 0]]]] = True
         self._held = np.flatnonzero(held)
         self.at_pins = ElasticEnergy(system, held) if len(self._held) else None
+        self._pins_are_stitched = bool(np.isin(system.stitching.nodes(), self._held).any())
         self._all = np.arange(len(system.masses))
         self._on_pins = np.zeros((len(system.masses), 3))
         moving = any(obstacle.motion is not None for obstacle in system.obstacles)
@@ -97,7 +99,7 @@ class Works:
         self.residual += _work_of_impulses(at.points, self.system.masses, self.impulses, at.begun, at.h)
         if self.at_pins is not None:
             self._on_pins += of_actuators(at)
-            self._add_pins(self.at_pins, at)
+            self._add_pins(self.at_pins, at, extended[len(at.points) :, :3])
         if self._anchors:
             self._add_anchors(at, extended)
 
@@ -106,25 +108,27 @@ class Works:
         self._add_inertia(velocities, 1.0)
         add_works(self.by_name, more)
 
-    def _add_pins(self, energy: ElasticEnergy, at: Substep) -> None:
+    def _add_pins(self, energy: ElasticEnergy, at: Substep, anchors: Floats) -> None:
         before, after = at.begun.copy(), at.points[:, :3].copy()
         moved = after[self._held] - before[self._held]
         before[self._held] += moved
         after[self._held] -= moved
         places = before, at.begun, at.points, after
         E = [float(energy.of(x, False, at.h).sum()) for x in places]
+        if self._pins_are_stitched:
+            E = [e + self._in_stitches(x, anchors) for e, x in zip(E, places, strict=True)]
         weight = self.system.masses[self._held, None] * self.system.gravity
         others = self._on_pins[self._held] + weight
         held = float(np.einsum("ij,ij->", others, moved))
         add_works(self.by_name, {"pins": 0.5 * (E[0] - E[1] + E[2] - E[3]) - held})
 
     def _add_anchors(self, at: Substep, extended: Floats) -> None:
-        n, stitching = len(at.points), self.system.stitching
-        new = extended[n:, :3]
-        ends = [np.concatenate(pair) for pair in ((at.begun, new), (at.begun, self._anchored))]
-        ends += [np.concatenate(pair) for pair in ((at.points[:, :3], new), (at.points[:, :3], self._anchored))]
-        E = [stitch_energy(stitching, np.ascontiguousarray(x)) for x in ends]
+        new = extended[len(at.points) :, :3]
+        E = [self._in_stitches(x, anchors) for x in (at.begun, at.points) for anchors in (new, self._anchored)]
         add_works(self.by_name, {"anchors": 0.5 * (E[0] - E[1] + E[2] - E[3])})
+
+    def _in_stitches(self, x: Floats, anchors: Floats) -> float:
+        return stitch_energy(self.system.stitching, np.concatenate([x[:, :3], anchors]))
 
     def _add_inertia(self, velocities: Floats, sign: float) -> None:
         if len(self._held):

@@ -73,7 +73,6 @@ def advance(
         if len(ws.joints):
             add_works(ws.works.by_name, {"joints": ws.joints.end_substep(ws.points, ws.origins, end, h)})
         note_works(ws, at, damping)
-        ws.assessment.balance.note_contacts(ws.collisions.contacts)
     return held_back
 
 

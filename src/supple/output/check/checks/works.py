@@ -155,7 +155,7 @@ class Works(FrameCheck):
         rounding = _SINGLE * np.linalg.norm(moved, axis=1)
         sizes, after = np.linalg.norm(forces, axis=1), np.einsum("ij,ij->i", forces, moved)
         if not self._implicit:
-            # Each force is a mean over the frame, in which velocities differ from their mean by half of their change.
+            # Each force is a mean over the frame: it may have acted only while the velocity differed from its mean.
             return after, sizes * (self._way(last, at) + rounding)
         before = np.einsum("ij,ij->i", self._forces, moved)
         return 0.5 * (before + after), 0.5 * np.abs(after - before) + sizes * rounding
@@ -200,8 +200,13 @@ class Works(FrameCheck):
         return way
 
     def _way(self, last: Snapshot, at: Snapshot) -> NDArray[np.float64]:
-        """(n,) half of how far a vertex would go with the change of its velocity [m]."""
-        return 0.5 * self.scene.recording.dt * np.linalg.norm(at.velocities - last.velocities, axis=1)
+        """(n,) how far a vertex would go in a frame with the largest difference of its velocity from the mean [m].
+
+        Within a frame, velocities are taken to be between those of its ends. A vertex that hits something late stops
+        with almost all of the change; one that is slowed down evenly differs from the mean by half of it.
+        """
+        dt, moved = self.scene.recording.dt, at.positions - last.positions
+        return np.maximum(*(np.linalg.norm(dt * of.velocities - moved, axis=1) for of in (last, at)))
 
     def _of_pins(
         self,
