@@ -87,6 +87,12 @@ def test_keys(fresh):
     fresh.received(Pause)
     fresh.tab.wait_for_timeout(300)
     assert fresh.fake.received == []
+    fresh.screen.show_tab("Bodies")
+    keyboard.press(" ")  # after a click on a tab
+    fresh.received(Pause)
+    fresh.tab.locator("[role=slider]:visible").first.focus()
+    keyboard.press(" ")
+    fresh.received(Pause)
     camera = lambda: np.asarray(fresh.screen.client.camera.position)  # noqa: E731
     keyboard.press("4")
     center = fresh.live.stage.model.view.center
@@ -241,6 +247,42 @@ def test_notifications_do_not_cover_the_state_and_the_warning(fresh):
         boxes = [tab.locator(name).bounding_box() for name in ("#supple-state", "#supple-warning")]
         fresh.screen.wait(lambda: notification.bounding_box()["width"] > 0.5 * PHONE["width"], "the notification")
         assert all(notification.bounding_box()["y"] >= box["y"] + box["height"] for box in boxes)
+
+
+# Texts above the picture with less contrast than 4.5 (WCAG 2.1, 1.4.3) where the picture behind is black or white.
+PALE = """parts => parts.flatMap(part => [part, ...part.querySelectorAll("*")].flatMap(element => {
+  const own = [...element.childNodes].filter(node => node.nodeType === Node.TEXT_NODE).map(node => node.data).join("");
+  const colors = text => text.match(/[\\d.]+/g).map(Number);
+  const luminance = rgb => rgb.slice(0, 3).map(c => c / 255)
+    .map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, c, i) => sum + [0.2126, 0.7152, 0.0722][i] * c, 0);
+  let ground = element;
+  const under = () => getComputedStyle(ground).backgroundColor;
+  while (ground !== part && under() === "rgba(0, 0, 0, 0)") ground = ground.parentElement;
+  const [r, g, b, alpha = 1] = colors(under());
+  const text = luminance(colors(getComputedStyle(element).color));
+  return !own.trim() ? [] : [0, 255].filter(behind => {
+    const back = luminance([r, g, b].map(c => alpha * c + (1 - alpha) * behind));
+    return (Math.max(text, back) + 0.05) / (Math.min(text, back) + 0.05) < 4.5;
+  }).map(() => own);
+}))"""
+
+
+def test_texts_above_the_picture_are_readable_on_any_picture(fresh):
+    tab, views = fresh.tab, fresh.live.panel.views
+    changes = {"tet_values": np.full(96, 12_300.0), "tet_quantity": "von_mises"}
+    fresh.fake.show(paused=False, timing=Timing(40.0, 25.0, 0.42, keeps_up=False), **changes)
+    views.color_by.value = "von Mises stress"
+    views.apply()
+    tab.keyboard.press("?")
+    for name in ("state", "warning", "legend", "keys"):
+        fresh.screen.wait(lambda name=name: tab.locator(f"#supple-{name}").count() == 1, name)
+    for theme in ("light", "dark"):
+        tab.emulate_media(color_scheme=theme)
+        tab.wait_for_function(f"document.documentElement.dataset.mantineColorScheme === '{theme}'")
+        assert tab.locator("#supple-layer > *").evaluate_all(PALE) == []
+    views.color_by.value = "body"
+    views.apply()
 
 
 def test_the_bodies_stay_in_the_picture_of_a_window_that_becomes_a_phone(fresh):

@@ -181,6 +181,8 @@
     const button = event.target.closest?.("[data-press]");
     if (button) send(button.dataset.press, button.dataset.value ?? true);
     if (event.target.closest?.("#supple-keys")) toggleKeys();
+    // After a click with the mouse, the space bar is not for the tab.
+    if (event.detail) event.target.closest?.("[role=tab]")?.blur();
   });
 
   // The place of the pointer, for the value of the field there: (x, y) from -1 to 1, y upwards.
@@ -200,14 +202,15 @@
     if (text !== sent) send(pointer, (sent = text));
   }
 
-  // Keys. viser's client reacts to them in every element; a slider or a tab keeps its own ones.
-  const OWN = "[role=slider],[role=tab],[role=option],[role=listbox],[role=menu],[role=dialog],select";
+  // Keys. viser's client reacts to them in every element; a list or a tab keeps its own ones, and a slider its arrows.
+  const OWN = "[role=tab],[role=option],[role=listbox],[role=menu],[role=dialog],select";
   function attachKeys() {
     document.body.addEventListener("keydown", (event) => {
       const typed = event.target.closest?.("input,textarea");
       if (event.key === "?" && !typed) toggleKeys();
       if (event.key === "Escape") document.getElementById("supple-keys")?.remove();
-      if (event.target.closest?.(OWN) && /^( |Arrow)/.test(event.key)) event.stopPropagation();
+      const own = event.key === " " ? OWN : `[role=slider],${OWN}`;
+      if (/^( |Arrow)/.test(event.key) && event.target.closest?.(own)) event.stopPropagation();
       // Otherwise the space bar would also press the button that was clicked last.
       if (event.key === " " && event.target.closest?.("button")) event.target.blur();
     });
