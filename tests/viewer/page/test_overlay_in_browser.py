@@ -87,12 +87,11 @@ def test_keys(fresh):
     fresh.received(Pause)
     fresh.tab.wait_for_timeout(300)
     assert fresh.fake.received == []
-    fresh.screen.show_tab("Bodies")
-    keyboard.press(" ")  # after a click on a tab
-    fresh.received(Pause)
-    fresh.tab.locator("[role=slider]:visible").first.focus()
-    keyboard.press(" ")
-    fresh.received(Pause)
+    slider = fresh.tab.locator("[role=slider]:visible").first
+    for use in (fresh.tab.get_by_role("tab", name="Bodies").click, slider.focus):
+        use()
+        keyboard.press(" ")
+        fresh.received(Pause)
     camera = lambda: np.asarray(fresh.screen.client.camera.position)  # noqa: E731
     keyboard.press("4")
     center = fresh.live.stage.model.view.center
@@ -253,9 +252,8 @@ def test_notifications_do_not_cover_the_state_and_the_warning(fresh):
 PALE = """parts => parts.flatMap(part => [part, ...part.querySelectorAll("*")].flatMap(element => {
   const own = [...element.childNodes].filter(node => node.nodeType === Node.TEXT_NODE).map(node => node.data).join("");
   const colors = text => text.match(/[\\d.]+/g).map(Number);
-  const luminance = rgb => rgb.slice(0, 3).map(c => c / 255)
-    .map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
-    .reduce((sum, c, i) => sum + [0.2126, 0.7152, 0.0722][i] * c, 0);
+  const linear = c => c <= 10.31 ? c / 3294.6 : ((c / 255 + 0.055) / 1.055) ** 2.4;
+  const luminance = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
   let ground = element;
   const under = () => getComputedStyle(ground).backgroundColor;
   while (ground !== part && under() === "rgba(0, 0, 0, 0)") ground = ground.parentElement;
@@ -270,13 +268,13 @@ PALE = """parts => parts.flatMap(part => [part, ...part.querySelectorAll("*")].f
 
 def test_texts_above_the_picture_are_readable_on_any_picture(fresh):
     tab, views = fresh.tab, fresh.live.panel.views
-    changes = {"tet_values": np.full(96, 12_300.0), "tet_quantity": "von_mises"}
-    fresh.fake.show(paused=False, timing=Timing(40.0, 25.0, 0.42, keeps_up=False), **changes)
+    slow = Timing(40.0, 25.0, 0.42, keeps_up=False)
+    fresh.fake.show(paused=False, timing=slow, tet_values=np.full(96, 12_300.0), tet_quantity="von_mises")
     views.color_by.value = "von Mises stress"
     views.apply()
     tab.keyboard.press("?")
     for name in ("state", "warning", "legend", "keys"):
-        fresh.screen.wait(lambda name=name: tab.locator(f"#supple-{name}").count() == 1, name)
+        tab.locator(f"#supple-{name}").wait_for()
     for theme in ("light", "dark"):
         tab.emulate_media(color_scheme=theme)
         tab.wait_for_function(f"document.documentElement.dataset.mantineColorScheme === '{theme}'")
@@ -304,6 +302,10 @@ def test_the_bodies_stay_in_the_picture_of_a_window_that_becomes_a_phone(fresh):
     screen.wait(lambda: shares() < 0.5, "all bodies in the narrow picture")
     tab.set_viewport_size(WIDE)
     screen.wait(lambda: abs(away() - before) < 0.01 * before, "the camera where it was")
+    reset = "suppleViewer.mutable.current.resetCameraPose(false), suppleViewer.mutable.current.cameraControl.distance"
+    wide = tab.evaluate(reset)  # viser does so for a new visitor, too
+    tab.set_viewport_size(PHONE)
+    screen.wait(lambda: abs(tab.evaluate(reset) - 1.93 * wide) < 0.01 * wide, "the camera of a phone")
 
 
 def test_the_legend_in_the_picture_and_the_value_at_the_pointer(fresh):
