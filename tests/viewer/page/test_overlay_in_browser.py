@@ -87,6 +87,11 @@ def test_keys(fresh):
     fresh.received(Pause)
     fresh.tab.wait_for_timeout(300)
     assert fresh.fake.received == []
+    slider = fresh.tab.locator("[role=slider]:visible").first
+    for use in (fresh.tab.get_by_role("tab", name="Bodies").click, slider.focus):
+        use()
+        keyboard.press(" ")
+        fresh.received(Pause)
     camera = lambda: np.asarray(fresh.screen.client.camera.position)  # noqa: E731
     keyboard.press("4")
     center = fresh.live.stage.model.view.center
@@ -243,6 +248,41 @@ def test_notifications_do_not_cover_the_state_and_the_warning(fresh):
         assert all(notification.bounding_box()["y"] >= box["y"] + box["height"] for box in boxes)
 
 
+# Texts above the picture with less contrast than 4.5 (WCAG 2.1, 1.4.3) where the picture behind is black or white.
+PALE = """parts => parts.flatMap(part => [part, ...part.querySelectorAll("*")].flatMap(element => {
+  const own = [...element.childNodes].filter(node => node.nodeType === Node.TEXT_NODE).map(node => node.data).join("");
+  const colors = text => text.match(/[\\d.]+/g).map(Number);
+  const linear = c => c <= 10.31 ? c / 3294.6 : ((c / 255 + 0.055) / 1.055) ** 2.4;
+  const luminance = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  let ground = element;
+  const under = () => getComputedStyle(ground).backgroundColor;
+  while (ground !== part && under() === "rgba(0, 0, 0, 0)") ground = ground.parentElement;
+  const [r, g, b, alpha = 1] = colors(under());
+  const text = luminance(colors(getComputedStyle(element).color));
+  return !own.trim() ? [] : [0, 255].filter(behind => {
+    const back = luminance([r, g, b].map(c => alpha * c + (1 - alpha) * behind));
+    return (Math.max(text, back) + 0.05) / (Math.min(text, back) + 0.05) < 4.5;
+  }).map(() => own);
+}))"""
+
+
+def test_texts_above_the_picture_are_readable_on_any_picture(fresh):
+    tab, views = fresh.tab, fresh.live.panel.views
+    slow = Timing(40.0, 25.0, 0.42, keeps_up=False)
+    fresh.fake.show(paused=False, timing=slow, tet_values=np.full(96, 12_300.0), tet_quantity="von_mises")
+    views.color_by.value = "von Mises stress"
+    views.apply()
+    tab.keyboard.press("?")
+    for name in ("state", "warning", "legend", "keys"):
+        tab.locator(f"#supple-{name}").wait_for()
+    for theme in ("light", "dark"):
+        tab.emulate_media(color_scheme=theme)
+        tab.wait_for_function(f"document.documentElement.dataset.mantineColorScheme === '{theme}'")
+        assert tab.locator("#supple-layer > *").evaluate_all(PALE) == []
+    views.color_by.value = "body"
+    views.apply()
+
+
 def test_the_bodies_stay_in_the_picture_of_a_window_that_becomes_a_phone(fresh):
     tab, screen = fresh.tab, fresh.screen
     points = fresh.start.positions[np.linspace(0, len(fresh.start.positions) - 1, 40).astype(int)]
@@ -262,6 +302,10 @@ def test_the_bodies_stay_in_the_picture_of_a_window_that_becomes_a_phone(fresh):
     screen.wait(lambda: shares() < 0.5, "all bodies in the narrow picture")
     tab.set_viewport_size(WIDE)
     screen.wait(lambda: abs(away() - before) < 0.01 * before, "the camera where it was")
+    reset = "suppleViewer.mutable.current.resetCameraPose(false), suppleViewer.mutable.current.cameraControl.distance"
+    wide = tab.evaluate(reset)  # viser does so for a new visitor, too
+    tab.set_viewport_size(PHONE)
+    screen.wait(lambda: abs(tab.evaluate(reset) - 1.93 * wide) < 0.01 * wide, "the camera of a phone")
 
 
 def test_the_legend_in_the_picture_and_the_value_at_the_pointer(fresh):

@@ -59,9 +59,9 @@ class Measures:
             rows = np.nan_to_num(np.array(self._rows, dtype=np.float64), posinf=0.0, neginf=0.0)
         shown(self.energy, rows, (1, 2))
         shown(self.spin, rows, (3,))
-        lines = sparkline(rows[:, 4], "#b8860b") + sparkline(rows[:, 5], "#2e8b57")
-        now = f'energy {written(rows[-1, 4], "J", 3)}</span><span style="color:#2e8b57">smallest J {rows[-1, 5]:.3f}'
-        self._overlay.show("state", f'{lines}<div class="row"><span style="color:#b8860b">{now}</span></div>')
+        lines = sparkline(rows[:, 4], "energy") + sparkline(rows[:, 5], "smallest")
+        now = f'energy {written(rows[-1, 4], "J", 3)}</span><span class="smallest">smallest J {rows[-1, 5]:.3f}'
+        self._overlay.show("state", f'{lines}<div class="row"><span class="energy">{now}</span></div>')
 
 
 def plot(gui: Any, title: str, series: Iterable[tuple[str, str]]) -> Any:
@@ -86,13 +86,13 @@ def shown(handle: Any, rows: NDArray[np.float64], columns: Sequence[int]) -> Non
     handle.data = tuple(np.ascontiguousarray(rows[:, k]) for k in (0, *columns))
 
 
-def sparkline(values: NDArray[np.float64], color: str) -> str:
-    """A small plot of values (k,), as SVG; a line in the middle where they do not change."""
+def sparkline(values: NDArray[np.float64], kind: str) -> str:
+    """A small plot of values (k,), as SVG in the color of a class; a line in the middle where they do not change."""
     low, high = float(values.min()), float(values.max())
     across = np.linspace(1.0, 149.0, len(values)) if len(values) > 1 else np.array([1.0])
     up = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
     points = " ".join(f"{x:.0f},{y:.1f}" for x, y in zip(across, 22.0 - 20.0 * up, strict=True))
-    return f'<svg viewBox="0 0 150 24"><polyline points="{points}" fill="none" stroke="{color}"/></svg>'
+    return f'<svg class="{kind}" viewBox="0 0 150 24"><polyline points="{points}"/></svg>'
 
 
 def measures_text(snapshot: Snapshot) -> str:

@@ -31,7 +31,3 @@ def add_keys(gui: Any, stage: Stage, actions: Actions) -> None:
     for key, (name, act) in (*actions.items(), *views.items()):
         command = gui.add_command(name, hotkey=key)
         command.on_trigger(sequential(lambda event, act=act: event.client is not None and act(event.client)))
-
-
-def _look_from(stage: Stage, preset: str, client: Any) -> None:
-    look_from(client, preset, stage.model.view)

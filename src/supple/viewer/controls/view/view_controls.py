@@ -86,7 +86,6 @@ class ViewControls:
             handle.on_update(lambda _: self.apply())
         self.camera.on_click(self._look)
         self.follow.on_update(lambda _: self._begin_to_follow())
-        server.on_client_connect(self._welcome)
 
     def apply(self) -> None:
         """Draw with the options of the panel."""
@@ -161,11 +160,6 @@ class ViewControls:
         if center is not None:
             for client in self._server.get_clients().values():
                 follow(client, center - np.asarray(client.camera.look_at))
-
-    def _welcome(self, client: Any) -> None:
-        """In a picture that is higher than wide, the initial camera would cut the scene off."""
-        if client.camera.aspect < 1.0:
-            look_from(client, PRESETS[0], self._stage.model.view)
 
     def _look(self, event: Any) -> None:
         if event.client is not None:

@@ -26,6 +26,11 @@
       /(\w+)(&&document\.hidden\?\((\w+)\(\),(\w+)\.requestRender\(\)\):\w+\?\3\(\):)\4\.requestRender\(\)/,
       "$1$2($1&&suppleIsFirst()&&$3(),$4.requestRender())",
     ],
+    // Where the view is at first and after it is reset: in a narrow picture, farther away.
+    reset: [
+      /(\w+)(\.applyMatrix4\((\w+)\);let (\w+)=new \w+\(\.\.\.\w+\.lookAt\.value\);\4\.applyMatrix4\(\3\),)/,
+      "$1$2suppleReset($1,$4),",
+    ],
     // The arrow keys to the sides: the right one takes a step.
     keys: [/\.has\(`Arrow(?:Left|Right)`\)/g, ".has(``)"],
   };
@@ -137,17 +142,27 @@
     const box = suppleViewer.mutable.current.canvas?.getBoundingClientRect();
     if (box && layer) Object.assign(layer.style, {
       left: `${box.left}px`, top: `${box.top}px`, width: `${box.width}px`, height: `${box.height}px` });
-    if (box?.height) keepInPicture(Math.min(1, box.width / box.height));
+    keepInPicture();
   }
   // Where the picture becomes narrower than it is high, or wider again, the camera moves such that as much stays in it.
   let narrow = null;
-  function keepInPicture(now) {
-    const control = suppleViewer.mutable.current.cameraControl;
-    if (!control || now === narrow) return;
-    const sine = (aspect) => Math.sin(Math.atan(Math.tan((control.camera.fov * Math.PI) / 360) * aspect));
-    if (narrow !== null) control.dollyTo((control.distance * sine(narrow)) / sine(now), false);
+  const sine = (half, aspect) => Math.sin(Math.atan(Math.tan(half) * aspect));
+  function narrowness() {
+    const box = suppleViewer.mutable.current.canvas?.getBoundingClientRect();
+    return box?.width && box.height ? Math.min(1, box.width / box.height) : null;
+  }
+  function keepInPicture() {
+    const control = suppleViewer.mutable.current.cameraControl, now = narrowness();
+    if (!control || narrow === null || now === null || now === narrow) return;
+    const half = (control.camera.fov * Math.PI) / 360;
+    control.dollyTo((control.distance * sine(half, narrow)) / sine(half, now), false);
     narrow = now;
   }
+  globalThis.suppleReset = (eye, center) => {
+    narrow = narrowness() ?? 1;
+    const half = suppleViewer.useInitialCamera.get().fov.value / 2;
+    eye.sub(center).multiplyScalar(sine(half, 1) / sine(half, narrow)).add(center);
+  };
 
   // The values of sliders with their units: a text input of the panel that is not displayed, whose label names the
   // slider, takes the place of the slider's number.
@@ -181,6 +196,8 @@
     const button = event.target.closest?.("[data-press]");
     if (button) send(button.dataset.press, button.dataset.value ?? true);
     if (event.target.closest?.("#supple-keys")) toggleKeys();
+    // After a click with the mouse, the space bar is not for the tab.
+    if (event.detail) event.target.closest?.("[role=tab]")?.blur();
   });
 
   // The place of the pointer, for the value of the field there: (x, y) from -1 to 1, y upwards.
@@ -200,14 +217,15 @@
     if (text !== sent) send(pointer, (sent = text));
   }
 
-  // Keys. viser's client reacts to them in every element; a slider or a tab keeps its own ones.
-  const OWN = "[role=slider],[role=tab],[role=option],[role=listbox],[role=menu],[role=dialog],select";
+  // Keys. viser's client reacts to them in every element; a list or a tab keeps its own ones, and a slider its arrows.
+  const OWN = "[role=tab],[role=option],[role=listbox],[role=menu],[role=dialog],select";
   function attachKeys() {
     document.body.addEventListener("keydown", (event) => {
       const typed = event.target.closest?.("input,textarea");
       if (event.key === "?" && !typed) toggleKeys();
       if (event.key === "Escape") document.getElementById("supple-keys")?.remove();
-      if (event.target.closest?.(OWN) && /^( |Arrow)/.test(event.key)) event.stopPropagation();
+      const own = event.key === " " ? OWN : `[role=slider],${OWN}`;
+      if (/^( |Arrow)/.test(event.key) && event.target.closest?.(own)) event.stopPropagation();
       // Otherwise the space bar would also press the button that was clicked last.
       if (event.key === " " && event.target.closest?.("button")) event.target.blur();
     });
