@@ -29,7 +29,7 @@ for name in sys.argv[1:]:
     nobody = (np.zeros(0), np.zeros((0, 3, 3)), np.zeros(0), np.zeros((0, 9)), none)
     movers = Movers(np.ones(1), body, np.zeros((1, 3)), *nobody)
     points = (x.copy(), np.zeros(1), movers, x.copy())
-    ends = (0, 1, 1.0, 1.0, (0.0, 1.0), False)
+    ends = (0, 1, 1.0, 1.0, (0.0, 1.0), 1)
     kernels_of(shape.contact)[1](x, x.copy(), points, found, arrays, rules, frames, frames, *ends)
     print(name, *np.round(x[0], 6) + 0.0)
 """
