@@ -7,6 +7,9 @@ import pytest
 
 import supple as sp
 from supple.output.export.exporter import export
+from supple.readings.sensor_readings import sensor_readings
+from supple.state import ContactPoints
+from supple.system import build_system
 
 RUBBER = sp.StableNeoHookean(youngs=5e4, poisson=0.3, density=1000.0, damping=0.02)
 MESH = sp.shapes.box((0.2, 0.1, 0.2), (4, 1, 4))
@@ -101,6 +104,20 @@ def test_shear_is_along_the_grid_on_a_slope():
     expected = np.array([np.cos(ANGLE), np.sin(ANGLE), 0.0]) * WEIGHT
     np.testing.assert_allclose(sums, expected, atol=0.02 * WEIGHT)
     np.testing.assert_allclose(other.shear.sum(axis=(0, 1)), [sums[2], sums[1]], atol=0.005 * WEIGHT)
+
+
+def test_no_force_is_lost_where_a_vertex_is_pulled():
+    """The mean force over a frame may pull at all triangles of a vertex that turned far in it."""
+    system = build_system(sp.Scene([sp.Body("block", MESH, RUBBER)], [sp.HalfSpace(name="floor")], sensors=SENSORS[:1]))
+    corner = int(np.argmin(MESH.vertices.sum(axis=1)))
+    row = np.flatnonzero(system.points.single == corner)
+    for force in ([-3.0, -2.0, -1.0], [3.0, 2.0, 1.0]):
+        forces, numbers = np.array([force]), np.zeros(1, dtype=np.int32)
+        where = (np.zeros(1, dtype=np.int64), row.astype(np.int32), np.ones(1))
+        others = (0.1 * forces, np.zeros(1), numbers, numbers + 1, ("block", "floor"))
+        contacts = ContactPoints(np.zeros((1, 3)), forces / np.linalg.norm(forces), forces, *others, *where)
+        felt = sensor_readings(system, system.rest_positions, contacts)["all"]
+        np.testing.assert_allclose(felt.numbers()[:3], 1.1 * forces[0], rtol=1e-12)
 
 
 def test_scenes_without_contact_feel_nothing():

@@ -1,8 +1,10 @@
 """What sensors feel: the contact forces on parts of surfaces.
 
 The contact force of a vertex acts on those of its triangles that it pushes, in proportion to their areas projected
-along the normal force (`contact_pressures` divides by these areas). Each corner of each triangle so has a part of the
-force. The parts of all triangles add up to the whole force, and a part of a surface has those of its triangles.
+along the normal force (`contact_pressures` divides by these areas). Where it pushes none of them, as the mean over a
+frame in which the body turned far may, it acts on all, in proportion to their areas. Each corner of each triangle so
+has a part of the force. The parts of all triangles add up to the whole force, and a part of a surface has those of its
+triangles.
 """
 
 from __future__ import annotations
@@ -110,6 +112,8 @@ def _touched(triangles: NDArray[np.int32], x: NDArray[np.float64], contacts: Con
     pushes = contacts.on_vertices(contacts.forces, len(x))
     total = contacts.on_vertices(contacts.forces + contacts.friction, len(x))
     facing = np.maximum(-np.einsum("ti,tci->tc", areas, pushes[triangles]), 0.0)
+    pushed = np.bincount(triangles.ravel(), facing.ravel(), len(x)) > 0.0
+    facing = np.where(pushed[triangles], facing, lengths)
     sums = np.bincount(triangles.ravel(), facing.ravel(), len(x))
     shares = facing / np.where(sums > 0.0, sums, 1.0)[triangles]
     return Touched(triangles, shares[:, :, None] * total[triangles], normals)
