@@ -110,6 +110,15 @@ CASES = {
         {"a.obj": obj(POINTS, FACES)},
         ["mesh", "a.obj", "-o", "o.1.node", "--quality", "nan"],
     ),
+    "meshing with more tets than memory": (
+        {"a.obj": obj(POINTS, FACES)},
+        ["mesh", "a.obj", "-o", "o.1.node", "--tets", "99999999999"],
+    ),
+    "meshing with edges of atoms": (
+        {"a.obj": obj(POINTS, FACES)},
+        ["mesh", "a.obj", "-o", "o.1.node", "--edge", "1e-300"],
+    ),
+    "meshing with half a tet": ({"a.obj": obj(POINTS, FACES)}, ["mesh", "a.obj", "-o", "o.1.node", "--tets", "1.5"]),
     # tet meshes
     "no ele": ({"t.node": NODE}, ["info", "t.node"]),
     "no node": ({"t.ele": ELE}, ["info", "t.ele"]),
@@ -185,6 +194,15 @@ CASES = {
     "a missing argument": ({}, ["run"]),
     "steps that are no number": ({"s.yaml": scene()}, ["run", "s.yaml", "--steps", "many"]),
     "negative steps": ({"s.yaml": scene()}, ["run", "s.yaml", "--steps", "-3"]),
+    "more steps than a scene file may have": ({"s.yaml": scene()}, ["run", "s.yaml", "--steps", "9" * 30]),
+    "a trace onto a folder": (
+        {"s.yaml": scene(top="solver: {kind: implicit}\nsteps: 1\n"), "t/x": b""},
+        ["run", "s.yaml", "--trace", "t"],
+    ),
+    "a new scene of a name that is not in UTF-8": ({}, ["new", "\udcff.yaml"]),
+    "a surface of a name that is not in UTF-8": ({}, ["new", "s.yaml", "--surface", "\udcff.stl"]),
+    "a scene of a name that is not in UTF-8": ({}, ["run", "\udcff.yaml"]),
+    "a recording of a name that is not in UTF-8": ({}, ["plot", "\udcff.vtkhdf"]),
     "dt of zero": ({"s.yaml": scene()}, ["run", "s.yaml", "--dt", "0"]),
     "dt of nan": ({"s.yaml": scene()}, ["run", "s.yaml", "--dt", "nan"]),
     "an unknown solver on the command line": ({"s.yaml": scene()}, ["run", "s.yaml", "--solver", "magic"]),

@@ -119,3 +119,10 @@ def test_damaged_files_give_one_line(tmp_path, case):
         sp.SurfaceMesh.load(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_scale_beyond_all_numbers_gives_no_warning_of_numpy(tmp_path):
+    (tmp_path / "s.glb").write_bytes(file_of(document(nodes=[{"mesh": 0, "scale": [1e308] * 3}])))
+    with pytest.raises(MeshError):
+        sp.SurfaceMesh.load(tmp_path / "s.glb")

@@ -218,8 +218,14 @@ def test_time_limit_ends_the_mesher() -> None:
 def test_memory_limit_ends_the_mesher(mebibytes: int) -> None:
     """At 40 MiB NumPy cannot be loaded; at 200 MiB TetGen runs out of memory."""
     with pytest.raises(MesherFailure, match=rf"ran out of memory within the memory limit of {mebibytes} MiB") as error:
-        fill(SPHERE, max_volume=1e-8, memory_limit=mebibytes * 2**20)
+        fill(SPHERE, max_volume=SPHERE.volume / 600_000, memory_limit=mebibytes * 2**20)
     assert error.value.kind == "memory"
+
+
+@pytest.mark.parametrize("size", [{"tets": 10**12}, {"max_volume": 1e-12 * SPHERE.volume}, {"edge": 1e-300}], ids=str)
+def test_more_tets_than_memory_are_refused_before_the_mesher_starts(size) -> None:
+    with pytest.raises(MeshingError, match=r"at least (1e\+12|inf) tets do not fit into the memory limit of 4096 MiB"):
+        fill(SPHERE, **size)
 
 
 @pytest.mark.parametrize("shift", [(0.4, 0.01, 0.0), (0.4, 0.0, 0.0), (1e-9, 0.0, 0.0)], ids=str)

@@ -67,6 +67,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run `supple` with the given arguments, or those of the process; returns the exit code."""
     logging.basicConfig(level=_log_level(), format="%(levelname)s: %(message)s")
     given = sys.argv[1:] if arguments is None else list(arguments)
+    for text in given:
+        if any("\ud800" <= character <= "\udfff" for character in text):  # Python's sign for a byte that is not UTF-8
+            print_error(f"{text}: is not in UTF-8, and no scene file or recording could name it; rename it")
+            return ExitCode.INPUT
     if not given or given[0] not in COMMANDS:
         for name in COMMANDS:
             _ = app[name]  # imports it, so that the list of commands shows their descriptions

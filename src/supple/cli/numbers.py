@@ -17,6 +17,16 @@ def whole_number(_: Any, tokens: Sequence[Token]) -> int:
         raise ValueError(f"{text!r} is not a whole number") from None
 
 
+def steps(_: Any, tokens: Sequence[Token]) -> int:
+    """A number of frames, no larger than that of a scene file."""
+    from supple.scene_file.document import MAX_STEPS
+
+    number = whole_number(_, tokens)
+    if number > MAX_STEPS:
+        raise ValueError(f"at most {MAX_STEPS} frames are possible")
+    return number
+
+
 def seconds(_: Any, tokens: Sequence[Token]) -> float:
     """A time [s], as a number or a fraction such as 1/60."""
     from supple.scene_file.fraction import number_or_fraction
@@ -28,5 +38,5 @@ def seconds(_: Any, tokens: Sequence[Token]) -> float:
         raise ValueError(f"{text!r} is neither a number nor a fraction such as 1/60") from None
 
 
-Steps = Annotated[int | None, Parameter(converter=whole_number)]
+Steps = Annotated[int | None, Parameter(converter=steps)]
 Seconds = Annotated[float | None, Parameter(converter=seconds)]

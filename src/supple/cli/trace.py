@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from supple.errors import SolverError
+from supple.errors import OutputError, SolverError
 from supple.files.replacing import parent_folder, whole_file
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.newton.trace import NewtonRow, trace_csv
@@ -53,6 +53,7 @@ def traces(path: Path | None, solver: Solver) -> list[NewtonTrace]:
     Raises
     ------
     SolverError : where the solver does not use Newton's method.
+    OutputError : where the path is a folder.
     """
     if path is None:
         return []
@@ -61,4 +62,6 @@ def traces(path: Path | None, solver: Solver) -> list[NewtonTrace]:
             f"--trace {path}: {type(solver).__name__} does not use Newton's method; use --solver implicit, or leave "
             "--trace out"
         )
+    if path.is_dir():
+        raise OutputError(f"--trace {path}: is a folder; give the name of a file")
     return [NewtonTrace(path)]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.files.replacing import whole_file
+from supple.files.figures import save_figure
 from supple.output.drawing import body_color, opened
 from supple.output.recording.reader import Recording
 
@@ -75,8 +75,7 @@ def plot_recording(recording: Recording | str | Path, output: str | Path) -> Pat
                 axis.set_xlabel("time [s]")
         names = ", ".join(body.name for body in source.bodies[:6]) + (", …" if len(source.bodies) > 6 else "")
         figure.suptitle(f"{source.path.name}: {names} ({len(source)} frames)")
-        with whole_file(output) as fresh:
-            figure.savefig(fresh, format=kind)
+        save_figure(figure, output, kind)
     return output
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import StudyError
-from supple.files.replacing import whole_file
+from supple.files.figures import save_figure
 from supple.studies.effects import main_effects, varying_factors
 from supple.studies.table import StudyTable
 
@@ -168,6 +168,5 @@ def _figure(height: float = 4.5) -> tuple[Any, Any]:
 
 def _saved(figure: Any, output: str | Path) -> Path:
     output = Path(output)
-    with whole_file(output) as fresh:
-        figure.savefig(fresh, format=output.suffix[1:].lower() or "png")
+    save_figure(figure, output, output.suffix[1:].lower() or "png")
     return output

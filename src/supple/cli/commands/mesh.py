@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from supple.cli.numbers import whole_number
 from supple.errors import MeshError, MeshingError
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def mesh(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     scale: float = 1.0,
-    tets: int | None = None,
+    tets: Annotated[int | None, Parameter(converter=whole_number)] = None,
     edge: float | None = None,
     max_volume: float | None = None,
     quality: float = 1.4,
@@ -35,7 +36,7 @@ def mesh(
     keep_surface: Annotated[bool, Parameter(negative="")] = False,
     mesher: Literal["auto", "tetgen", "ftetwild"] = "auto",
     repair: Annotated[bool, Parameter(negative="")] = False,
-    decimate: int | None = None,
+    decimate: Annotated[int | None, Parameter(converter=whole_number)] = None,
     envelope: float = 1e-3,
     time_limit: float = 120.0,
     memory_limit: float = 4.0,

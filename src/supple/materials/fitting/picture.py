@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.files.replacing import whole_file
+from supple.files.figures import save_figure
 from supple.materials.fitting.curves import Curve
 
 _KINDS = ("png", "pdf", "svg")
@@ -47,6 +47,5 @@ def draw_fit(
     axes.grid(alpha=0.25, linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)
-    with whole_file(path) as fresh:
-        figure.savefig(fresh, format=kind)
+    save_figure(figure, path, kind)
     return path

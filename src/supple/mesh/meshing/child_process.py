@@ -72,6 +72,7 @@ def run_mesher(
 
     Raises
     ------
+    MeshingError : where the folder for temporary files cannot be written to.
     MesherFailure : where the child ran out of time or memory, crashed, or failed; it has ended by then.
     """
     with tempfile.TemporaryDirectory(prefix="supple-mesh-", ignore_cleanup_errors=True) as name:
@@ -83,8 +84,11 @@ def run_mesher(
             "memory_limit": limits.memory,
             "cpu_seconds": (limits.time + 10.0) * threads,
         }
-        (folder / "job.json").write_text(json.dumps(job), "utf-8")
-        np.savez(folder / "surface.npz", vertices=surface.vertices, triangles=surface.triangles)
+        try:
+            (folder / "job.json").write_text(json.dumps(job), "utf-8")
+            np.savez(folder / "surface.npz", vertices=surface.vertices, triangles=surface.triangles)
+        except OSError as error:
+            raise _unwritable(folder, error.strerror or str(error)) from None
         code, peak = _run_child(mesher, folder, limits)
         answer_file = folder / "answer.json"
         answer = json.loads(answer_file.read_text("utf-8")) if answer_file.exists() else {}
@@ -93,6 +97,8 @@ def run_mesher(
         if code == 0 and "error" not in answer:
             with np.load(folder / "mesh.npz") as mesh:
                 return MesherResult(mesh["vertices"], mesh["elements"], mesh["labels"], float(answer["seconds"]))
+        if "disk" in answer:
+            raise _unwritable(folder, answer["disk"])
         starved = limits.memory is not None and peak > STARVED * limits.memory
         raise _failure(mesher, code, answer.get("error", ""), _last_line(folder), limits, starved, remedy)
 
@@ -169,6 +175,11 @@ def _failure(
     how = f"exit code {code}" if code >= 0 else _signal_name(-code)
     output = f", its last output: {last}" if last else ""
     return MesherFailure("crash", f"{mesher} crashed ({how}){output}{remedy}")
+
+
+def _unwritable(folder: Path, reason: str) -> MeshingError:
+    """Not a failure of the mesher: another one would fail too."""
+    return MeshingError(f"the mesher's files cannot be written to {folder.parent}: {reason}; make room there")
 
 
 def _signal_name(number: int) -> str:

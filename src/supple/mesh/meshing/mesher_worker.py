@@ -19,7 +19,7 @@ VOLUME_ATTEMPTS = 5
 
 
 def main(folder: Path) -> int:
-    """Run the job in `folder`; returns the exit code: 0, or 1 where `answer.json` has the error."""
+    """Run the job in `folder`; returns 0, or 1 where `answer.json` has the error, or as "disk" that of a file."""
     job: dict[str, Any] = json.loads((folder / "job.json").read_text("utf-8"))
     answer: dict[str, Any] = {"notes": limit_process(job["cpu_seconds"], job["memory_limit"])}
     started = time.perf_counter()
@@ -41,6 +41,8 @@ def main(folder: Path) -> int:
             np.savez(file, vertices=points, elements=elements, labels=labels)
     except MemoryError:
         answer["error"], code = "out of memory", 1
+    except OSError as error:
+        answer["disk"], code = error.strerror or str(error), 1
     except Exception as error:
         text = " ".join(str(error).split())
         answer["error"], code = text if isinstance(error, RuntimeError) else f"{type(error).__name__}: {text}", 1

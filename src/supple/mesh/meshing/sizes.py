@@ -6,6 +6,7 @@ import logging
 import math
 from collections.abc import Callable
 
+from supple.errors import MeshingError
 from supple.mesh.tetmesh import TetMesh
 
 logger = logging.getLogger(__name__)
@@ -22,6 +23,18 @@ _LEVER = 2.0
 def volume_of_edge(edge: float) -> float:
     """The volume of a regular tetrahedron with edges of this length [m^3]."""
     return edge**3 / (6.0 * math.sqrt(2.0))
+
+
+def refuse_too_many(tets: float, memory: int | None) -> None:
+    """Raise `MeshingError` where so many tets do not fit into the memory [bytes] of a mesher.
+
+    A mesher keeps of each tet at least its 4 vertices and its 4 neighbors, in 8 bytes each.
+    """
+    if memory is not None and 64.0 * tets > memory:
+        raise MeshingError(
+            f"at least {tets:.3g} tets do not fit into the memory limit of {memory / 2**20:.0f} MiB; ask for larger "
+            "tets, or raise memory_limit"
+        )
 
 
 def mesh_with_count(make: Callable[[float], TetMesh], count: int, volume: float) -> TetMesh:

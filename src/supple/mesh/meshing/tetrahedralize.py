@@ -13,7 +13,7 @@ from supple.mesh.meshing.child_process import Limits, MesherFailure
 from supple.mesh.meshing.decimation import decimate_surface
 from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed, mesh_with_ftetwild
 from supple.mesh.meshing.repair import RepairReport, repair_surface
-from supple.mesh.meshing.sizes import mesh_with_count, volume_of_edge
+from supple.mesh.meshing.sizes import mesh_with_count, refuse_too_many, volume_of_edge
 from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
@@ -152,6 +152,9 @@ def tetrahedralize_reported(
     if chosen == "ftetwild":
         _check_ftetwild_options(quality, min_dihedral, keep_surface)
     seconds = 0.0
+    refuse_too_many(tets or 0, limits.memory)
+    if max_volume is not None and report.ok:
+        refuse_too_many(surface.volume / max_volume if max_volume > 0.0 else np.inf, limits.memory)
 
     def make(max_volume: float | None) -> TetMesh:
         nonlocal seconds, chosen

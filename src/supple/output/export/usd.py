@@ -27,37 +27,43 @@ def write_usd(recording: Recording, output: Path) -> None:
     """
     if find_spec("pxr") is None:
         raise OutputError("export to USD needs OpenUSD, which is not installed; pip install 'supple[usd]'")
-    from pxr import Tf, Usd, UsdGeom
+    from pxr import Tf
 
     with whole_file(output) as fresh:
-        stage = Usd.Stage.CreateNew(str(fresh))
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        stage.SetTimeCodesPerSecond(1.0 / recording.dt)
-        stage.SetFramesPerSecond(1.0 / recording.dt)
-        stage.SetStartTimeCode(0)
-        stage.SetEndTimeCode(len(recording) - 1)
-        stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/recording").GetPrim())
-        obstacles = obstacle_pictures(recording.obstacles, view_of(recording))
-        for group, drawn in (("bodies", pictures(recording)), ("obstacles", obstacles)):
-            folder = UsdGeom.Scope.Define(stage, f"/recording/{group}").GetPath()
-            for i, picture in enumerate(drawn):
-                mesh = _define(stage, f"{folder}/{_identifier(picture.name, i)}", picture)
-                if isinstance(picture, Picture) and picture.body.rigid:
-                    _set_points(mesh, picture.rest(recording), None)
-                    _set_poses(mesh, [picture.pose(frame) for frame in recording])
-                    continue
-                if isinstance(picture, ObstaclePicture) and not picture.moves(recording):
-                    _set_points(mesh, picture.at(recording[0]), None)
-                    continue
-                for k, frame in enumerate(recording):
-                    _set_points(mesh, picture.at(frame), k)
         try:
-            stage.GetRootLayer().Save()
+            _write(recording, fresh)
         except Tf.ErrorException as error:
             # The text contains the line of USD's source, then the reason, then what USD reads back.
             reason = re.search(r"rror occurred writing file: ([^'\n]*)", str(error))
             raise OSError(errno.EIO, reason[1] if reason else "USD could not write it") from None
+
+
+def _write(recording: Recording, path: Path) -> None:
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetTimeCodesPerSecond(1.0 / recording.dt)
+    stage.SetFramesPerSecond(1.0 / recording.dt)
+    stage.SetStartTimeCode(0)
+    stage.SetEndTimeCode(len(recording) - 1)
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/recording").GetPrim())
+    obstacles = obstacle_pictures(recording.obstacles, view_of(recording))
+    for group, drawn in (("bodies", pictures(recording)), ("obstacles", obstacles)):
+        folder = UsdGeom.Scope.Define(stage, f"/recording/{group}").GetPath()
+        for i, picture in enumerate(drawn):
+            mesh = _define(stage, f"{folder}/{_identifier(picture.name, i)}", picture)
+            if isinstance(picture, Picture) and picture.body.rigid:
+                _set_points(mesh, picture.rest(recording), None)
+                _set_poses(mesh, [picture.pose(frame) for frame in recording])
+                continue
+            if isinstance(picture, ObstaclePicture) and not picture.moves(recording):
+                _set_points(mesh, picture.at(recording[0]), None)
+                continue
+            for k, frame in enumerate(recording):
+                _set_points(mesh, picture.at(frame), k)
+    stage.GetRootLayer().Save()
 
 
 def _define(stage, path: str, picture):

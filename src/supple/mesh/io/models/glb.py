@@ -36,9 +36,9 @@ def read(data: bytes) -> CellSoup:
             if found is None:
                 continue
             x, rows = found
-            if np.linalg.det(place[:3, :3]) < 0.0:  # a mirror turns triangles around
-                rows = rows[:, ::-1]
             with np.errstate(all="ignore"):  # what is not finite is reported later, with its vertex
+                if np.linalg.det(place[:3, :3]) < 0.0:  # a mirror turns triangles around
+                    rows = rows[:, ::-1]
                 points.append(x @ place[:3, :3].T + place[:3, 3])
             triangles.append(rows + count)
             count += len(x)
