@@ -130,7 +130,9 @@ def test_the_same_bits_every_time(make):
         (lambda: shapes.sphere(1, "a"), "edge_length is 'a'"),  # pyright: ignore[reportArgumentType]
         (lambda: shapes.sphere(1, 2), "shorter"),
         (lambda: shapes.sphere(1, 1e-5), "longer"),
-        (lambda: shapes.sphere(1e200, 0.1), "would be inf elements"),
+        (lambda: shapes.sphere(1e200, 0.1), r"radius is 1e\+200"),
+        (lambda: shapes.cylinder(1e300, 1e300), r"radius is 1e\+300"),
+        (lambda: shapes.box((1e300, 1, 1), (1, 1, 1)), "of 1e90 at most"),
         (lambda: shapes.cylinder(1, np.inf), "height is inf"),
         (lambda: shapes.cylinder(1, 0.1, 0.2), "height = 0.1"),
         (lambda: shapes.cylinder(1, 1, 1e-4), "longer"),

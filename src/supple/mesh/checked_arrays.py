@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import MeshError
 
 MAX_VERTICES = np.iinfo(np.int32).max
+# Beyond this, squared lengths and determinants overflow without an error [m].
+LARGEST_LENGTH = 1e90
 
 
 def frozen(array: NDArray[Any]) -> NDArray[Any]:
@@ -36,9 +38,8 @@ def vertex_array(value: ArrayLike, owner: str) -> NDArray[np.float64]:
     if not np.isfinite(array).all():
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise MeshError(f"{owner}: vertex {row} is {place(array[row])}, which is not finite; correct or remove it")
-    # Beyond this, squared lengths and determinants overflow without an error.
     largest = float(np.abs(array).max())
-    if largest > 1e90:
+    if largest > LARGEST_LENGTH:
         row = int(np.abs(array).max(axis=1).argmax())
         raise MeshError(f"{owner}: vertex {row} is {place(array[row])}; coordinates beyond 1e90 m cannot be used")
     return frozen(array)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
+from supple.mesh.checked_arrays import LARGEST_LENGTH
 from supple.numerics.memory import require_memory
 
 # With more tets or triangles than this, the sizes given are most likely a typing error.
@@ -19,10 +19,14 @@ BYTES_PER_ELEMENT = 1000
 
 
 def positive(owner: str, **sizes: Any) -> None:
-    """Raise for lengths that are not positive, finite numbers."""
+    """Raise for lengths that are not positive numbers, or beyond those of meshes."""
     for name, value in sizes.items():
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < math.inf:
-            raise MeshError(f"{owner}: {name} is {value!r}; give a positive length in metres")
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float | np.number)
+            or not 0.0 < value <= LARGEST_LENGTH
+        ):
+            raise MeshError(f"{owner}: {name} is {value!r}; give a positive length in metres, of 1e90 at most")
 
 
 def lengths(owner: str, name: str, value: Sequence[float]) -> NDArray[np.float64]:
@@ -31,8 +35,8 @@ def lengths(owner: str, name: str, value: Sequence[float]) -> NDArray[np.float64
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         array = np.empty(0)
-    if array.shape != (3,) or not ((array > 0.0) & (array < math.inf)).all():
-        raise MeshError(f"{owner}: {name} is {value!r}; give three positive lengths in metres")
+    if array.shape != (3,) or not ((array > 0.0) & (array <= LARGEST_LENGTH)).all():
+        raise MeshError(f"{owner}: {name} is {value!r}; give three positive lengths in metres, of 1e90 at most")
     return array
 
 
