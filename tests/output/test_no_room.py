@@ -7,7 +7,10 @@ import subprocess
 import sys
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
+
+from supple.output.export.video_worker import _write_mp4
 
 pytest.importorskip("resource", reason="only POSIX limits the size of files")
 
@@ -77,3 +80,9 @@ def test_a_limit_of_file_sizes_is_an_error_and_leaves_no_file(tmp_path, recorded
         assert "File too large" in text, name
         assert "\n" not in text
     assert list(tmp_path.iterdir()) == []
+
+
+def test_where_ffmpeg_cannot_make_the_film_the_error_is_not_its_command(tmp_path):
+    images = (np.full((480, 640, 3), k, np.uint8) for k in range(60))
+    with pytest.raises(OSError, match="ffmpeg ended at frame"):
+        _write_mp4(images, tmp_path / "absent" / "a.mp4", 30.0, (640, 480))

@@ -100,8 +100,11 @@ def _write_mp4(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, s
     )
     writer.send(None)
     sent = 0
-    for sent, image in enumerate(images, start=1):  # noqa: B007
-        writer.send(image)
+    for sent, image in enumerate(images, start=1):
+        try:
+            writer.send(image)
+        except OSError:  # its text is the whole command of ffmpeg
+            raise OSError(errno.EIO, f"ffmpeg ended at frame {sent}; can the file be made there?") from None
     writer.close()
     # The writer does not report whether ffmpeg could write all frames.
     try:
