@@ -68,6 +68,6 @@ ARCH = torture(
     scene=scene,
     solver=lambda: Implicit(contact=IPCContact(dhat=DHAT, friction_velocity=SLOW)),
     measurement=_Measurement,
-    small=Size((1,), 1 / 2, round(2 * SECONDS)),
+    small=Size((1,), 1 / 5, round(5 * SECONDS)),
     full=Size((1,), 1 / 20, round(20 * SECONDS)),
 )
