@@ -83,11 +83,11 @@ def test_backward_euler_never_gains_energy():
 
 
 @pytest.mark.parametrize("integrator", ["bdf2", "newmark"])
-def test_second_order_collisions_keep_most_of_the_energy(integrator):
+def test_second_order_collisions_keep_the_energy_that_they_should(integrator):
     energies = np.array([energy(frame) for frame in collide(oblique(), 0.0025, 80, integrator=integrator)])
-    # Measured: BDF2 gains 3.3 % while they touch.
-    assert energies.max() <= energies[0] * 1.04
-    assert energies[-1] > 0.6 * energies[0]
+    # With steps of a quarter of this: newmark 0.55, bdf2 0.52, backward Euler 0.46. The rest vibrates, or was lost.
+    assert energies.max() <= energies[0] * (1 + 1e-5)
+    assert 0.45 * energies[0] < energies[-1] < 0.66 * energies[0]
 
 
 @pytest.mark.parametrize("dt", [0.001, 0.05, 0.2])

@@ -71,6 +71,11 @@ class Integrator(ABC):
 
     name: str
 
+    @property
+    def without_history(self) -> Integrator | None:
+        """The method for a step whose history is not that of a smooth solution; None where a step needs no history."""
+        return None
+
     @abstractmethod
     def plan(self, system: System, state: State, h: float) -> Plan:
         """A step of length h [s] from `state`."""
@@ -113,6 +118,10 @@ class BDF2(Integrator):
     """
 
     name = "bdf2"
+
+    @property
+    def without_history(self) -> Integrator:
+        return BackwardEuler()
 
     def plan(self, system: System, state: State, h: float) -> Plan:
         past = state.memory

@@ -32,6 +32,7 @@ from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
+from supple.implicit.stepping.numerical_energy import makes_energy
 from supple.implicit.stepping.rigid_bodies import rigid_ends, with_rigid_bodies
 from supple.implicit.stepping.works import works_of_step
 from supple.implicit.stepping.workspace import Workspace
@@ -91,7 +92,22 @@ class Substep:
 
 
 def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
-    """One step of length h [s] to the time `end` [s], from a state with the obstacles' vertices."""
+    """One step of length h [s] to the time `end` [s], from a state with the obstacles' vertices.
+
+    Where its integrator makes energy of the velocities before a blow, the step is taken again without its history.
+    """
+    taken = _take(state, end, h, settings, workspace)
+    method = settings.integrator.without_history
+    if method is None or state.memory is None or taken.outcome.status is not Status.CONVERGED:
+        return taken
+    balance = taken.works, taken.residual, taken.actuators
+    if not makes_energy(state, taken.state, *balance, settings.shortest(workspace, h) / h, workspace):
+        return taken
+    again = _take(state, end, h, replace(settings, integrator=method), workspace)
+    return replace(again, outcome=replace(again.outcome, rows=taken.outcome.rows + again.outcome.rows))
+
+
+def _take(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
     system, tools = workspace.system, workspace.tools
     targets = system.pin_targets(end)
     obstacles = len(state.positions) - workspace.bodies_end
