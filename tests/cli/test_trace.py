@@ -88,3 +88,11 @@ def test_a_path_that_cannot_be_written_is_one_line(scene, tmp_path, capfd):
     error = capfd.readouterr().err.strip()
     assert "file" in error
     assert len(error.splitlines()) == 1
+
+
+def test_a_trace_that_cannot_be_written_is_refused_before_the_run(scene, tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr("os.access", lambda path, mode: False)  # root may write everywhere
+    table = tmp_path / "new" / "newton.csv"
+    assert main(["run", str(scene), "-q", "-o", str(tmp_path / "out"), "--trace", str(table)]) == ExitCode.INPUT
+    assert f"--trace {table}: the folder {tmp_path} cannot be written to" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -15,6 +15,7 @@ from cyclopts.exceptions import CycloptsError
 from supple import __version__
 from supple.cli.console import ShellConsole
 from supple.cli.exit_codes import ExitCode
+from supple.cli.interrupts import ended_as_by_ctrl_c
 from supple.cli.print_error import print_error
 from supple.errors import SuppleError
 
@@ -75,7 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in COMMANDS:
             _ = app[name]  # imports it, so that the list of commands shows their descriptions
     try:
-        code = app(given)
+        with ended_as_by_ctrl_c():
+            code = app(given)
         _flush(sys.stdout)
     except SuppleError as error:
         print_error(str(error))

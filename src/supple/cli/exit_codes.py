@@ -14,6 +14,6 @@ class ExitCode(IntEnum):
     SOLVER = 3
     """The solver could not go on. The recording up to there is complete."""
     INTERRUPTED = 130
-    """Ctrl-C. The recording up to there is complete."""
+    """Ctrl-C, or the request of a system to end. The recording up to there is complete."""
     BROKEN_PIPE = 141
     """The reader of the output has ended, as in `supple info mesh.stl | head -1`."""

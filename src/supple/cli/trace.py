@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -53,7 +54,7 @@ def traces(path: Path | None, solver: Solver) -> list[NewtonTrace]:
     Raises
     ------
     SolverError : where the solver does not use Newton's method.
-    OutputError : where the path is a folder.
+    OutputError : where the path is a folder, or is in one that cannot be written to.
     """
     if path is None:
         return []
@@ -64,4 +65,7 @@ def traces(path: Path | None, solver: Solver) -> list[NewtonTrace]:
         )
     if path.is_dir():
         raise OutputError(f"--trace {path}: is a folder; give the name of a file")
+    folder = next(parent for parent in path.absolute().parents if parent.exists())
+    if folder.is_dir() and not os.access(folder, os.W_OK):
+        raise OutputError(f"--trace {path}: the folder {folder} cannot be written to; give another one")
     return [NewtonTrace(path)]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
 import mmap
 import os
+import shutil
 import signal
+import stat
 import subprocess
 import sys
 import tempfile
@@ -24,6 +27,8 @@ from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)
 
+# Of the folder of a mesher's files; one that is older than a day belongs to a process that was killed [s].
+PREFIX, A_DAY = "supple-mesh-", 86_400.0
 # A crash while more than this fraction of the allowed address space is used counts as lack of memory.
 STARVED = 0.8
 # How TetGen, C++, NumPy and the loader of shared libraries report it, in lower case.
@@ -75,11 +80,13 @@ def run_mesher(
     MeshingError : where the folder for temporary files cannot be written to.
     MesherFailure : where the child ran out of time or memory, crashed, or failed; it has ended by then.
     """
-    with tempfile.TemporaryDirectory(prefix="supple-mesh-", ignore_cleanup_errors=True) as name:
+    _delete_left_behind(Path(tempfile.gettempdir()), max(A_DAY, 2.0 * limits.time))
+    with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:
         folder = Path(name)
         threads = options.get("threads", 1) or os.cpu_count() or 1
         job = {
             "mesher": mesher,
+            "parent": os.getpid(),
             "options": options,
             "memory_limit": limits.memory,
             "cpu_seconds": (limits.time + 10.0) * threads,
@@ -101,6 +108,16 @@ def run_mesher(
             raise _unwritable(folder, answer["disk"])
         starved = limits.memory is not None and peak > STARVED * limits.memory
         raise _failure(mesher, code, answer.get("error", ""), _last_line(folder), limits, starved, remedy)
+
+
+def _delete_left_behind(temporary: Path, age: float) -> None:
+    """Delete own folders of meshers whose process was killed: those that are older than an age [s]."""
+    for folder in temporary.glob(PREFIX + "*"):
+        with contextlib.suppress(OSError):
+            known = folder.lstat()
+            own = not hasattr(os, "getuid") or known.st_uid == os.getuid()
+            if own and stat.S_ISDIR(known.st_mode) and known.st_mtime < time.time() - age:
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def _run_child(mesher: str, folder: Path, limits: Limits) -> tuple[int, int]:

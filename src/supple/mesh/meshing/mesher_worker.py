@@ -21,6 +21,7 @@ VOLUME_ATTEMPTS = 5
 def main(folder: Path) -> int:
     """Run the job in `folder`; returns 0, or 1 where `answer.json` has the error, or as "disk" that of a file."""
     job: dict[str, Any] = json.loads((folder / "job.json").read_text("utf-8"))
+    end_with_parent(job["parent"])
     answer: dict[str, Any] = {"notes": limit_process(job["cpu_seconds"], job["memory_limit"])}
     started = time.perf_counter()
     code = 0
@@ -51,10 +52,23 @@ def main(folder: Path) -> int:
     return code
 
 
+def end_with_parent(parent: int) -> None:
+    """Let the system kill this process when its parent, of this number, ends, even while a mesher runs; on Linux."""
+    if not sys.platform.startswith("linux"):
+        return
+    import ctypes
+    import signal
+
+    set_parent_death_signal = 1  # PR_SET_PDEATHSIG of <linux/prctl.h>
+    ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
+    if os.getppid() != parent:  # it ended before
+        os._exit(1)
+
+
 def limit_process(cpu_seconds: float, memory_limit: int | None) -> list[str]:
     """Limit this process's memory and CPU time where the platform can; returns a note where it cannot.
 
-    The limit on CPU time ends this process if the parent was killed before it could end its child.
+    Where the system does not end this process with its parent, the limit on CPU time does after a while.
     """
     try:
         import resource

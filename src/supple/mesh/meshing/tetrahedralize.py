@@ -25,6 +25,8 @@ Mesher = Literal["auto", "tetgen", "ftetwild"]
 
 # TetGen's facets are planar to 0.1 degrees; a larger change of the volume has another cause.
 VOLUME_TOLERANCE = 1e-3
+# Volumes and squares of areas of smaller surfaces are not normal numbers [m].
+SMALLEST_LENGTH = 1e-60
 DEFAULT_QUALITY = 1.4
 
 
@@ -130,6 +132,11 @@ def tetrahedralize_reported(
     _in_range("envelope", envelope, 0.0, 1.0)
     _in_range("time_limit", time_limit, 0.0, np.inf)
     _in_range("memory_limit", memory_limit, 0.0, np.inf)
+    extent = float(np.ptp(surface.vertices, axis=0).max(initial=0.0)) if len(surface.vertices) else 0.0
+    if 0.0 < extent < SMALLEST_LENGTH:
+        raise MeshingError(
+            f"the surface is {extent:.3g} m long; one below {SMALLEST_LENGTH:g} m cannot be meshed: scale it"
+        )
     limits = Limits(time_limit, None if memory_limit is None else int(memory_limit))
 
     repaired = None
