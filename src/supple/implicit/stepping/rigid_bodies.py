@@ -31,6 +31,8 @@ from supple.system import System
 # Each round divides the error by about w h; changes of the angle below this are round-off.
 _MOST_ROUNDS = 60
 _ROUNDED = 1e-15
+# Of |F^T F - 1| at the end of a step: beyond it a body is no longer rigid.
+_MOST_STRAINED = 0.01
 
 
 def with_rigid_bodies(
@@ -76,6 +78,18 @@ def rigid_ends(system: System, before: State, end: State, limits: StepLimits) ->
     if not np.isfinite(way).all() or limits.largest_step(end.positions, way).step < 1.0 or not limits.allows(x):
         return end
     return replace(end, positions=x, velocities=v)
+
+
+def strained(system: System, end: State) -> str:
+    """What is wrong where a rigid body is not rigid at the end of a midpoint step, because of surfaces in its way."""
+    errors = orthogonality_errors(system, end.positions)
+    name = max(errors, key=errors.__getitem__)
+    if errors[name] <= _MOST_STRAINED:
+        return ""
+    return (
+        f"surfaces are in the way of the rigid pose of body {name!r}, whose |F^T F - 1| is {errors[name]:.2g}; take a "
+        "shorter step, or 'backward_euler' or 'bdf2'"
+    )
 
 
 def _mirrored(

@@ -33,7 +33,7 @@ from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
 from supple.implicit.stepping.numerical_energy import makes_energy
-from supple.implicit.stepping.rigid_bodies import rigid_ends, with_rigid_bodies
+from supple.implicit.stepping.rigid_bodies import rigid_ends, strained, with_rigid_bodies
 from supple.implicit.stepping.works import works_of_step
 from supple.implicit.stepping.workspace import Workspace
 from supple.state import State, Status
@@ -178,6 +178,8 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
         outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
+        if text := strained(system, after):
+            outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
     acted = state.positions + plan.place * (x - state.positions)
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
     works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, end, workspace)
