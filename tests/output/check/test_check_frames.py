@@ -8,7 +8,7 @@ import pytest
 import supple as sp
 from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
 
-from .conftest import JELLY, V, X, failures, nan_position, recorded
+from .conftest import FRAMES, JELLY, V, X, failures, nan_position, recorded
 
 
 def nan_velocity(file, n):
@@ -147,6 +147,23 @@ def test_a_missing_frame(free, corrupted):
         file["supple/frames/index"][4:] = file["supple/frames/index"][4:] + 1
 
     assert failures(corrupted(free, change)) == {"sequence": 4}
+
+
+def test_a_step_that_failed_ends_a_recording_in_order(tmp_path):
+    """The last frame is the state before the step, at the time of that."""
+    cube = sp.Body("cube", sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1)), JELLY)
+    scene = sp.Scene([cube], gravity=(0, -1e17, 0))
+    path = recorded(tmp_path / "lost.vtkhdf", scene, sp.XPBD(substeps=5))
+    assert failures(path) == {"status": 1}
+    assert sp.check_recording(path)["status"].where == "not_finite"
+
+
+def test_a_failed_step_that_goes_back_in_time(free, corrupted):
+    def change(file, n):
+        file["supple/frames/status"][FRAMES - 1] = list(sp.Status).index(sp.Status.NOT_FINITE)
+        file["supple/frames/time"][FRAMES - 1] = 0.0
+
+    assert failures(corrupted(free, change))["sequence"] == FRAMES - 1
 
 
 @pytest.fixture(scope="module")

@@ -81,6 +81,10 @@ class Sequence(FrameCheck):
             at = recording[k]
             step = at.time - float(recording.times[k - 1])
             rounding = 4.0 * np.finfo(np.float64).eps * abs(at.time)
+            # A step that failed ends where the solver got to, at the latest with its length; `Converged` names it.
+            failed = not recording.statuses[k].can_go_on
+            if failed and 0.0 <= step <= recording.dt * (1.0 + _SAME_TIME) + rounding:
+                step = recording.dt
             if not step > 0.0:
                 self.tally.see(at, step, True, f"time {at.time:.9g} s does not come after the one before")
             elif indices[k] - indices[k - 1] != 1:
