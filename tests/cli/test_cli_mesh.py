@@ -101,7 +101,7 @@ def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> N
         (["ball.stl", "-o", "b.node", "--scale", "0"], "scale must be"),
         (["ball.stl", "-o", "b.node", "--memory-limit", "0"], "memory limit must be"),
         (["ball.stl", "-o", "b.node", "--time-limit", "nan"], "time_limit must be"),
-        (["ball.stl", "-o", "b.node", "--max-volume", "1e-8", "--time-limit", "0.5"], "time limit of 0.5 s"),
+        (["ball.stl", "-o", "b.node", "--max-volume", "3e-6", "--time-limit", "0.5"], "time limit of 0.5 s"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

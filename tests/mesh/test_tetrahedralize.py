@@ -208,7 +208,7 @@ def test_an_unreachable_max_volume_is_an_error() -> None:
 def test_time_limit_ends_the_mesher() -> None:
     started = time.monotonic()
     with pytest.raises(MesherFailure, match=r"time limit of 1 s.*raise time_limit") as error:
-        fill(SPHERE, max_volume=1e-8, time_limit=1.0)
+        fill(SPHERE, max_volume=3e-7, time_limit=1.0)
     assert error.value.kind == "time"
     assert time.monotonic() - started < 30
 
@@ -218,7 +218,7 @@ def test_time_limit_ends_the_mesher() -> None:
 def test_memory_limit_ends_the_mesher(mebibytes: int) -> None:
     """At 40 MiB NumPy cannot be loaded; at 200 MiB TetGen runs out of memory."""
     with pytest.raises(MesherFailure, match=rf"ran out of memory within the memory limit of {mebibytes} MiB") as error:
-        fill(SPHERE, max_volume=SPHERE.volume / 600_000, memory_limit=mebibytes * 2**20)
+        fill(SPHERE, max_volume=SPHERE.volume / (3000 * mebibytes), memory_limit=mebibytes * 2**20)
     assert error.value.kind == "memory"
 
 
@@ -226,6 +226,20 @@ def test_memory_limit_ends_the_mesher(mebibytes: int) -> None:
 def test_more_tets_than_memory_are_refused_before_the_mesher_starts(size) -> None:
     with pytest.raises(MeshingError, match=r"at least (1e\+12|inf) tets do not fit into the memory limit of 4096 MiB"):
         fill(SPHERE, **size)
+
+
+@pytest.mark.parametrize("size", [{"tets": 20_000_000}, {"max_volume": SPHERE.volume / 20_000_000}], ids=str)
+def test_twenty_million_tets_do_not_fit_into_four_gibibytes(size) -> None:
+    with pytest.raises(MeshingError, match=r"at least 2e\+07 tets do not fit into .* 4096 MiB; ask for fewer \(tets="):
+        fill(SPHERE, **size)
+
+
+@pytest.mark.parametrize("size", [{"tets": 2_000_000}, {"max_volume": SPHERE.volume / 800_000}], ids=str)
+def test_sizes_that_take_minutes_are_named_before_the_mesher_starts(size, caplog) -> None:
+    with pytest.raises(MesherFailure, match="time limit"):
+        fill(SPHERE, time_limit=0.1, **size)
+    assert "about 2e+06 tets are expected: the mesher may reach its time limit of 0.1 s; ask for fewer" in caplog.text
+    assert "tets=500000, or edge=0.02" in caplog.text
 
 
 @pytest.mark.parametrize("shift", [(0.4, 0.01, 0.0), (0.4, 0.0, 0.0), (1e-9, 0.0, 0.0)], ids=str)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,11 +106,24 @@ def record(path: Path, steps: int = 8, *, moved_by: Solver | None = None, divisi
     return list(simulate(small_scene(divisions), moved_by or Prescribed(), 1 / 30, steps, sinks=sinks))
 
 
+def vtk_arrays() -> tuple[Any, Any]:
+    """VTK, and its function that gives an array of NumPy; without VTK, the test is skipped."""
+    vtk = pytest.importorskip("vtk")
+    from vtk.util.numpy_support import vtk_to_numpy
+
+    return vtk, vtk_to_numpy
+
+
 @pytest.fixture(scope="session")
 def tools() -> SimpleNamespace:
     """The names above: tests cannot import this file."""
     return SimpleNamespace(
-        Prescribed=Prescribed, box=box, octahedron=octahedron, small_scene=small_scene, record=record
+        Prescribed=Prescribed,
+        box=box,
+        octahedron=octahedron,
+        small_scene=small_scene,
+        record=record,
+        vtk=vtk_arrays,
     )
 
 

@@ -11,6 +11,12 @@ from supple.mesh.tetmesh import TetMesh
 
 logger = logging.getLogger(__name__)
 
+# Tets that a bound on their volume gives, over the least number: a ball with TetGen had 2.5 to 3.3.
+TETS_OF_BOUND = 2.5
+# TetGen took 15 s for 0.5 million tets, and 177 s for 2.0 million, which it made more than once (two cores, in use).
+MANY = 1_000_000
+# Of TetGen, which needed 314 to 319 for each tet more, up to two million; fTetWild needs more.
+BYTES_OF_TET = 300.0
 COUNT_TOLERANCE = 0.1
 MOST_TRIES = 6
 
@@ -25,15 +31,31 @@ def volume_of_edge(edge: float) -> float:
     return edge**3 / (6.0 * math.sqrt(2.0))
 
 
-def refuse_too_many(tets: float, memory: int | None) -> None:
-    """Raise `MeshingError` where so many tets do not fit into the memory [bytes] of a mesher.
+def edge_of_volume(volume: float) -> float:
+    """The edge of a regular tetrahedron of this volume [m]."""
+    return (6.0 * math.sqrt(2.0) * volume) ** (1.0 / 3.0)
 
-    A mesher keeps of each tet at least its 4 vertices and its 4 neighbors, in 8 bytes each.
+
+def warn_of_many(tets: float, volume: float, seconds: float) -> None:
+    """Log before the start where about so many tets of a whole volume [m^3] may take longer than a time limit [s].
+
+    It is no refusal: the time depends on the machine, and the limit ends the mesher.
     """
-    if memory is not None and 64.0 * tets > memory:
+    if tets >= MANY:
+        edge = edge_of_volume(TETS_OF_BOUND * volume / MANY)
+        logger.warning(
+            "about %.2g tets are expected: the mesher may reach its time limit of %g s; ask for fewer (tets=%d, or "
+            "edge=%.2g), or raise time_limit",
+            *(tets, seconds, MANY // 2, edge),
+        )
+
+
+def refuse_too_many(tets: float, memory: int | None) -> None:
+    """Raise `MeshingError` where so many tets do not fit into the memory [bytes] of a mesher."""
+    if memory is not None and BYTES_OF_TET * tets > memory:
         raise MeshingError(
-            f"at least {tets:.3g} tets do not fit into the memory limit of {memory / 2**20:.0f} MiB; ask for larger "
-            "tets, or raise memory_limit"
+            f"at least {tets:.3g} tets do not fit into the memory limit of {memory / 2**20:.0f} MiB; ask for fewer "
+            "(tets=, or a larger edge), or raise memory_limit"
         )
 
 

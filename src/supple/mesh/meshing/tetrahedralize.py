@@ -13,7 +13,7 @@ from supple.mesh.meshing.child_process import Limits, MesherFailure
 from supple.mesh.meshing.decimation import decimate_surface
 from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed, mesh_with_ftetwild
 from supple.mesh.meshing.repair import RepairReport, repair_surface
-from supple.mesh.meshing.sizes import mesh_with_count, refuse_too_many, volume_of_edge
+from supple.mesh.meshing.sizes import TETS_OF_BOUND, mesh_with_count, refuse_too_many, volume_of_edge, warn_of_many
 from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
@@ -159,9 +159,13 @@ def tetrahedralize_reported(
     if chosen == "ftetwild":
         _check_ftetwild_options(quality, min_dihedral, keep_surface)
     seconds = 0.0
-    refuse_too_many(tets or 0, limits.memory)
+    low, high = surface.bounds  # an open surface has no volume
+    enclosed = surface.volume if report.watertight else 0.5 * float(np.prod(high - low))
+    least = tets or 0
     if max_volume is not None and report.ok:
-        refuse_too_many(surface.volume / max_volume if max_volume > 0.0 else np.inf, limits.memory)
+        least = enclosed / max_volume if max_volume > 0.0 else np.inf
+    refuse_too_many(least, limits.memory)
+    warn_of_many(least if tets else TETS_OF_BOUND * least, enclosed, limits.time)
 
     def make(max_volume: float | None) -> TetMesh:
         nonlocal seconds, chosen
@@ -196,8 +200,6 @@ def tetrahedralize_reported(
     if tets is None:
         mesh = make(max_volume)
     else:
-        low, high = surface.bounds  # an open surface has no volume
-        enclosed = surface.volume if report.watertight else 0.5 * float(np.prod(high - low))
         mesh = mesh_with_count(make, tets, max(enclosed, 1e-3 * float(np.prod(high - low))))
     logger.info("%s: %d vertices, %d tets in %.2f s", chosen, len(mesh.vertices), len(mesh.tets), seconds)
     return mesh, MeshingReport(chosen, seconds, repaired)
