@@ -7,8 +7,8 @@ from typing import Any
 from benchmarks.table import measured_on, row_of
 
 _PLATES = {
-    "obstacles": "obstacles of triangles, moved by a script",
-    "scripted bodies": "rigid bodies, moved by the same script",
+    "obstacles": "obstacles of triangles, the upper one moved as the free plate",
+    "scripted bodies": "rigid bodies, moved in the same way",
     "free bodies": "rigid bodies, the lower one held, the upper one free",
 }
 _WAYS = {
@@ -20,17 +20,17 @@ _WAYS = {
 
 def rigid_bodies_text(figures: dict[str, Any]) -> str:
     """The table of `benchmarks.rigid_bodies`."""
-    plates = figures["plates"]
     lines = [
         f"The ball has {figures['tets']:,} tets. {measured_on(figures)}",
         "",
-        "| plates | ms/step | Newton/step | ratio |",
-        "|---|---|---|---|",
+        "| solver | plates | ms/step | Newton iterations or substeps | ratio |",
+        "|---|---|---|---|---|",
     ]
-    for kind, text in _PLATES.items():
-        one = plates[kind]
-        ratio = one["ms_per_step"] / plates["obstacles"]["ms_per_step"]
-        lines.append(f"| {text} | {one['ms_per_step']:.1f} | {one['iterations']:.1f} | {ratio:.2f} |")
+    for solver, plates in figures["solvers"].items():
+        for kind, text in _PLATES.items():
+            one = plates[kind]
+            ratio = one["ms_per_step"] / plates["obstacles"]["ms_per_step"]
+            lines.append(f"| `{solver}` | {text} | {one['ms_per_step']:.1f} | {one['iterations']:.1f} | {ratio:.2f} |")
     return "\n".join(lines)
 
 

@@ -132,6 +132,18 @@ def test_a_floating_root_falls(tmp_path):
     assert frame.poses["a"].velocity[2] == pytest.approx(-0.0981)
 
 
+def _chain(count, mass=""):
+    """Links, each the child of the next one."""
+    links = "".join(f'<link name="l{i}">{mass}</link>' for i in range(count + 1))
+    joints = "".join(
+        f'<joint name="j{i}" type="fixed"><parent link="l{i + 1}"/><child link="l{i}"/></joint>' for i in range(count)
+    )
+    return f'<robot name="chain">{links}{joints}</robot>'
+
+
+MASS = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+
+
 BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>\n'
 BAD = {
     "empty": "",
@@ -202,12 +214,32 @@ BAD = {
     "a moving frame": ARM.replace('name="flange" type="fixed"', 'name="flange" type="continuous"'),
     "name of a path": ARM.replace('"upper"', '"up/per"'),
     "binary": "\x00\x01\x02",
+    "huge inertia": ARM.replace('ixx="0.02" ixy="0.0005"', 'ixx="1e308" ixy="0.0005"'),
+    "huge angle": ARM.replace('rpy="0 0 0.3"', 'rpy="0 0 1e308"'),
+    "huge scale": ARM.replace('scale="0.001 0.001 0.001"', 'scale="1e200 1e200 1e200"'),
+    "huge damping": ARM.replace('damping="0.2"', 'damping="1e300"'),
+    "mass with a unit": ARM.replace('mass value="2"', 'mass value="2 kg"'),
+    "limits with a unit": ARM.replace('lower="0" upper="0.04"', 'lower="0deg" upper="90deg"'),
+    "sphere of nothing": ARM.replace('<cylinder radius="0.03" length="0.2"/>', '<sphere radius="0"/>'),
+    "scale of nothing": ARM.replace('scale="0.001 0.001 0.001"', 'scale="0 0 0"'),
+    "mesh outside": ARM.replace("package://arm/meshes/lower.stl", "../../../../../../etc/passwd"),
+    "mesh of the net": ARM.replace("package://arm/meshes/lower.stl", "http://localhost:1/lower.stl"),
+    "part of a mesh": ARM.replace("lower.stl", "broken.stl"),
+    "macro": ARM.replace('mass value="2"', 'mass value="${m}"'),
+    "namespace": ARM.replace("<robot name", '<robot xmlns="http://x" name'),
+    "attribute twice": ARM.replace('mass value="2"', 'mass value="2" value="3"'),
+    "deep": "<robot>" + "<link>" * 100_000 + "</link>" * 100_000 + "</robot>",
+    "no end of depth": "<robot>" + "<a>" * 100_000,
+    "long frames": _chain(5_000),
+    "long loop below a frame": _chain(5_000).replace('parent link="l5000"', 'parent link="l1"'),
 }
 
 
 @pytest.mark.parametrize("what", BAD)
 def test_bad_robots_are_refused_in_one_line(what, robot_file, capsys):
-    (robot_file.parent / "meshes" / "lower.dae").write_text("<COLLADA/>")
+    meshes = robot_file.parent / "meshes"
+    (meshes / "lower.dae").write_text("<COLLADA/>")
+    (meshes / "broken.stl").write_bytes((meshes / "lower.stl").read_bytes()[:100])
     robot_file.write_text(BAD[what])
     code = main(["run", str(robot_file), "-o", str(robot_file.parent / "out"), "--steps", "1", "--quiet"])
     printed = capsys.readouterr().err
@@ -215,6 +247,30 @@ def test_bad_robots_are_refused_in_one_line(what, robot_file, capsys):
     assert len(printed.strip().splitlines()) == 1, printed
     assert "arm.urdf" in printed or "joint" in printed, printed
     assert "Traceback" not in printed
+
+
+def test_links_are_placed_in_one_pass(tmp_path, monkeypatch):
+    """A file of a megabyte may have thousands of links in one line."""
+    from supple.scene_file.urdf import describe
+
+    asked = []
+    is_body = describe._is_body
+    monkeypatch.setattr(describe, "_is_body", lambda link, robot: asked.append(link) or is_body(link, robot))
+    path = tmp_path / "chain.urdf"
+    path.write_text(_chain(400).replace('<link name="l0">', f'<link name="l0">{MASS}'))
+    (body,) = sp.load_scene(path).bodies
+    assert body.name == "l0"
+    assert len(asked) < 5 * 401
+
+
+def test_more_links_than_a_scene_file_may_have_are_refused_before_they_are_described(tmp_path, monkeypatch):
+    from supple.scene_file.urdf import describe
+
+    monkeypatch.setattr(describe, "_MOST_BODIES", 3)
+    path = tmp_path / "chain.urdf"
+    path.write_text(_chain(3, MASS))
+    with pytest.raises(sp.SceneError, match=r"chain.urdf: 4 links have a mass; at most 3 are read"):
+        sp.load_scene(path)
 
 
 def test_bytes_that_are_no_text_are_refused(robot_file):

@@ -176,6 +176,19 @@ def test_a_heavy_body_on_a_light_one_gains_no_energy():
     assert frames[-1].poses["high"].translation[1] > 0.15
 
 
+@pytest.mark.parametrize(("size", "ratio"), [(0.1, 50.0), (0.1, 130.0), (0.01, 50.0)])
+def test_a_heavy_body_that_falls_on_a_soft_mat_gains_no_energy(size, ratio):
+    """The modulus is twenty times the pressure of the weight."""
+    material = sp.StableNeoHookean(youngs=20.0 * ratio * 1000.0 * G * size, poisson=0.4, density=1000.0)
+    mat = sp.Body("mat", sp.shapes.box((3 * size, size, 3 * size), (6, 2, 6)), material, position=(0, 0.6 * size, 0))
+    cube = sp.shapes.box_surface((size,) * 3, (1, 1, 1))
+    heavy = sp.RigidBody("heavy", cube, density=1000.0 * ratio, position=(0, 1.7 * size, 0), friction=0.5)
+    frames = run(sp.Scene([mat, heavy], obstacles=[FLOOR]), 16, substeps="auto")
+    from_nowhere = np.cumsum([0.0, *(frame.report.work["numerical"] for frame in frames)])
+    fall = 0.2 * size * ratio * 1000.0 * size**3 * G
+    assert np.max(from_nowhere - np.minimum.accumulate(from_nowhere)) < 0.01 * fall
+
+
 def test_a_stack_of_small_boxes_lands_without_a_gain_of_energy():
     """Boxes of 3 mm that fall by 2 mm; the 7 substeps of larger boxes gain 75 % of the energy."""
     size = 3e-3

@@ -16,6 +16,8 @@ from supple.scene_file.urdf.robot import Geometry, Inertia, Link, Placement, Rob
 
 # The edges of spheres and cylinders, as a share of the radius.
 _EDGE = 0.5
+# As many as a scene file may have; checked before the text of the scene is written and read.
+_MOST_BODIES = 10_000
 
 
 def described(robot: Robot) -> tuple[dict[str, Any], list[str]]:
@@ -23,29 +25,32 @@ def described(robot: Robot) -> tuple[dict[str, Any], list[str]]:
 
     Raises
     ------
-    SceneError : where a link that moves has no mass.
+    SceneError : where a link that moves has no mass, or there are too many links.
     """
     frames = _frames(robot)
     missing = list(robot.ignored)
     bodies, unseen = [], []
-    for link in robot.links.values():
-        if _is_body(link, robot):
-            bodies.append(_body(link, frames[link.name]))
-            if link.collision is None:
-                unseen.append(link.name)
+    moving = [link for link in robot.links.values() if _is_body(link, robot)]
+    if len(moving) > _MOST_BODIES:
+        raise SceneError(f"{len(moving)} links have a mass; at most {_MOST_BODIES} are read")
+    for link in moving:
+        bodies.append(_body(link, frames[link.name]))
+        if link.collision is None:
+            unseen.append(link.name)
     if not bodies:
         raise SceneError("no link has a mass; give <inertial> to those that move")
     joints = []
     if _is_body(robot.links[robot.root], robot):
         joints.append({"kind": "fixed", "first": robot.root, "name": f"{robot.root} to the world"})
-    parents = {joint.child: joint for joint in robot.joints}
+    carriers = _carriers(robot, list(frames))
+    parents = {joint.parent for joint in robot.joints}
     for joint in robot.joints:
         if not _is_body(robot.links[joint.child], robot):
-            if joint.kind != "fixed" and joint.child in {other.parent for other in robot.joints}:
+            if joint.kind != "fixed" and joint.child in parents:
                 raise SceneError(f"link {joint.child!r} moves and has no mass; give it an <inertial>")
             continue
         if joint.kind != "floating":
-            joints.append(_joint(joint, _carrier(joint.parent, parents, robot), frames[joint.child]))
+            joints.append(_joint(joint, carriers[joint.parent], frames[joint.child]))
     pairs = [{"first": unseen, "second": "*", "collide": False}] if unseen and len(bodies) > 1 else []
     solver = {"kind": "implicit"}
     data = {"bodies": bodies, "joints": joints, "contact_pairs": pairs, "gravity": [0.0, 0.0, -9.81], "solver": solver}
@@ -56,17 +61,18 @@ def _is_body(link: Link, robot: Robot) -> bool:
     return link.inertia is not None or (link.name == robot.root and link.collision is not None)
 
 
-def _carrier(name: str, parents: dict[str, RobotJoint], robot: Robot) -> str | None:
-    """The nearest link from `name` upwards that is a body; None for the world."""
-    while not _is_body(robot.links[name], robot):
-        if name not in parents:
-            return None
-        name = parents[name].parent
-    return name
+def _carriers(robot: Robot, downwards: list[str]) -> dict[str, str | None]:
+    """By link, the nearest one from it upwards that is a body; None for the world. downwards : parents first."""
+    above = {joint.child: joint.parent for joint in robot.joints}
+    carriers: dict[str, str | None] = {}
+    for name in downwards:
+        is_body = _is_body(robot.links[name], robot)
+        carriers[name] = name if is_body else carriers.get(above.get(name, ""))
+    return carriers
 
 
 def _frames(robot: Robot) -> dict[str, Placement]:
-    """Where the links' frames are in the world, with all joints at zero and the root at the origin."""
+    """Where the links' frames are in the world, parents first, with all joints at zero and the root at the origin."""
     frames = {robot.root: Placement()}
     children: dict[str, list[RobotJoint]] = {}
     for joint in robot.joints:

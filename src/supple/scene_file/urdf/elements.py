@@ -14,6 +14,7 @@ import numpy as np
 from supple.scene_file.yaml_reader import printable
 
 _LARGEST = 16 * 2**20  # bytes
+_LARGEST_NUMBER = 1e90  # products of three of them are numbers
 
 
 class Problem(Exception):
@@ -77,12 +78,14 @@ def attribute(element: ElementTree.Element, key: str, what: str) -> str:
 
 
 def numbers(element: ElementTree.Element, key: str, what: str, count: int) -> tuple[float, ...]:
-    """The finite numbers of an attribute; raises `Problem` where there are others or not as many."""
+    """The numbers of an attribute, of 1e90 at most; raises `Problem` where there are others or not as many."""
     text = attribute(element, key, what)
     values = tuple(_floats(text))
     if len(values) != count or not np.isfinite(values).all():
         wanted = "one finite number" if count == 1 else f"{count} finite numbers"
         raise Problem(f"{what}: {key} of its <{element.tag}> is {printable(text)!r}; give {wanted}")
+    if np.abs(values).max() > _LARGEST_NUMBER:
+        raise Problem(f"{what}: {key} of its <{element.tag}> is {printable(text)!r}; give at most {_LARGEST_NUMBER:g}")
     return values
 
 

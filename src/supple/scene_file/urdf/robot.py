@@ -145,12 +145,19 @@ def _root(links: dict[str, Link], joints: dict[str, RobotJoint]) -> str:
     if len(roots) > 1:
         text = ", ".join(repr(printable(name)) for name in roots[:5])
         raise Problem(f"links {text} have no parent; join them, so that the links are one tree")
-    for name in links:
-        here, seen = name, 0
-        while here in parents:
-            here, seen = parents[here], seen + 1
-            if seen > len(links):
-                raise Problem(f"link {printable(name)!r} is its own ancestor; links must be a tree without loops")
+    children: dict[str, list[str]] = {}
+    for child, parent in parents.items():
+        children.setdefault(parent, []).append(child)
+    reached, waiting = set(roots), list(roots)
+    while waiting:
+        below = children.get(waiting.pop(), [])
+        reached.update(below)
+        waiting += below
+    if len(reached) < len(links):
+        here = next(name for name in links if name not in reached)
+        for _ in links:  # upwards, into the loop
+            here = parents[here]
+        raise Problem(f"link {printable(here)!r} is its own ancestor; links must be a tree without loops")
     return roots[0]
 
 
