@@ -25,7 +25,8 @@ from supple.output.drawing import (
 )
 from supple.output.recording.frame import RecordedFrame
 from supple.output.recording.reader import Recording
-from supple.output.viser_server import temporary_server
+from supple.output.view.gate import new_token
+from supple.output.view.server import gated_server
 
 # Bytes of moving vertices before compression, which at least halves them; pages of longer recordings have fewer frames.
 _MOST_BYTES = 36_000_000
@@ -49,7 +50,7 @@ def write_page(
     """
     output = Path(output)
     with opened(recording) as source, whole_file(output) as fresh:
-        with temporary_server() as server:
+        with gated_server(new_token()) as server:
             page = _serialize(server, source, frames or source)
         fresh.write_text(titled(page, ", ".join(body.name for body in source.bodies)), encoding="utf-8")
     return output

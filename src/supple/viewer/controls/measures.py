@@ -14,7 +14,7 @@ from supple.readings.joint_readings import JointReading
 from supple.viewer.controls.view.overlay import Overlay
 from supple.viewer.protocol.quantities import written
 from supple.viewer.protocol.snapshots import Snapshot
-from supple.viewer.server.plain_markdown import plain
+from supple.viewer.controls.plain_markdown import plain
 
 _SECONDS = 10.0  # of simulated time in a plot
 _MOST_JOINTS = 12  # in the text

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from supple.output.page import quantum_of, titled
-from supple.output.viser_server import temporary_server
+from supple.output.view.gate import new_token
+from supple.output.view.server import gated_server
 from supple.viewer.drawing.layers.skin import drawn_points
 from supple.viewer.drawing.moments.model import Model, Moment
 from supple.viewer.drawing.options import ViewOptions
@@ -38,7 +39,7 @@ def page_of_moments(moments: Sequence[tuple[float, Moment]], options: ViewOption
     """
     first = moments[0][1].model
     moments = [moments[i] for i in evenly(len(moments), most_moments(first, options))]
-    with temporary_server() as server:
+    with gated_server(new_token()) as server:  # nobody knows the token
         stage = Stage(server, _rounded(moments[0][1]), options)
         serializer = server.get_scene_serializer()
         previous = moments[0][0]

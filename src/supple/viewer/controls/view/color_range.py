@@ -10,7 +10,6 @@ from supple.viewer.controls.controller import sequential
 from supple.viewer.drawing.coloring.color_scale import Range
 from supple.viewer.drawing.stage import Stage
 from supple.viewer.protocol.quantities import typed, written
-from supple.viewer.server.browser_values import one_of
 
 _FIXED = "fixed"
 _SHARES = {"98 % of the values": 0.98, "90 % of the values": 0.90, "all values": 1.0}
@@ -42,7 +41,7 @@ class ColorRange:
     @property
     def ends(self) -> Range:
         """The choice."""
-        kind = one_of(self.kind.value, KINDS)
+        kind = self.kind.value
         return Range(fixed=self._fixed) if kind == _FIXED else Range(_SHARES[kind])
 
     def show(self) -> None:

@@ -1,4 +1,4 @@
-"""A slider for a value with a unit, which is also displayed as text, and can be typed: "30 kPa"."""
+"""A slider for a value with a unit, and the value as text, which can be typed: "30 kPa"."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from typing import Any
 from supple.errors import CommandError
 from supple.viewer.controls.controller import notify, sequential
 from supple.viewer.protocol.quantities import WITH_PREFIX, typed, written
-from supple.viewer.server.browser_values import number
 
 # The smallest power of ten of a slider whose left end is zero.
 _LEAST_POWER = -12.0
+# A browser sends every letter that is typed: a text counts when no other one follows within this time [s].
+_TYPING = 0.8
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,8 @@ class Scale:
             return int(value) if self.whole else value
         return max(_LEAST_POWER, math.log10(value)) if value > 0.0 else _LEAST_POWER
 
-    def value(self, position: object) -> float:
-        """The value at a position, from the browser."""
-        left, right = self.position(self.low), self.position(self.high)
-        at = number(position, left, right)
+    def value(self, at: float) -> float:
+        """The value at a position."""
         if not self.logarithmic:
             return round(at) if self.whole else at
         if self.low == 0.0 and at <= _LEAST_POWER:
@@ -64,7 +63,7 @@ class Scale:
 
 
 class UnitSlider:
-    """A slider, and its value as text, which `server/page/page.js` draws in place of the slider's number.
+    """A slider, and below it its value as text.
 
     Parameters
     ----------
@@ -80,12 +79,13 @@ class UnitSlider:
         value: float,
         *,
         hint: str,
-        changed: Callable[[Any, float], object],
+        changed: Callable[[Any, float], object] = lambda client, value: None,
         visible: bool = True,
     ) -> None:
         self._name, self.scale, self.value, self._changed = label, scale, value, changed
         self._lock, self._removed = threading.RLock(), False
-        # There is little space below a slider: units that take no prefix are only beside it.
+        self._typing: threading.Timer | None = None
+        # There is little space below a slider: units that take no prefix are only in the text.
         unit = scale.unit if scale.unit in WITH_PREFIX else ""
         ends = tuple(
             (
@@ -104,17 +104,26 @@ class UnitSlider:
             hint=hint,
             visible=visible,
         )
-        self.text = gui.add_text(f"beside {self.handle._impl.uuid}", written(value, scale.unit), visible=False)
+        self.text = gui.add_text("", written(value, scale.unit), hint=hint, visible=visible)
         self.handle.on_update(sequential(self._moved))
         self.text.on_update(sequential(self._typed))
 
     def show(self, value: float) -> None:
-        """Set slider and text."""
+        """Set slider and text, unless a visitor is typing."""
         with self._lock:
-            if not self._removed:
+            if not self._removed and self._typing is None:
                 self.value = value
                 self.handle.value = self.scale.position(value)
                 self._write()
+
+    @property
+    def visible(self) -> bool:
+        """Whether the panel displays both."""
+        return self.handle.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        self.handle.visible = self.text.visible = visible
 
     def remove(self) -> None:
         """Remove both from the panel."""
@@ -137,14 +146,25 @@ class UnitSlider:
     def _typed(self, event: Any) -> None:
         if event.client is None:
             return
+        with self._lock:
+            if self._typing is not None:
+                self._typing.cancel()
+            self._typing = threading.Timer(_TYPING, self._finish, (event.client,))
+            self._typing.daemon = True
+            self._typing.start()
+
+    def _finish(self, client: Any) -> None:
+        """The text is complete."""
+        with self._lock:
+            self._typing = None
         try:
             value = self._value_of(str(self.text.value))
         except CommandError as error:
-            notify(event.client, "Not done", str(error))
+            notify(client, "Not done", str(error))
             self.show(self.value)
         else:
             self.show(value)
-            self._changed(event.client, value)
+            self._changed(client, value)
 
     def _value_of(self, text: str) -> float:
         scale = self.scale

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError, MeshingError
 from supple.viewer.protocol import limits
-from supple.viewer.server.uploads.worker import ANSWER, JOB, MESH
+from supple.viewer.upload_worker import ANSWER, JOB, MESH
 
 # Time between two checks of the child [s].
 _POLL = 0.1
@@ -92,7 +92,7 @@ def _run(folder: Path, progress: Callable[[float], None], stop: threading.Event)
     }
     with (folder / "output.txt").open("wb") as output:
         child = subprocess.Popen(
-            [sys.executable, "-P", "-m", "supple.viewer.server.uploads.worker"],
+            [sys.executable, "-P", "-m", "supple.viewer.upload_worker"],
             cwd=folder,
             env=environment,
             stdin=subprocess.PIPE,

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
-from supple.viewer.controls.inputs.pending import PendingValue
-from supple.viewer.controls.inputs.unit_slider import Scale, UnitSlider
+from supple.viewer.controls.pending import PendingValue
+from supple.viewer.controls.unit_slider import Scale, UnitSlider
 from supple.viewer.protocol.commands import SetParameter
 from supple.viewer.protocol.parameters import PARAMETERS, Parameter, Value
 

@@ -15,8 +15,8 @@ import supple as sp
 from supple.errors import MeshError, MeshingError, SuppleError
 from supple.mesh.primitives.surfaces import sphere_surface
 from supple.viewer.protocol import limits
-from supple.viewer.server.uploads import worker
-from supple.viewer.server.uploads.meshing import Upload, mesh_of_upload
+from supple.viewer import upload_worker as worker
+from supple.viewer.uploads import Upload, mesh_of_upload
 
 
 @pytest.fixture(scope="module")
