@@ -14,23 +14,23 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
 from supple.materials.flows.internal import checked
-from supple.numerics.memory import require_memory
-from supple.readings.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
-from supple.readings.applied_values import with_applied_values
-from supple.readings.diagnostics import Diagnostics, measure
-from supple.readings.energy_balance import completed_works
-from supple.readings.frame_readings import FrameReadings
-from supple.readings.joint_readings import JointReading, joint_readings
+from supple.model.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
+from supple.model.diagnostics import Diagnostics, measure
+from supple.model.energy_balance import completed_works
+from supple.model.state import ContactPoints, Problems, SolverDetails, State, Status, StepReport
+from supple.model.system import BodyRange, System, build_system, initial_state
+from supple.results.readings.applied_values import with_applied_values
+from supple.results.readings.frame_readings import FrameReadings
+from supple.results.readings.joint_readings import JointReading, joint_readings
+from supple.runtime.displayed import DisplayedReport, supplied
+from supple.runtime.memory import require_memory
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
-from supple.solver import Solver
-from supple.state import ContactPoints, Problems, SolverDetails, State, Status, StepReport
-from supple.system import BodyRange, System, build_system, initial_state
+from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)
 
@@ -62,7 +62,7 @@ class Report(DisplayedReport, Diagnostics):
 
     @property
     def work(self) -> Mapping[str, float]:
-        """The works on the bodies over the frame by what does them, see `supple.readings.energy_balance` [J]."""
+        """The works on the bodies over the frame by what does them, see `supple.model.energy_balance` [J]."""
         return self.details.work
 
     @property
