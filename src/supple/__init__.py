@@ -6,7 +6,7 @@ when the name is first used, so that the import of `supple` is quick.
 
 import lazy_loader
 
-from .displayed import supply
+from .runtime.displayed import supply
 
 __version__ = "0.1.0"
 __getattr__, _, __all__ = lazy_loader.attach_stub(__name__, __file__)

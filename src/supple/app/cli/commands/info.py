@@ -245,8 +245,8 @@ def _material_text(body: PlacedBody) -> str:
     """The material, with the moduli of small strains where other parameters were given."""
     import numpy as np
 
-    from supple.materials.flows.viscoelastic import Viscoelastic
     from supple.materials.hyperelastic.by_law import ByLaw
+    from supple.materials.viscoelastic import Viscoelastic
 
     material = body.material
     name = type(material).__name__

@@ -10,16 +10,16 @@ from pydantic import Field, create_model
 
 from supple.app.scene_file.model import Model, Name, NonNegative, Number, Positive, Vector
 from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.flows.j2_plastic import J2Plastic
-from supple.materials.flows.viscoelastic import Viscoelastic
 from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.hyperelastic.holzapfel_gasser_ogden import HolzapfelGasserOgden
 from supple.materials.hyperelastic.mooney_rivlin import MooneyRivlin
 from supple.materials.hyperelastic.ogden import Ogden
 from supple.materials.hyperelastic.yeoh import Yeoh
+from supple.materials.j2_plastic import J2Plastic
 from supple.materials.material import Elastic, Hyperelastic, Material
 from supple.materials.own.energy_material import EnergyMaterial
 from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.viscoelastic import Viscoelastic
 
 
 def _kind(material: type[Elastic]) -> str:

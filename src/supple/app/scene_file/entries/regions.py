@@ -10,8 +10,8 @@ from supple.app.scene_file.entries.materials import ElasticMaterialModel
 from supple.app.scene_file.entries.selections import InBoxModel
 from supple.app.scene_file.model import Index, Model, Name
 from supple.errors import SceneError
+from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Hyperelastic, Material
-from supple.materials.regions import Regions
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.located import at
 from supple.scene.selection import InBox

@@ -21,10 +21,10 @@ from supple.app.viewer.protocol import commands, limits
 from supple.app.viewer.protocol.parameters import Value, find_parameter
 from supple.errors import CommandError
 from supple.materials.elastic_tets.laws import tet_material
+from supple.materials.elastic_tets.regions import Regions
 from supple.materials.flows.internal import at_rest, checked, count_of, tets_of
-from supple.materials.flows.viscoelastic import Viscoelastic
 from supple.materials.material import Material
-from supple.materials.regions import Regions
+from supple.materials.viscoelastic import Viscoelastic
 from supple.model.state import State
 from supple.model.system import BodyRange, initial_state
 from supple.scene.body import Body, PlacedBody

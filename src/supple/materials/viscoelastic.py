@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.materials.flows.j2_plastic import J2Plastic
 from supple.materials.flows.maxwell import MAXWELL_FLOW
 from supple.materials.isotropic import rest_lame_parameters
+from supple.materials.j2_plastic import J2Plastic
 from supple.materials.laws.hencky import MAXWELL
 from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import LawTets, TetMaterial
