@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.model.diagnostics import measure
 from supple.model.state import SolverDetails, State, Status, StepReport
 from supple.model.system import build_system, initial_state
-from supple.simulate import NullSink, measure
+from supple.simulate import NullSink
 from supple.solvers.implicit.contact.model import ContactModel
 from supple.solvers.solver import Solver
 

@@ -66,6 +66,8 @@ from .results.check.report import CheckReport as CheckReport
 from .results.check.report import CheckResult as CheckResult
 from .results.check.settings import CheckSettings as CheckSettings
 from .results.export.exporter import export as export
+from .results.frame import Frame as Frame
+from .results.frame import Report as Report
 from .results.page import write_page as write_page
 from .results.plots import plot_recording as plot_recording
 from .results.progress import ProgressBar as ProgressBar
@@ -114,9 +116,7 @@ from .scene.sensors import Taxels as Taxels
 from .scene.stitches.vertex_edge import VertexEdgeStitch as VertexEdgeStitch
 from .scene.stitches.vertex_triangle import SoftVertexTriangleStitch as SoftVertexTriangleStitch
 from .scene.stitches.vertex_vertex import VertexVertexStitch as VertexVertexStitch
-from .simulate import Frame as Frame
 from .simulate import NullSink as NullSink
-from .simulate import Report as Report
 from .simulate import simulate as simulate
 from .solvers.implicit.contact.settings import IPCContact as IPCContact
 from .solvers.implicit.solver import Implicit as Implicit

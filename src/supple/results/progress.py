@@ -6,7 +6,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from supple.simulate import Frame
+from supple.results.frame import Frame
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -188,11 +188,10 @@ def test_a_claim_that_does_not_hold_is_reported_and_exits_1(monkeypatch, capfd, 
 
 
 def test_newton_iterations_go_to_the_log_at_debug(caplog):
-    with caplog.at_level(logging.DEBUG, logger="supple.solvers.implicit.newton.minimize"):
+    name = "supple.solvers.implicit.newton.minimize"
+    with caplog.at_level(logging.DEBUG, logger=name):
         frames, _ = run(DEMOS["twist"], "implicit", steps=1)
-    logged = [
-        record.getMessage() for record in caplog.records if record.name == "supple.solvers.implicit.newton.minimize"
-    ]
+    logged = [record.getMessage() for record in caplog.records if record.name == name]
     rows = [row for row in frames[0].report.details.newton if row.kind == "newton"]
     assert len(rows) >= 1
     assert sum("iteration=" in line for line in logged) == len(rows)

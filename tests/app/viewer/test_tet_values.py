@@ -6,9 +6,9 @@ import pytest
 import supple as sp
 from supple.app.viewer.engine.measurement.contact_points import contact_points
 from supple.app.viewer.engine.measurement.tet_values import QUANTITIES, tet_values
+from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import build_system
-from supple.simulate import measure
 
 
 def cube_system(material, **parts):
@@ -69,8 +69,8 @@ def test_what_is_not_known_is_not_a_number():
 def test_the_energy_of_volumes_is_that_of_the_report():
     system = cube_system(sp.EdgesAndVolume(edge_compliance=0.0, volume_compliance=1e-6))
     x = system.rest_positions * [1.1, 1.0, 1.0]
+    from supple.model.diagnostics import measure
     from supple.model.state import State
-    from supple.simulate import measure
 
     total = measure(system, State(0.0, x, np.zeros_like(x))).elastic_energy
     assert tet_values(system.laws, x, "energy") @ system.rest_volumes == pytest.approx(total)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.model.diagnostics import measure
 from supple.model.system import build_system, initial_state
-from supple.simulate import measure
 from supple.solvers.xpbd.solver import XPBD
 
 SPHERE = sp.shapes.sphere(radius=0.5, edge_length=0.33)

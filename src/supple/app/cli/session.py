@@ -17,8 +17,9 @@ from supple.app.runs.resume import resume
 from supple.app.runs.run_folder import RunFolder, SceneSource
 from supple.errors import OutputError
 from supple.model.state import Status
+from supple.results.frame import Frame
 from supple.scene.scene import Scene
-from supple.simulate import Frame, Sink, simulate
+from supple.simulate import Sink, simulate
 from supple.solvers.solver import Solver
 
 if TYPE_CHECKING:

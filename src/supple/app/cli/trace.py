@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from supple.errors import OutputError, SolverError
+from supple.results.frame import Frame
 from supple.runtime.replacing import parent_folder, whole_file
-from supple.simulate import Frame
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.newton.trace import NewtonRow, trace_csv
 from supple.solvers.implicit.solver import Implicit

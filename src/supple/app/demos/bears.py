@@ -10,10 +10,10 @@ from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.app.demos.motion_measures import volume
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.obstacles.sphere import Sphere
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.xpbd.solver import XPBD
 
 HEIGHT = 0.1

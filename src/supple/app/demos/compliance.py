@@ -10,10 +10,10 @@ from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.app.demos.motion_measures import height
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.xpbd.solver import XPBD
 
 RADIUS = 0.4

@@ -10,8 +10,8 @@ from typing import Any
 
 from supple.errors import SolverError
 from supple.model.state import Status
+from supple.results.frame import Frame
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.solver import Solver
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import BodyRange
-from supple.simulate import Frame
+from supple.results.frame import Frame
 
 
 def body_range(frame: Frame, name: str) -> BodyRange:

@@ -11,13 +11,13 @@ from supple.app.demos.motion_measures import height, spin_about, volume
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.forces import SoftTarget
 from supple.scene.motion import Keyframes
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.xpbd.solver import XPBD
 

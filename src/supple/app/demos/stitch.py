@@ -13,11 +13,11 @@ from supple.app.demos.motion_measures import stitch_lengths
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.numerics.geometry.triangle_tree import TriangleTree
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
 from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.xpbd.solver import XPBD
 

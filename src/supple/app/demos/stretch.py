@@ -10,12 +10,12 @@ from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.app.demos.motion_measures import volume
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.xpbd.solver import XPBD
 

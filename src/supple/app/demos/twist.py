@@ -10,12 +10,12 @@ from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.app.demos.motion_measures import pin_error
 from supple.materials.neo_hookean import NeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 LENGTH, SIDE, YOUNGS, POISSON = 1.0, 0.2, 1e5, 0.45

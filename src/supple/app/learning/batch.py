@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from supple.app.learning.copies import Copy, Moment, same_bodies, scenes_of
 from supple.errors import SceneError, SolverError
 from supple.model.state import Status
+from supple.results.frame import Frame
 from supple.runtime.memory import require_memory
 from supple.runtime.thread_tuning import ThreadTuner
 from supple.runtime.threads import numba_threads
 from supple.scene.scene import Scene
-from supple.simulate import Frame, check_timing
+from supple.simulate import check_timing
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.solver import XPBD
 

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.model.diagnostics import measure
 from supple.model.state import State, Status, StepReport
 from supple.model.system import System, initial_state
+from supple.results.frame import Frame, completed_report
 from supple.scene.scene import Scene
-from supple.simulate import Frame, advance, completed_report, first_frame, measure
+from supple.simulate import advance, first_frame
 from supple.solvers.solver import Solver
 
 

@@ -10,8 +10,8 @@ from supple.app.runs.facts import versions
 from supple.model.system import System, rebuilt_system
 from supple.results.checkpoint.file import Checkpoint, RunFacts
 from supple.results.checkpoint.scene_hash import scene_hash
+from supple.results.frame import Frame, start_frame
 from supple.scene.scene import Scene
-from supple.simulate import Frame, start_frame
 from supple.solvers.solver import Solver
 
 

@@ -13,8 +13,8 @@ from supple.app.runs.log import RunLog
 from supple.errors import OutputError
 from supple.results.checkpoint.file import RunFacts, write_checkpoint
 from supple.results.export.exporter import export
+from supple.results.frame import Frame
 from supple.results.recording.recorder import Recorder
-from supple.simulate import Frame
 
 logger = logging.getLogger(__name__)
 

@@ -11,9 +11,10 @@ from supple.app.runs.facts import differences, versions
 from supple.app.scene_file.loader import Run
 from supple.errors import SuppleError
 from supple.results.checkpoint.file import RunFacts, read_checkpoint, write_checkpoint
+from supple.results.frame import Frame
 from supple.results.recording.continued import ContinuedRecorder
 from supple.results.recording.recorder import Recorder
-from supple.simulate import Frame, simulate
+from supple.simulate import simulate
 
 logger = logging.getLogger(__name__)
 

@@ -15,12 +15,13 @@ from supple.app.runs.keeper import Keeper
 from supple.app.runs.run_folder import FolderSink
 from supple.errors import OutputError, SceneError
 from supple.results.checkpoint.file import Checkpoint, read_checkpoint
+from supple.results.frame import Frame
 from supple.results.recording.continued import ContinuedRecorder
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
 from supple.runtime.lock import FolderLock, in_use, is_locked
 from supple.scene.scene import Scene
-from supple.simulate import Control, Frame, Frames, Sink, simulate
+from supple.simulate import Control, Frames, Sink, simulate
 from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)

@@ -15,11 +15,11 @@ from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal
 from supple.app.runs.keeper import Keeper
 from supple.errors import OutputError
+from supple.results.frame import Frame
 from supple.results.readings.fields import checked_fields
 from supple.results.recording.recorder import Recorder
 from supple.runtime.lock import FolderLock
 from supple.runtime.replacing import output_error, whole_file
-from supple.simulate import Frame
 from supple.solvers.solver import Solver
 
 CHECKPOINT_EVERY = 100

@@ -47,7 +47,8 @@ def encoded(value: Any, classes: Classes) -> tuple[Any, list[NDArray[Any]]]:
             made_of = {name: tree_of(getattr(item, name)) for name in _field_names(type(item))}
             return {"class": type(item).__name__, "fields": made_of}
         raise OutputError(
-            f"a checkpoint cannot hold a {type(item).__name__}; register its class in supple.results.checkpoint.memories"
+            f"a checkpoint cannot hold a {type(item).__name__}; register its class in "
+            "supple.results.checkpoint.memories"
         )
 
     return tree_of(value), arrays

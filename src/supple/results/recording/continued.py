@@ -9,12 +9,12 @@ import numpy as np
 
 from supple.errors import OutputError
 from supple.model.state import Status
+from supple.results.frame import Frame
 from supple.results.recording.details import RecordedDetails
 from supple.results.recording.file import RecordingFile, rewrite
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
 from supple.runtime.replacing import output_error, remove_abandoned, temporary_name
-from supple.simulate import Frame
 
 logger = logging.getLogger(__name__)
 

@@ -14,6 +14,7 @@ from supple.materials.elastic_tets.active import ActiveTets
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.flows.internal import NEVER_FLOWED
 from supple.model.state import State
+from supple.results.frame import Report
 from supple.results.readings.by_body import ByBody
 from supple.results.readings.fields import checked_fields
 from supple.results.readings.sensor_readings import ForceReading, Reading, TaxelReading
@@ -22,7 +23,6 @@ from supple.results.recording.contents import RecordedContents
 from supple.results.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series
 from supple.results.recording.scene import RecordedBody
 from supple.scene.rigid.pose import Pose, pose_of
-from supple.simulate import Report
 
 
 @dataclass(frozen=True, eq=False, repr=False)

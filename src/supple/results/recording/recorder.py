@@ -17,13 +17,13 @@ from supple.errors import OutputError
 from supple.materials.flows.internal import COLUMNS, count_of
 from supple.model.state import Status
 from supple.model.system import System
+from supple.results.frame import Frame
 from supple.results.readings.fields import Field, checked_fields, cost
 from supple.results.recording.details import RecordedDetails
 from supple.results.recording.file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.results.recording.scene import write_scene
 from supple.results.recording.sensors import RecordedSensor, recorded_sensors
 from supple.runtime.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
-from supple.simulate import Frame
 
 logger = logging.getLogger(__name__)
 
@@ -97,8 +97,8 @@ class Recorder:
     scene_text : the scene file's text, kept in the recording.
     solver : a description of the solver, kept in the recording; by default that of the first frame.
     compress : compress the frames when the simulation ends. The file is smaller and takes longer to write.
-    fields : names of `supple.results.readings.fields.FIELDS`, such as "von_mises" and "contact_force", that every frame has in
-        addition, in single precision. Their cost in bytes is logged when the simulation begins.
+    fields : names of `supple.results.readings.fields.FIELDS`, such as "von_mises" and "contact_force", that every
+        frame has in addition, in single precision. Their cost in bytes is logged when the simulation begins.
 
     Raises
     ------

@@ -16,6 +16,7 @@ from supple.mesh.skin import Embedding
 from supple.mesh.surface import SurfaceMesh
 from supple.model.state import Status
 from supple.model.system import System
+from supple.results.frame import Frame
 from supple.results.recording.actions.stitches import write_stitches
 from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.physics import write_physics
@@ -24,7 +25,6 @@ from supple.scene.body import PlacedBody
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS, restored_obstacle
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.simulate import Frame
 
 FORMAT_VERSION = 2
 VTK_TETRA, VTK_QUADRATIC_TETRA = 10, 24

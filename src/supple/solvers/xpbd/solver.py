@@ -67,14 +67,15 @@ class XPBD(Solver):
     Parameters
     ----------
     substeps : number of substeps of a frame, each with one sweep over all constraints. "auto": what the frame needs
-        (see `supple.solvers.xpbd.substeps`); a frame that turns out bad is repeated with more. `report.details` tells how many,
-        and why.
+        (see `supple.solvers.xpbd.substeps`); a frame that turns out bad is repeated with more. `report.details`
+        tells how many, and why.
     momentum_restore : restore the momentum that constraint projection takes from free bodies (see
         `supple.solvers.xpbd.momentum`). False shows the behaviour of plain XPBD.
     contact : contact of bodies with each other and with themselves; None turns it off. Obstacles always act.
     accuracy : the share of its stiffness that a body may lack; beyond it, the status of a frame is `softened`.
     max_substeps : the largest automatic number.
-    sleep_after : how long a body stays at its place before it sleeps [s], see `supple.solvers.xpbd.sleep`; None: nothing sleeps
+    sleep_after : how long a body stays at its place before it sleeps [s], see `supple.solvers.xpbd.sleep`; None:
+        nothing sleeps
     start : what becomes of bodies that begin inside of something: an error, or they are slowly pushed out.
     threads : number of threads. None: one, or all of Numba's where the scene is large enough and several threads are
         measured to be faster. The result has the same bits for any number.

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import build_system, initial_state
-from supple.simulate import measure
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
 from supple.solvers.xpbd.solver import XPBD
 

@@ -11,11 +11,11 @@ from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.materials.neo_hookean import NeoHookean
 from supple.mesh import shapes
 from supple.model.system import build_system
+from supple.results.frame import Frame
 from supple.scene.actuators.cavity import Cavity
 from supple.scene.body import Body
 from supple.scene.loads.over_time import Curve
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 INNER, OUTER, EDGE = 0.1, 0.15, 0.025

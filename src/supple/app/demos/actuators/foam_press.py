@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.results.readings.sensor_readings import ForceReading
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
@@ -18,7 +19,6 @@ from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
 from supple.scene.sensors import ForceSensor
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 SIDE, HEIGHT, PRESSED, STEPS = 0.1, 0.05, 0.02, 20

@@ -9,13 +9,13 @@ import numpy as np
 from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.actuators.muscle import Muscle
 from supple.scene.body import Body
 from supple.scene.loads.over_time import Curve
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.xpbd.solver import XPBD
 

@@ -9,13 +9,13 @@ import numpy as np
 from supple.app.demos.actuators.bellows import bellows
 from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.results.frame import Frame
 from supple.scene.actuators.cavity import Cavity
 from supple.scene.body import Body
 from supple.scene.loads.over_time import Curve
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 WALL, STEPS, HIGHEST = 0.005, 3, 6e4

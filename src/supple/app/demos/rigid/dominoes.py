@@ -8,10 +8,10 @@ import numpy as np
 
 from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 COUNT = 20

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 SIZE = (0.1, 0.2, 0.3)

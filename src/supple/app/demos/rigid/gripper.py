@@ -9,6 +9,7 @@ import numpy as np
 from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.joints.axis_joint import SliderJoint
 from supple.scene.joints.motors import PositionMotor
@@ -17,7 +18,6 @@ from supple.scene.loads.over_time import Curve
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.xpbd.solver import XPBD
 

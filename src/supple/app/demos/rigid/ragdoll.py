@@ -9,6 +9,7 @@ import numpy as np
 from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.contact_pairs import ContactPair
 from supple.scene.joints.axis_joint import AxisJoint, HingeJoint
@@ -19,7 +20,6 @@ from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 # Center and size [m] of the flesh on the middle and on the doll's right, where x is positive.

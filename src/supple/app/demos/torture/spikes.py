@@ -10,12 +10,12 @@ from supple.app.demos.demo import Claim
 from supple.app.demos.torture.watch import ContactMeasurement, Size, mechanical_energy, push, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh.tetmesh import TetMesh
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.simulate import Frame
 
 GAP = 2e-3
 FALL = 0.01

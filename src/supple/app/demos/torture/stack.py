@@ -14,10 +14,10 @@ from supple.app.demos.demo import Claim
 from supple.app.demos.torture.meshes import mirrored_box
 from supple.app.demos.torture.watch import ContactMeasurement, Size, mass, push, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.solver import Implicit
 

@@ -12,12 +12,12 @@ from supple.app.demos.motion_measures import pin_error
 from supple.app.demos.torture.watch import ContactMeasurement, Torture
 from supple.materials.neo_hookean import NeoHookean
 from supple.mesh import shapes
+from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 LENGTH, SIDE = 1.0, 0.06

@@ -13,8 +13,8 @@ import numpy as np
 from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.app.demos.motion_measures import body_range
 from supple.model.state import Status
+from supple.results.frame import Frame
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 from supple.solvers.implicit.solver import Implicit
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.viewer.protocol.parameters import Value
+from supple.model.diagnostics import Diagnostics
 from supple.results.readings.joint_readings import JointReading
 from supple.results.recording.actions.joints import RecordedJoint
 from supple.results.recording.actions.stitches import RecordedStitches
 from supple.results.recording.scene import RecordedObstacle
-from supple.simulate import Diagnostics
 
 RIGID = "rigid"  # in place of a material
 PUSHER = "pusher"  # name of the obstacle that the mouse moves

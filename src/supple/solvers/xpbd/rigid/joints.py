@@ -1,10 +1,10 @@
 """Joints between rigid bodies: rows over the control points of two bodies each, which impulses keep.
 
-A row is a number g of the control points (see `supple.model.joints.geometry`) with the gradient G. An impulse p of it [kg m]
-has on a body the force sum G_k and the moment sum r_k x G_k about the center, with the arms r_k of the beginning of the
-substep, and moves the body by its inverse mass and inertia. A condition has g = g0. Limits, friction and motors are
-laws p = -h^2 clip(lambda + k (g - g0), low, high) (see `supple.model.joints.laws`); where k is that of a condition, it is
-infinite here. `joint_rows` solves these equations; multipliers begin at zero in each substep.
+A row is a number g of the control points (see `supple.model.joints.geometry`) with the gradient G. An impulse p of it
+[kg m] has on a body the force sum G_k and the moment sum r_k x G_k about the center, with the arms r_k of the
+beginning of the substep, and moves the body by its inverse mass and inertia. A condition has g = g0. Limits, friction
+and motors are laws p = -h^2 clip(lambda + k (g - g0), low, high) (see `supple.model.joints.laws`); where k is that of
+a condition, it is infinite here. `joint_rows` solves these equations; multipliers begin at zero in each substep.
 
 Where the two sides of a joint are apart, its forces have a moment. It is taken away from both bodies alike, so that
 two free bodies keep their angular momentum.

@@ -12,6 +12,7 @@ from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.scene.solvers import kind_of, solver_values
 from supple.app.viewer.protocol.parameters import PARAMETERS, Value
 from supple.app.viewer.protocol.snapshots import RIGID, BodyDescription, Measures, SceneDescription
+from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import BodyRange, System
 from supple.results.readings.joint_readings import joint_readings
@@ -20,7 +21,6 @@ from supple.results.recording.actions.stitches import recorded_stitches
 from supple.results.recording.scene import RecordedObstacle
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.simulate import measure
 from supple.solvers.xpbd.details import XPBDDetails
 
 
