@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import threading
 from collections.abc import Callable
@@ -82,9 +83,10 @@ class UnitSlider:
         changed: Callable[[Any, float], object] = lambda client, value: None,
         visible: bool = True,
     ) -> None:
-        self._name, self.scale, self.value, self._changed = label, scale, value, changed
+        self._name, self.scale, self._value, self._changed = label, scale, value, changed
         self._lock, self._removed = threading.RLock(), False
-        self._typing: threading.Timer | None = None
+        self._typing: asyncio.TimerHandle | None = None
+        self._who: Any = None  # types
         # There is little space below a slider: units that take no prefix are only in the text.
         unit = scale.unit if scale.unit in WITH_PREFIX else ""
         ends = tuple(
@@ -108,11 +110,17 @@ class UnitSlider:
         self.handle.on_update(sequential(self._moved))
         self.text.on_update(sequential(self._typed))
 
+    @property
+    def value(self) -> float:
+        """The value; a text that is being typed counts."""
+        self._settle()
+        return self._value
+
     def show(self, value: float) -> None:
         """Set slider and text, unless a visitor is typing."""
         with self._lock:
             if not self._removed and self._typing is None:
-                self.value = value
+                self._value = value
                 self.handle.value = self.scale.position(value)
                 self._write()
 
@@ -138,7 +146,7 @@ class UnitSlider:
         with self._lock:
             if self._removed:
                 return
-            self.value = value = self.scale.value(self.handle.value)
+            self._value = value = self.scale.value(self.handle.value)
             self._write()
         # Without the lock: what reacts has locks of its own.
         self._changed(event.client, value)
@@ -149,22 +157,23 @@ class UnitSlider:
         with self._lock:
             if self._typing is not None:
                 self._typing.cancel()
-            self._typing = threading.Timer(_TYPING, self._finish, (event.client,))
-            self._typing.daemon = True
-            self._typing.start()
+            self._typing, self._who = asyncio.get_running_loop().call_later(_TYPING, self._settle), event.client
 
-    def _finish(self, client: Any) -> None:
-        """The text is complete."""
+    def _settle(self) -> None:
+        """A text that was being typed is complete."""
         with self._lock:
-            self._typing = None
-        try:
-            value = self._value_of(str(self.text.value))
-        except CommandError as error:
-            notify(client, "Not done", str(error))
-            self.show(self.value)
-        else:
-            self.show(value)
-            self._changed(client, value)
+            typing, self._typing = self._typing, None
+            if typing is None or self._removed:
+                return
+            typing.cancel()
+            try:
+                value = self._value_of(str(self.text.value))
+            except CommandError as error:
+                notify(self._who, "Not done", str(error))
+                value = None
+            self.show(self._value if value is None else value)
+        if value is not None:
+            self._changed(self._who, value)
 
     def _value_of(self, text: str) -> float:
         scale = self.scale
@@ -177,6 +186,6 @@ class UnitSlider:
         return int(value) if scale.whole else value
 
     def _write(self) -> None:
-        text = written(self.value, self.scale.unit)
+        text = written(self._value, self.scale.unit)
         if self.text.value != text:
             self.text.value = text

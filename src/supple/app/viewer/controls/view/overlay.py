@@ -1,7 +1,7 @@
 """What is above the picture: the start, the state, the legend, and warnings.
 
-They are parts of one HTML element of the panel, which style sheets place above the picture. A button there is the label of
-a button of the panel: a click on it presses that one.
+They are parts of one HTML element of the panel, which a style sheet places above the picture. A button there is the
+label of a button of the panel: a click on it presses that one.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ import threading
 from typing import Any
 
 _STYLE = """
-.supple { position: fixed; z-index: 5; left: 10px; font: 13px/1.4 system-ui, sans-serif; color: #24292f; background: #fffd;
-  border-radius: 8px; padding: 5px 10px; --warning: #963c04; --energy: #755200; --smallest: #14663a; }
+.supple { position: fixed; z-index: 5; left: 10px; font: 13px/1.4 system-ui, sans-serif; color: #24292f;
+  background: #fffd; border-radius: 8px; padding: 5px 10px;
+  --warning: #963c04; --energy: #755200; --smallest: #14663a; }
 [data-mantine-color-scheme="dark"] .supple { color: #e6e8eb; background: #1d1f22dd; --warning: #ffa94d;
   --energy: #e0b040; --smallest: #6fcf97; }
-.supple label { cursor: pointer; border-radius: 6px; padding: 4px 12px; color: #fff; background: #12805c; white-space: nowrap; }
+.supple label { cursor: pointer; border-radius: 6px; padding: 4px 12px; color: #fff; background: #12805c;
+  white-space: nowrap; }
 #supple-start { left: max(10px, calc(50% - 360px)); bottom: 12%; background: none; }
 #supple-start label { display: block; font-size: min(22px, 4.2vw); padding: 14px 28px; border-radius: 12px; }
 #supple-state { top: 6px; }
@@ -23,12 +25,17 @@ _STYLE = """
 #supple-state .energy { color: var(--energy); }
 #supple-state .smallest { color: var(--smallest); }
 #supple-state .row { display: flex; gap: 12px; }
-#supple-warning, #supple-busy { top: 84px; max-width: min(360px, calc(100% - 40px)); color: var(--warning); font-weight: 600; }
+#supple-warning, #supple-busy { top: 84px; max-width: min(360px, calc(100% - 40px)); color: var(--warning);
+  font-weight: 600; }
 #supple-busy { top: 40%; }
 #supple-legend { bottom: 12px; }
 #supple-legend .bar { height: 12px; width: min(220px, 60vw); border-radius: 3px; }
 #supple-legend .numbers { display: flex; justify-content: space-between; font-variant-numeric: tabular-nums; }
 #supple-arrows { bottom: 84px; }
+.mantine-Slider-markLabel { white-space: nowrap; }
+.mantine-Slider-markWrapper:first-child .mantine-Slider-markLabel { transform: translate(-4px, .05rem) !important; }
+.mantine-Slider-markWrapper:last-child .mantine-Slider-markLabel {
+  transform: translate(calc(4px - 100%), .05rem) !important; }
 .mantine-Notifications-root[data-position="top-left"] { top: 172px !important; }
 """
 
