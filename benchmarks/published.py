@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.latency import live_page_text
 from benchmarks.measuring import ROOT
 from benchmarks.table import table_text
 from benchmarks.tables import live_text, reading_text, rigid_bodies_text, speed_text
@@ -32,7 +31,6 @@ def _tables(page: str, *names: str) -> dict[str, Part]:
 
 # By the name between the marks.
 SHOWN = {
-    "live_page": Part("live.md", ("live_page",), live_page_text),
     "live": Part("benchmarks.md", ("live",), live_text),
     "rigid_bodies": Part("benchmarks.md", ("rigid_bodies",), rigid_bodies_text),
     "reading_fields": Part("forces_and_stresses.md", ("reading_fields",), reading_text),

@@ -124,16 +124,16 @@ def test_errors_are_one_line(tmp_path, scene, served, capfd):
     outside.parent.mkdir()
     outside.write_text(SCENE.replace("shape: {kind: box, divisions: [1, 1, 1]}", "mesh: {file: ../mesh.stl}"))
     for arguments in (
-            ["view", str(tmp_path / "missing.yaml")],
-            ["view", str(tmp_path / "mesh.stl")],
-            ["view", str(outside.parent)],
-            ["view", str(outside)],
-            ["view", str(scene), "--port", "70000"],
-            ["view", str(scene), "--port", "http"],
-            ["demo", "teapot", "--live"],
-        ):
-            assert main(arguments) == ExitCode.INPUT, arguments
-            assert len(capfd.readouterr().err.splitlines()) == 1, arguments
+        ["view", str(tmp_path / "missing.yaml")],
+        ["view", str(tmp_path / "mesh.stl")],
+        ["view", str(outside.parent)],
+        ["view", str(outside)],
+        ["view", str(scene), "--port", "70000"],
+        ["view", str(scene), "--port", "http"],
+        ["demo", "teapot", "--live"],
+    ):
+        assert main(arguments) == ExitCode.INPUT, arguments
+        assert len(capfd.readouterr().err.splitlines()) == 1, arguments
     assert served == []
 
 

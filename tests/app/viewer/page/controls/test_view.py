@@ -34,7 +34,7 @@ def test_the_value_at_a_place_that_is_clicked_with_shift(live, fake, server, vis
     label = lambda: views.probe._label.text if views.probe._label else ""  # noqa: E731
     fake.show(tet_values=np.full(96, 1234.0), tet_quantity="von_mises")
     visitor.set(views.color_by, "von Mises stress")
-    until(lambda: len(live.stage.body_handles[0]._impl.click_cb) == 2)
+    until(lambda: live.stage.value_at(0) is not None and len(live.stage.body_handles[0]._impl.click_cb) == 2)
     visitor.click(live.stage.body_handles[0], middle + np.array([0.0, 0.0, 5.0]), [0.0, 0.0, -1.0], modifier="shift")
     until(lambda: label() == "1.234 kPa · body 0")
     assert fake.received[-1].tet_values == "von_mises"  # nothing is pinned
