@@ -31,7 +31,7 @@ def first_frame(name: str) -> None:
         scene, dt = sp.Scene(bodies=[ball], obstacles=[floor]), 1 / 60
         solver: Any = sp.XPBD(substeps=20) if name == "snippet" else sp.Implicit()
     else:
-        from supple.demos.registry import DEMOS
+        from supple.app.demos.registry import DEMOS
 
         demo = DEMOS[name]
         scene, solver, dt = demo.scene(), demo.solver(), demo.dt
