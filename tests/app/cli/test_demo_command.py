@@ -43,7 +43,7 @@ def test_quiet_prints_only_the_claims(tmp_path, capfd):
     assert all(line.startswith(("holds: ", "does not hold: ")) for line in out.splitlines())
     assert err == ""
     written = sorted(path.name for path in (tmp_path / "here").iterdir())
-    assert written == ["recording.vtkhdf", "report.csv", "report.parquet", "run"]
+    assert written == ["recording.vtkhdf", "report.csv", "run"]
 
 
 def test_a_demo_whose_claims_all_hold_exits_0(tmp_path, monkeypatch, capfd):

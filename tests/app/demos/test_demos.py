@@ -21,8 +21,7 @@ from supple.solvers.implicit.solver import Implicit
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.solver import XPBD
 
-# Torture scenes are tested in test_torture.py.
-EVERY = [(name, kind) for name, demo in DEMOS.items() for kind in demo.kinds if not name.startswith("torture-")]
+EVERY = [(name, kind) for name, demo in DEMOS.items() for kind in demo.kinds]
 SOLVERS = {"xpbd": XPBD, "implicit": Implicit}
 
 
