@@ -12,8 +12,9 @@ from functools import cache
 from types import FunctionType
 from typing import Any
 
-from supple.numerics.kernel_cache import njit, reached_code
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.numerics.reached_code import reached_code
 from supple.xpbd.contact.friction import along_surface, friction_total
 from supple.xpbd.contact.movers import place, place_before, push_body, softness
 from supple.xpbd.contact.response_rates import kept_share
