@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from tests.torture.registry import TORTURE
 
 import supple as sp
 from benchmarks.table import Table
-from supple.app.demos.torture.registry import TORTURE
 from supple.solvers.implicit.details import ImplicitDetails
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -21,10 +21,10 @@ from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
+from tests.torture.registry import TORTURE
 
 import supple as sp
 from benchmarks.table import Table
-from supple.app.demos.torture.registry import TORTURE
 from supple.model.system import build_system, initial_state
 
 ROOT = Path(__file__).resolve().parents[1]

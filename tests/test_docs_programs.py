@@ -1,13 +1,15 @@
-"""Every program of the documentation runs: the blocks of a page one after the other, in one empty folder.
+"""Every program of the documentation and of README runs: the blocks of a page one after the other, in one folder.
 
 Python blocks share their names. A YAML block that begins with `# name.yaml` is written to that file. Shell blocks are
-lines of `supple`, which run in this process.
+lines of `supple`, which run in this process; a demo whose claim fails returns 1. The folder is empty but for README's
+`examples`.
 """
 
 import importlib.util
 import json
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
@@ -28,6 +30,9 @@ ELSEWHERE = {
     "stitches.md": "two lines of the program of howto/stitching.md",
 }
 PAGES = [str(path.relative_to(DOCS).as_posix()) for path in sorted(DOCS.rglob("*.md"))]
+README = "../README.md"
+# README's blocks that install Supple, or that CI runs itself.
+INSTALLATION = re.compile(r"^(make|pip install|git clone)\b", flags=re.M)
 BLOCK = re.compile(r"^```(python|yaml|sh)\n(.*?)^```", flags=re.S | re.M)
 
 
@@ -35,14 +40,19 @@ def blocks_of(page):
     return BLOCK.findall((DOCS / page).read_text(encoding="utf-8"))
 
 
-WITH_PROGRAMS = [page for page in PAGES if blocks_of(page) and page not in ELSEWHERE]
+WITH_PROGRAMS = [page for page in [README, *PAGES] if blocks_of(page) and page not in ELSEWHERE]
 
 
 @pytest.mark.parametrize("page", WITH_PROGRAMS)
 def test_the_programs_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    for kind, text in blocks_of(page):
+    blocks = blocks_of(page)
+    if page == README:
+        shutil.copytree(DOCS.parent / "examples", "examples")
+        blocks = [(kind, text) for kind, text in blocks if not (kind == "sh" and INSTALLATION.search(text))]
+        assert {kind for kind, _ in blocks} == {"python", "sh"}
+    for kind, text in blocks:
         if kind == "python":
             exec(compile(text, page, "exec"), names)
         elif kind == "yaml":

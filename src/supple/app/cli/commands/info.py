@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SCENE_FILES = (".yaml", ".yml", ".urdf")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
-PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic", "arro3-io")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from tests.torture.watch import ContactMeasurement, Size, center, mass, push, torture
 
 from supple.app.demos.demo import Claim
-from supple.app.demos.torture.watch import ContactMeasurement, Size, center, mass, push, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.tetmesh import TetMesh

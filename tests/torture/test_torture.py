@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.torture import stack, twist8
+from tests.torture.registry import TORTURE
 
 import supple as sp
-from supple.app.demos.registry import DEMOS
-from supple.app.demos.torture import stack, twist8
-from supple.app.demos.torture.registry import TORTURE
 from supple.model.state import Status
 from supple.results.check.report import Verdict
 
@@ -50,11 +49,6 @@ def assert_holds(demo, path, may_fail=()):
     assert checked.ok or may_fail
     assert checked["intersection"].verdict is Verdict.PASS
     assert checked["inversion"].verdict is Verdict.PASS
-
-
-def test_all_torture_scenes_are_demos():
-    assert len(TORTURE) == 11
-    assert {f"torture-{name}" for name in TORTURE} <= set(DEMOS)
 
 
 # The first step of the arch takes as long as all the others together.

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from tests.torture.meshes import mirrored_box
+from tests.torture.watch import ContactMeasurement, Size, mass, push, torture
 
 from supple.app.demos.demo import Claim
-from supple.app.demos.torture.meshes import mirrored_box
-from supple.app.demos.torture.watch import ContactMeasurement, Size, mass, push, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.results.frame import Frame
 from supple.scene.body import Body

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import brentq
+from tests.torture.watch import ContactMeasurement, Size, center, torture
 
 from supple.app.demos.demo import Claim
-from supple.app.demos.torture.watch import ContactMeasurement, Size, center, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body

@@ -24,7 +24,7 @@ class Torture:
 
     Attributes
     ----------
-    small : for `make test`; full : the demo
+    small : for `make test`; full : for `make test-all`
     large : about 20,000 tets, for benchmarks; None where no benchmark uses the scene
     """
 

@@ -1,4 +1,4 @@
-"""ParaView's older format for series: a .pvd that lists one VTU file for each frame. It also opens recordings."""
+"""The last frame as a VTK unstructured grid. ParaView opens recordings themselves."""
 
 from __future__ import annotations
 
@@ -6,36 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
-from supple.runtime.replacing import whole_file, whole_folder
-
-
-def write_pvd(recording: Recording, output: Path) -> None:
-    """Write a folder with recording.pvd and frame_00000.vtu, ...: with tets, velocities, J and body numbers.
-
-    Rigid bodies are written as their surfaces.
-    """
-    digits = max(5, len(str(len(recording) - 1)))
-    with whole_folder(output) as folder:
-        lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>"]
-        for k, frame in enumerate(recording):
-            name = f"frame_{k:0{digits}}.vtu"
-            _write_vtu(recording, frame, folder / name)
-            lines.append(f'    <DataSet timestep="{frame.time!r}" part="0" file="{name}"/>')
-        lines += ["  </Collection>", "</VTKFile>", ""]
-        (folder / "recording.pvd").write_text("\n".join(lines), encoding="utf-8")
+from supple.runtime.replacing import whole_file
 
 
 def write_last_vtu(recording: Recording, output: Path) -> None:
-    """Write the last frame as one VTU file."""
-    with whole_file(output) as fresh:
-        _write_vtu(recording, recording[-1], fresh)
-
-
-def _write_vtu(recording: Recording, frame: RecordedFrame, path: Path) -> None:
+    """Write the last frame: tets, velocities, J and body numbers; rigid bodies as their surfaces."""
     import meshio
 
+    frame = recording[-1]
     positions, velocities = list(frame.positions.values()), list(frame.velocities.values())
     starts = np.cumsum([0, *map(len, positions)])
     triangles = [np.zeros((0, 3), np.int32)]
@@ -62,4 +41,5 @@ def _write_vtu(recording: Recording, frame: RecordedFrame, path: Path) -> None:
             "body": [numbers for _, _, _, numbers in parts],
         },
     )
-    mesh.write(path, file_format="vtu")
+    with whole_file(output) as fresh:
+        mesh.write(fresh, file_format="vtu")

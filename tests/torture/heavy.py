@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from tests.torture.watch import ContactMeasurement, Size, mass, push, torture
+
 from supple.app.demos.demo import Claim
-from supple.app.demos.torture.watch import ContactMeasurement, Size, mass, push, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from tests.torture.watch import ContactMeasurement, Size, mechanical_energy, push, torture
 
 from supple.app.demos.demo import Claim
-from supple.app.demos.torture.watch import ContactMeasurement, Size, mechanical_energy, push, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh.tetmesh import TetMesh
 from supple.results.frame import Frame
