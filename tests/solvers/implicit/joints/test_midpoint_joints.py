@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.scenes import G, bar, converged, gyroscope, hinge, rate_of_precession
 
 import supple as sp
 from supple.model.system import build_system, initial_state
@@ -11,9 +12,6 @@ from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.joints.rigidity import Rigidity
 
-from .conftest import bar, hinge
-
-G = 9.81
 MASS = 2.5
 INERTIA = bar().properties.inertia[2, 2] + 0.25 * MASS  # about the hinge
 SOFT = sp.StableNeoHookean(youngs=2e5, poisson=0.3, density=1000)
@@ -21,8 +19,7 @@ WEIGHT = MASS * G * 0.5  # its torque about the hinge, level
 
 
 def run(scene, dt, steps, contact=None):
-    frames = list(sp.simulate(scene, sp.Implicit(integrator="newmark", contact=contact), dt, steps))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, sp.Implicit(integrator="newmark", contact=contact), dt, steps))
     for frame in frames:
         assert max([one.violation for one in frame.report.joints.values()], default=0.0) < 1e-7
         assert isinstance(frame.report.details, ImplicitDetails)
@@ -55,18 +52,9 @@ def test_the_error_is_of_second_order():
 
 
 def test_a_spinning_top_precesses():
-    """With a horizontal axis the steady precession is m g l / (I w), exactly."""
-    length, spin = 0.1, 50.0
-    disk = sp.shapes.box_surface((0.2, 0.02, 0.2), (1, 1, 1))
-    inertia = sp.RigidBody("disk", disk, density=2700.0).properties
-    rate = inertia.mass * G * length / (inertia.inertia[1, 1] * spin)
-    place = {"position": (length, 0, 0), "rotation": (0, 0, -np.pi / 2), "velocity": (0, 0, -rate * length)}
-    body = sp.RigidBody("disk", disk, density=2700.0, angular_velocity=(spin, rate, 0), **place)
-    frames = run(sp.Scene([body], joints=[sp.BallJoint("disk", point=(0, 0, 0))]), 4e-3, 60)
-    centers = np.array([frame.poses["disk"].translation for frame in frames])
-    angles = np.unwrap(np.arctan2(-centers[:, 2], centers[:, 0]))
-    assert (angles[-1] - angles[0]) / (59 * 4e-3) == pytest.approx(rate, rel=2e-3)
-    assert np.abs(centers[:, 1]).max() < 1e-4
+    scene, rate = gyroscope()
+    frames = run(scene, 4e-3, 60)
+    assert rate_of_precession(frames, 4e-3, 1e-4) == pytest.approx(rate, rel=2e-3)
     assert np.ptp(energies(frames)) < 1e-6 * frames[0].report.kinetic_energy
 
 
