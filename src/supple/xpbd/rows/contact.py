@@ -80,7 +80,8 @@ class RowContact:
         self._everyone = np.zeros(0, dtype=np.bool_)
         self._before = np.zeros((count, 3))
         self._parts = [np.arange(part.vertices.start, part.vertices.stop) for part in system.bodies]
-        self._h = self._dt = 0.0
+        self._h = self._dt = self.time = 0.0
+        self._origin = np.zeros(3)
         self._frames = self._shapes.frames(0.0, np.zeros(3)), self._shapes.frames(0.0, np.zeros(3))
         self._walls: Walls = no_walls()
         self.counts = RowCounts()
@@ -103,7 +104,7 @@ class RowContact:
 
     def begin(self, time: float, h: float) -> None:
         """Begin the substep of h [s] that ends at `time` [s]: valid lists, and the impulses that were kept."""
-        self._h, lists, x = h, self.lists, self.nodes
+        self.time, self._h, lists, x = time, h, self.lists, self.nodes
         self.counts.substeps += 1
         self.begin_nodes[:] = x[:, :3]
         self._frames = self._frames[1], self._shapes.frames(time, self._origin)
