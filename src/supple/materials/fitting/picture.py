@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.files.figures import save_figure
 from supple.materials.fitting.curves import Curve
+from supple.runtime.figures import save_figure
 
 _KINDS = ("png", "pdf", "svg")
 _COLORS = {"uniaxial": "#30638e", "equibiaxial": "#d1495b", "pure_shear": "#3a7d44"}
