@@ -49,7 +49,7 @@ def on_triangles() -> sp.Scene:
     """A box falls onto the edge of a wedge."""
     points = np.array([[-0.2, 0, -0.2], [0.2, 0, -0.2], [0.2, 0, 0.2], [-0.2, 0, 0.2], [0, 0.1, -0.2], [0, 0.1, 0.2]])
     faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 5], [0, 5, 4], [1, 4, 5], [1, 5, 2], [0, 4, 1], [3, 2, 5]])
-    wedge = sp.TriangleObstacle(name="wedge", mesh=sp.SurfaceMesh(points, faces), friction=0.3)
+    wedge = sp.TriangleObstacle(name="wedge", surface=sp.SurfaceMesh(points, faces), friction=0.3)
     box = shapes.box((0.1, 0.1, 0.1), (3, 3, 3))
     return sp.Scene(
         bodies=[sp.Body("box", box, material(), position=(0.01, 0.16, 0), velocity=(0, -3, 0))], obstacles=[wedge]
@@ -73,9 +73,35 @@ def pinned() -> sp.Scene:
     return sp.Scene(bodies=[upper, lower], pins=pins, gravity=(0, 0, 0))
 
 
-def without_pushes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rows_contact, "solve", lambda *_: (0, 0.0))
-    monkeypatch.setattr(rows_contact, "MOST_PROJECTIONS", 0)
+def squeezed() -> sp.Scene:
+    """Two obstacles meet where a ball is."""
+    walls = [
+        sp.Box(name=name, center=(side * 0.11, 0, 0), size=(0.1, 0.2, 0.2), motion=lambda t, s=side: (-s * 2.0 * t, 0, 0))
+        for name, side in (("left", -1.0), ("right", 1.0))
+    ]
+    return sp.Scene(bodies=[sp.Body("ball", shapes.sphere(0.05, 0.025), material())], obstacles=walls, gravity=(0, 0, 0))
+
+
+class Watch:
+    """Exact tests of surfaces, and J, after every substep."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.crossing: list[int] = []
+        self.least: list[float] = []
+        self.cut = self.crushed = 0
+        admit = RowContact.admit
+
+        def checked(contact: RowContact, rows: int, low: int) -> None:
+            admit(contact, rows, low)
+            ws = contact.ws
+            asleep = np.zeros(len(ws.system.bodies), dtype=np.bool_)
+            found = ws.assessment.overlaps(np.ascontiguousarray(ws.points[:, :3] + ws.origins), contact.time, asleep)
+            self.crossing.append(sum(each.pairs for each in found))
+            edges = ws.points[ws.system.tets[:, 1:], :3] - ws.points[ws.system.tets[:, :1], :3]
+            self.least.append(float((np.linalg.det(edges) / (6.0 * ws.system.rest_volumes)).min()))
+            self.cut, self.crushed = max(self.cut, contact.counts.cut), max(self.crushed, contact.counts.crushed)
+
+        monkeypatch.setattr(RowContact, "admit", checked)
 
 
 @pytest.mark.parametrize(
@@ -86,34 +112,40 @@ def without_pushes(monkeypatch: pytest.MonkeyPatch) -> None:
         (folding, 20),
         (heap, 12),
         (on_triangles, 10),
-        (pushed, 8),
         (pinned, 12),
     ],
-    ids=["head_on_2", "head_on_10", "folding", "heap", "on_triangles", "pushed", "pinned"],
+    ids=["head_on_2", "head_on_10", "folding", "heap", "on_triangles", "pinned"],
 )
 def test_nothing_crosses_and_no_tet_turns_over_without_any_push(
     monkeypatch: pytest.MonkeyPatch, make: Callable[[], sp.Scene], frames: int
 ) -> None:
-    without_pushes(monkeypatch)
-    least, crossing, count = [], [], [0]
-    admit = RowContact.admit
-
-    def checked(self: RowContact, rows: int, low: int) -> None:
-        admit(self, rows, low)
-        ws = self.ws
-        world = np.ascontiguousarray(ws.points[:, :3] + ws.origins)
-        asleep = np.zeros(len(ws.system.bodies), dtype=np.bool_)
-        found = ws.assessment.overlaps(world, self.time, asleep)
-        crossing.append(sum(each.pairs for each in found))
-        least.append(float(self.tets.now.min()))
-        count[0] += self.counts.cut
-
-    monkeypatch.setattr(RowContact, "admit", checked)
-    solver = RowsXPBD(substeps=12)
-    for _ in sp.simulate(make(), solver, dt=1 / 60, steps=frames):
+    monkeypatch.setattr(rows_contact, "solve", lambda *_: (0, 0.0))
+    monkeypatch.setattr(rows_contact, "MOST_PROJECTIONS", 0)
+    watch = Watch(monkeypatch)
+    for _ in sp.simulate(make(), RowsXPBD(substeps=12), dt=1 / 60, steps=frames):
         pass
-    assert len(crossing) == 12 * frames
-    assert not any(crossing), f"first in substep {np.flatnonzero(crossing)[0]}"
-    assert min(least) > 0.0
-    # The guarantee had to act; J of the tets is what the exact determinants say.
-    assert count[0] > 0
+    assert len(watch.crossing) == 12 * frames
+    assert not any(watch.crossing), f"first in substep {np.flatnonzero(watch.crossing)[0]}"
+    assert min(watch.least) > 0.0
+    assert watch.cut > 0  # the guarantee had to act
+    assert watch.crushed == 0
+
+
+@pytest.mark.parametrize("make", [pushed, pinned], ids=["obstacle", "pin"])
+def test_what_moves_on_script_pushes_a_body_before_it(
+    monkeypatch: pytest.MonkeyPatch, make: Callable[[], sp.Scene]
+) -> None:
+    watch = Watch(monkeypatch)
+    frames = list(sp.simulate(make(), RowsXPBD(substeps=20), dt=1 / 60, steps=10))
+    assert not any(watch.crossing)
+    assert min(watch.least) > 0.0
+    assert watch.crushed == 0
+    moved = max(float(np.abs(frames[-1].velocities[name]).max()) for name in frames[-1].velocities)
+    assert moved > 0.1
+
+
+def test_a_body_that_obstacles_crush_has_a_named_status() -> None:
+    reports = [frame.report for frame in sp.simulate(squeezed(), RowsXPBD(substeps=12), dt=1 / 60, steps=4)]
+    assert {str(report.status) for report in reports} & {"inverted", "intersecting", "held_back"}
+    worst = next(report for report in reports if str(report.status) in ("inverted", "intersecting", "held_back"))
+    assert "ball" in worst.message

@@ -27,6 +27,8 @@ from supple.solvers.xpbd.rows.tets import determinant, least_J, share_of_tet
 
 # Of the gap: a distance below this may not become smaller in a substep.
 NEAREST = 0.02
+# Without carried nodes three rounds are the most that was seen; what is crushed needs no end.
+MOST_ROUNDS = 40
 # Of its distance, and of its J: what a pair and a tet keep in a substep.
 KEEP_DISTANCE, KEEP_J = 0.1, 0.2
 
@@ -55,9 +57,12 @@ def least_distance(before, nearest):
 @njit(error_model="numpy")
 def _shorten(base, points, i, share, marks, count, turn):
     """Leave a node a share of its motion; returns how many nodes were changed in this round."""
+    moved = False
     for j in range(3):
-        points[i, j] = base[i, j] + share * (points[i, j] - base[i, j])
-    return _note(i, marks, count, turn)
+        place = base[i, j] + share * (points[i, j] - base[i, j])
+        moved = moved or place != points[i, j]
+        points[i, j] = place
+    return _note(i, marks, count, turn) if moved else count
 
 
 @njit(error_model="numpy")
@@ -120,6 +125,8 @@ def admit(base, points, rows, count, tets, low, moved, keep, nearest, marks, cut
         if changed:
             low = _low_around(points, tets, keep, marks, changed, low if rounds == 0 else 0)
         elif rounds:
+            break
+        if rounds == MOST_ROUNDS:
             break
         changed = 0
         rounds += 1

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from supple.contact.mesh.obstacle_poses import ObstaclePoses
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.assessment.findings import tangled_bodies
 from supple.solvers.xpbd.contact.response_rates import response_rates
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.integration import update_velocities
@@ -82,6 +83,7 @@ class RowContact:
         self._parts = [np.arange(part.vertices.start, part.vertices.stop) for part in system.bodies]
         self._h = self._dt = self.time = 0.0
         self._origin = np.zeros(3)
+        self.tangled: frozenset[str] = frozenset()
         self._frames = self._shapes.frames(0.0, np.zeros(3)), self._shapes.frames(0.0, np.zeros(3))
         self._walls: Walls = no_walls()
         self.counts = RowCounts()
@@ -93,7 +95,8 @@ class RowContact:
         self.begin_nodes[:] = self.nodes[:, :3]
         self._frames = self._frames[0], self._shapes.frames(time, origin)
         volumes.measure(self.nodes, self.tets, False, 1.0)
-        np.maximum(self.tets.now, 0.0, out=self.tets.J)
+        self.tets.J[:] = self.tets.now
+        self.tangled = tangled_bodies(self.ws.system, self.tets.J)
 
     def _place_obstacles(self, time: float) -> None:
         surface = self.surface
@@ -177,7 +180,7 @@ class RowContact:
         x, x_n, v = ws.points, ws.previous, ws.velocities
         if not volumes.measure(self.nodes, tets, True, 1.0):
             return 0
-        guard.bounds[:] = np.minimum(tets.J, np.maximum(volumes.ONSET, 0.5 * tets.J))
+        volumes.set_bounds(tets, guard.bounds)
         update_velocities(x, x_n, v, h)
         for _ in range(MOST_PROJECTIONS):
             guard.project(x)
@@ -235,7 +238,7 @@ class RowContact:
             self._measure_walls()
             cut += self._cut(self._detect(0, 0.0, self._everyone), 0, 0)
         self.counts.cut += cut > 0
-        self.tets.J[:] = np.where(self.tets.J > 0.0, self.tets.now, 0.0)
+        self.tets.J[:] = self.tets.now
 
     def _cut(self, rows: int, low: int, moved: int) -> int:
         nearest = guarantee.NEAREST * self.gap

@@ -14,7 +14,7 @@ import numpy as np
 from supple.model.actuator_readings import actuator_fields, start_of
 from supple.model.state import State, Status, StepReport
 from supple.model.system import System
-from supple.solvers.xpbd.assessment.findings import Findings, count_inverted, tangled_bodies
+from supple.solvers.xpbd.assessment.findings import Findings, count_inverted
 from supple.solvers.xpbd.details import XPBDDetails
 from supple.solvers.xpbd.frame.advance import damping_in
 from supple.solvers.xpbd.frame.substep_start import cycles, grow, pin_targets
@@ -99,7 +99,7 @@ class RowsXPBD(XPBD):
         asleep = np.zeros(len(ws.system.bodies), dtype=np.bool_)
         ws.world[:] = ws.points[:, :3] + ws.origins
         findings = Findings(
-            inverted=count_inverted(ws.system, J, tangled_bodies(ws.system, ws.rows.tets.J)),
+            inverted=count_inverted(ws.system, J, ws.rows.tangled),
             overlaps=ws.assessment.overlaps(ws.world, time, asleep) if counts.crushed else [],
             held=counts.cut / count,
             softened=[(share, name) for name, share in shares.items() if share > self.accuracy],

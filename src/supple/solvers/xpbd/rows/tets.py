@@ -29,7 +29,7 @@ class Tets(NamedTuple):
     ----------
     nodes : (m, 4); scales : (m,) J over the determinant
     around : the tets of each node
-    J : (m,) at the beginning of the substep, 0 for tets that are not guarded; now : (m,) as measured last
+    J : (m,) at the beginning of the substep; now : (m,) as measured last
     low : (4 m,) numbers of tets, scratch memory
     """
 
@@ -59,14 +59,14 @@ def determinant(x, nodes, t):
 
 @njit(error_model="numpy", inline="always")
 def least_J(before, share):
-    """What must remain of J: a share of it, or all of it below `FLATTEST`."""
-    return min((1.0 - 1e-6) * before, max(share * before, FLATTEST))
+    """What must remain of J: a share of it, or all of it below `FLATTEST`. Inverted tets are not guarded."""
+    return min((1.0 - 1e-6) * before, max(share * before, FLATTEST)) if before > 0.0 else -np.inf
 
 
 @njit(error_model="numpy", inline="always")
 def guarded_J(before):
     """What the guard asks for."""
-    return min(before, max(ONSET, 0.5 * before))
+    return min(before, max(ONSET, 0.5 * before)) if before > 0.0 else -np.inf
 
 
 @njit(cache=True, error_model="numpy")
@@ -84,6 +84,13 @@ def measure(points, tets, guard, share):
             tets.low[count] = t
             count += 1
     return count
+
+
+@njit(cache=True, error_model="numpy")
+def set_bounds(tets, bounds):
+    """Write what the guard asks for to bounds (m,)."""
+    for t in range(len(bounds)):
+        bounds[t] = guarded_J(tets.J[t])
 
 
 @njit(error_model="numpy")
