@@ -31,7 +31,9 @@ def head_on(speed: float) -> sp.Scene:
 
 def folding() -> sp.Scene:
     bar = shapes.box((0.03, 0.5, 0.03), (2, 24, 2))
-    body = sp.Body("bar", bar, material(2e4, 0.01), position=(0, 0.27, 0), rotation=(0.02, 0, 0.05), velocity=(0, -2, 0))
+    body = sp.Body(
+        "bar", bar, material(2e4, 0.01), position=(0, 0.27, 0), rotation=(0.02, 0, 0.05), velocity=(0, -2, 0)
+    )
     return sp.Scene(bodies=[body], obstacles=[FLOOR])
 
 
@@ -76,10 +78,14 @@ def pinned() -> sp.Scene:
 def squeezed() -> sp.Scene:
     """Two obstacles meet where a ball is."""
     walls = [
-        sp.Box(name=name, center=(side * 0.11, 0, 0), size=(0.1, 0.2, 0.2), motion=lambda t, s=side: (-s * 2.0 * t, 0, 0))
+        sp.Box(
+            name=name, center=(side * 0.11, 0, 0), size=(0.1, 0.2, 0.2), motion=lambda t, s=side: (-s * 2.0 * t, 0, 0)
+        )
         for name, side in (("left", -1.0), ("right", 1.0))
     ]
-    return sp.Scene(bodies=[sp.Body("ball", shapes.sphere(0.05, 0.025), material())], obstacles=walls, gravity=(0, 0, 0))
+    return sp.Scene(
+        bodies=[sp.Body("ball", shapes.sphere(0.05, 0.025), material())], obstacles=walls, gravity=(0, 0, 0)
+    )
 
 
 class Watch:

@@ -189,7 +189,7 @@ def _low_around(points, tets, keep, marks, changed, low):
             t = tets.around.items[a]
             J = tets.scales[t] * determinant(points, tets.nodes, t)
             tets.now[t] = J
-            if not J >= least_J(tets.J[t], keep) and low < len(tets.low):
+            if not least_J(tets.J[t], keep) <= J and low < len(tets.low):
                 tets.low[low] = t
                 low += 1
     return low
@@ -282,7 +282,11 @@ def _spin(points, begin, velocities, nodes, e, center):
         v = nodes[e, i]
         m = 1.0 / points[v, 3]
         r = subtract(row(begin, v), center)
-        xx, yy, zz = xx + m * (r[1] ** 2 + r[2] ** 2), yy + m * (r[2] ** 2 + r[0] ** 2), zz + m * (r[0] ** 2 + r[1] ** 2)
+        xx, yy, zz = (
+            xx + m * (r[1] ** 2 + r[2] ** 2),
+            yy + m * (r[2] ** 2 + r[0] ** 2),
+            zz + m * (r[0] ** 2 + r[1] ** 2),
+        )
         xy, yz, zx = xy - m * r[0] * r[1], yz - m * r[1] * r[2], zx - m * r[2] * r[0]
         u = cross(r, row(velocities, v))
         moment = (moment[0] + m * u[0], moment[1] + m * u[1], moment[2] + m * u[2])

@@ -163,9 +163,7 @@ class RowContact:
 
     def solve(self, rows: int) -> None:
         """Solve the rows."""
-        sweeps, residual = solve(
-            self.nodes, self.begin_nodes, self._rows, rows, RESIDUAL * self.gap, MOST_SWEEPS
-        )
+        sweeps, residual = solve(self.nodes, self.begin_nodes, self._rows, rows, RESIDUAL * self.gap, MOST_SWEEPS)
         self.counts.rows += rows
         self.counts.sweeps += sweeps
         self.counts.residual = max(self.counts.residual, residual)
@@ -224,7 +222,7 @@ class RowContact:
 
     def admit(self, rows: int, low: int) -> None:
         """Widen gaps and put nodes back onto walls, then shorten motions until the guarantee holds."""
-        ws, h, slack = self.ws, self._h, SLACK * self.gap
+        h, slack = self._h, SLACK * self.gap
         recovered = RECOVERED * self.edge * h / self._dt
         moved = guarantee.widen(self.nodes, self._rows, rows, self.gap, recovered, self._marks)
         # Pairs that were left out are asked again where something went farther than was expected.

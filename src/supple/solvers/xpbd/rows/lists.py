@@ -12,9 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.rows.pairs import POINT, SHAPE, Pairs, along, describe_pairs, is_loaded, weights_of
+from supple.solvers.xpbd.rows.pairs import SHAPE, Pairs, describe_pairs, near_pairs
 from supple.solvers.xpbd.rows.search import PatchSearch
 from supple.solvers.xpbd.rows.shapes import RowShapes
 from supple.solvers.xpbd.rows.surface import RowSurface
@@ -159,9 +158,7 @@ class Lists:
             shapes.append(every[near])
         return np.concatenate(points), np.concatenate(shapes)
 
-    def _describe_walls(
-        self, pairs: Pairs, first: int, nodes: NDArray[np.int32], shapes: NDArray[np.int32]
-    ) -> None:
+    def _describe_walls(self, pairs: Pairs, first: int, nodes: NDArray[np.int32], shapes: NDArray[np.int32]) -> None:
         s, mine = self._surface.simplices, slice(first, None)
         pairs.nodes[mine] = nodes[:, None]
         pairs.kinds[mine], pairs.shapes[mine], pairs.pushes[mine] = SHAPE, shapes, True
@@ -173,7 +170,7 @@ class Lists:
         tight = self.tight
         tight.x, tight.v, tight.age, tight.until = x[:, :3].copy(), v.copy(), 0.0, time
         room = np.empty(len(self.pairs.keys), dtype=np.int64)
-        count = _near_pairs(x, v, self.pairs, time, self._gap + 2.0 * NEAR * self._edge, room)
+        count = near_pairs(x, v, self.pairs, time, self._gap + 2.0 * NEAR * self._edge, room)
         self.near = room[:count]
         self._deviations = self._deviations[0], 0.0
         self.lists += 1
@@ -214,7 +211,11 @@ def _largest_deviation(x, begin, v, age, nodes):
     """The square of how far a node is from where it was expected; inf where that is not finite."""
     most = 0.0
     for i in nodes:
-        a, b, c = x[i, 0] - begin[i, 0] - age * v[i, 0], x[i, 1] - begin[i, 1] - age * v[i, 1], x[i, 2] - begin[i, 2] - age * v[i, 2]
+        a, b, c = (
+            x[i, 0] - begin[i, 0] - age * v[i, 0],
+            x[i, 1] - begin[i, 1] - age * v[i, 1],
+            x[i, 2] - begin[i, 2] - age * v[i, 2],
+        )
         square = a * a + b * b + c * c
         if not square <= most:
             most = square if square < np.inf else np.inf
@@ -225,7 +226,11 @@ def _largest_deviation(x, begin, v, age, nodes):
 def _deviating(x, begin, v, age, nodes, margin, left):
     left[:] = False
     for i in nodes:
-        a, b, c = x[i, 0] - begin[i, 0] - age * v[i, 0], x[i, 1] - begin[i, 1] - age * v[i, 1], x[i, 2] - begin[i, 2] - age * v[i, 2]
+        a, b, c = (
+            x[i, 0] - begin[i, 0] - age * v[i, 0],
+            x[i, 1] - begin[i, 1] - age * v[i, 1],
+            x[i, 2] - begin[i, 2] - age * v[i, 2],
+        )
         left[i] = not a * a + b * b + c * c <= margin * margin
 
 
@@ -255,54 +260,3 @@ def _fastest(v, nodes, owner, owners):
         a, b, c = v[i, 0] - f * means[o, 0], v[i, 1] - f * means[o, 1], v[i, 2] - f * means[o, 2]
         most = max(most, a * a + b * b + c * c, 0.02 * (v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2))
     return most
-
-
-@njit(error_model="numpy")
-def room_between(begin, end, nodes, k, kind, n):
-    """The width of the slab across n that neither side of a pair enters, at the beginning and at the end."""
-    p, q, r, s = nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3]
-    low = min(along(begin, p, n), along(end, p, n))
-    high = max(max(along(begin, r, n), along(end, r, n)), max(along(begin, s, n), along(end, s, n)))
-    one, other = along(begin, q, n), along(end, q, n)
-    if kind == POINT:
-        return low - max(high, max(one, other))
-    return min(low, min(one, other)) - high
-
-
-@njit(error_model="numpy")
-def _speed(v, nodes, k, kind):
-    """The largest relative speed of nodes of the two sides of a pair."""
-    p, q, r, s = row(v, nodes[k, 0]), row(v, nodes[k, 1]), row(v, nodes[k, 2]), row(v, nodes[k, 3])
-    if kind == SHAPE:
-        return math.sqrt(dot(p, p))
-    a, b = subtract(p, r), subtract(p, s)
-    most = max(dot(a, a), dot(b, b))
-    if kind == POINT:
-        c = subtract(p, q)
-        return math.sqrt(max(most, dot(c, c)))
-    a, b = subtract(q, r), subtract(q, s)
-    return math.sqrt(max(most, max(dot(a, a), dot(b, b))))
-
-
-@njit(cache=True, error_model="numpy")
-def _near_pairs(x, v, pairs, time, reach, out):
-    """The pairs that may come nearer than `reach` while their nodes go on for a time; all pairs with shapes."""
-    count = 0
-    nodes = pairs.nodes
-    for k in range(len(nodes)):
-        kind = pairs.kinds[k]
-        if kind == SHAPE or is_loaded(pairs.impulses, k):
-            out[count] = k
-            count += 1
-            continue
-        far = reach + time * _speed(v, nodes, k, kind)
-        if room_between(x, x, nodes, k, kind, row(pairs.normals, k)) > far:
-            continue
-        _, r = weights_of(x, nodes, k, kind)
-        size = math.sqrt(dot(r, r))
-        for j in range(3):
-            pairs.normals[k, j] = r[j] / size
-        if size <= far:
-            out[count] = k
-            count += 1
-    return count

@@ -8,6 +8,7 @@ the weights add up to zero.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from supple.numerics.geometry.closest_point import closest_on_triangle
 from supple.numerics.geometry.closest_segments import closest_on_segments
-from supple.numerics.mat3 import dot, row
+from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 
 POINT, EDGES, SHAPE = 0, 1, 2
@@ -115,3 +116,54 @@ def describe_pairs(first, points, edges, simplices, far, pairs):
         if one == other:
             _, r = weights_of(s.rest, pairs.nodes, k, pairs.kinds[k])
             pairs.pushes[k] = dot(r, r) > far * far
+
+
+@njit(error_model="numpy")
+def room_between(begin, end, nodes, k, kind, n):
+    """The width of the slab across n that neither side of a pair enters, at the beginning and at the end."""
+    p, q, r, s = nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3]
+    low = min(along(begin, p, n), along(end, p, n))
+    high = max(max(along(begin, r, n), along(end, r, n)), max(along(begin, s, n), along(end, s, n)))
+    one, other = along(begin, q, n), along(end, q, n)
+    if kind == POINT:
+        return low - max(high, max(one, other))
+    return min(low, min(one, other)) - high
+
+
+@njit(error_model="numpy")
+def relative_speed(v, nodes, k, kind):
+    """The largest relative speed of nodes of the two sides of a pair."""
+    p, q, r, s = row(v, nodes[k, 0]), row(v, nodes[k, 1]), row(v, nodes[k, 2]), row(v, nodes[k, 3])
+    if kind == SHAPE:
+        return math.sqrt(dot(p, p))
+    a, b = subtract(p, r), subtract(p, s)
+    most = max(dot(a, a), dot(b, b))
+    if kind == POINT:
+        c = subtract(p, q)
+        return math.sqrt(max(most, dot(c, c)))
+    a, b = subtract(q, r), subtract(q, s)
+    return math.sqrt(max(most, max(dot(a, a), dot(b, b))))
+
+
+@njit(cache=True, error_model="numpy")
+def near_pairs(x, v, pairs, time, reach, out):
+    """The pairs that may come nearer than `reach` while their nodes go on for a time; all pairs with shapes."""
+    count = 0
+    nodes = pairs.nodes
+    for k in range(len(nodes)):
+        kind = pairs.kinds[k]
+        if kind == SHAPE or is_loaded(pairs.impulses, k):
+            out[count] = k
+            count += 1
+            continue
+        far = reach + time * relative_speed(v, nodes, k, kind)
+        if room_between(x, x, nodes, k, kind, row(pairs.normals, k)) > far:
+            continue
+        _, r = weights_of(x, nodes, k, kind)
+        size = math.sqrt(dot(r, r))
+        for j in range(3):
+            pairs.normals[k, j] = r[j] / size
+        if size <= far:
+            out[count] = k
+            count += 1
+    return count

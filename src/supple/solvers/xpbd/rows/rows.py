@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from supple.numerics.mat3 import dot, row
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.rows.lists import room_between
-from supple.solvers.xpbd.rows.pairs import SHAPE, Pairs, along, is_loaded, weights_of
+from supple.solvers.xpbd.rows.pairs import SHAPE, Pairs, along, is_loaded, room_between, weights_of
 from supple.solvers.xpbd.rows.shapes import Walls
 
 

@@ -136,7 +136,7 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_p
                         t = other[j]
                         if not _meet(of_points, k, of_triangles, t, reach):
                             continue
-                        if v == s.triangles[t, 0] or v == s.triangles[t, 1] or v == s.triangles[t, 2]:
+                        if v in (s.triangles[t, 0], s.triangles[t, 1], s.triangles[t, 2]):
                             continue
                         if not _point_near(x, way, v, s.triangles, t, reach) or in_list(s.excluded_triangles, k, t):
                             continue
@@ -153,7 +153,7 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_p
                     if not _meet(of_edges, e, of_edges, f, reach):
                         continue
                     g, h = s.edges[f, 0], s.edges[f, 1]
-                    if c == g or c == h or d == g or d == h:
+                    if c in (g, h) or d in (g, h):
                         continue
                     if not _edges_near(x, way, s.edges, e, f, reach) or in_list(s.excluded_edges, e, f):
                         continue
