@@ -22,8 +22,8 @@ from supple.solvers.xpbd.integration import first_lost
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.refusals import lost_position_message
 from supple.solvers.xpbd.rows.contact import RowContact, RowCounts
+from supple.solvers.xpbd.rows.substep import substep
 from supple.solvers.xpbd.solver import XPBD
-from supple.solvers.xpbd.substep import substep
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
 
