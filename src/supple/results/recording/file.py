@@ -1,6 +1,6 @@
 """A VTKHDF file of which a killed writer loses at most the frame that it writes.
 
-The HDF5 library alone does not guarantee this (docs/decisions.md, 4). Therefore it first lays out the whole file, with
+The HDF5 library alone does not guarantee this (notes/decisions.md, 4). Therefore it first lays out the whole file, with
 room for many frames, and closes it. Every series of frames then has a fixed position ("contiguous" layout), and a frame
 is written there as plain bytes; the last write of a frame is the count of frames. Room that is not used takes no disk
 space where the file system supports holes.

@@ -277,7 +277,7 @@ _THIN_SHARE = 0.1
 
 
 def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
-    """A warning where nearly incompressible tets are too few across to deform (docs/locking.md)."""
+    """A warning where nearly incompressible tets are too few across to deform (docs/theory/locking.md)."""
     import numpy as np
 
     from supple.materials.material import Hyperelastic

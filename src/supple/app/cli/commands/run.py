@@ -38,7 +38,7 @@ def run(
     Parameters
     ----------
     scene
-        The scene file (.yaml); `supple schema` describes it. Or a robot (.urdf); docs/robots.md describes what is read.
+        The scene file (.yaml); `supple schema` describes it. Or a robot (.urdf); see docs/learn/robots.md.
     output
         Run folder; it is created where it does not exist, and may not contain an earlier run.
     steps

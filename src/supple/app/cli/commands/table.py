@@ -16,7 +16,7 @@ def table(
 ) -> None:
     """Write one row for each frame: energies, momenta, contact and reaction forces, sizes of recorded fields.
 
-    docs/forces_and_stresses.md lists the columns.
+    docs/reference/forces_and_stresses.md lists the columns.
 
     Parameters
     ----------
