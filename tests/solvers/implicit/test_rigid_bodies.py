@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.scenes import BOX, FLOOR, SPIN, G, converged, flips_of, flips_of_eulers_equations, momenta, rigid, soft
+from tests.scenes import FLOOR, G, converged, momenta, rigid, soft
 
 import supple as sp
 from supple.contact.start.separation import separate
+from supple.errors import SolverError
 from supple.scene.rotation import rotation_matrix
 
 
@@ -24,31 +25,6 @@ def test_free_fall_of_backward_euler_is_exact():
     np.testing.assert_allclose(pose.translation, [0.2, -G * 1e-4 * n * (n + 1) / 2, 0.0], atol=1e-13)
     np.testing.assert_allclose(pose.velocity, [1.0, -G * 0.2, 0.0], atol=1e-11)
     assert error_of(frames) < 1e-12
-
-
-def test_a_free_body_keeps_its_momenta():
-    """The midpoint rule, in a motion that tumbles."""
-    scene = sp.Scene([rigid(shape=BOX, velocity=(1, 2, 3), angular_velocity=(1, 4, 2))], gravity=(0, 0, 0))
-    frames = run(scene, 2e-3, 250, "newmark")
-    P, L = momenta(frames)
-    assert np.abs(P - P[0]).max() <= 1e-11 * np.linalg.norm(P[0])
-    assert np.abs(L - L[0]).max() <= 1e-10 * np.linalg.norm(L[0])
-    energies = np.array([f.report.kinetic_energy + f.report.elastic_energy for f in frames])
-    assert np.ptp(energies) < 1e-4 * energies[0]
-    assert error_of(frames) < 1e-13  # the ends of steps are projected
-
-
-def test_the_intermediate_axis_turns_over_when_eulers_equations_say():
-    """The Dzhanibekov effect, twice. Ends of midpoint steps mirror their beginnings: the energy does not drift."""
-    body = rigid(shape=BOX, angular_velocity=SPIN)
-    exact = flips_of_eulers_equations(np.diag(body.properties.inertia), 2.8)
-    assert len(exact) == 2
-    for dt, late, drift in ((0.02, 0.02, 5e-3), (0.01, 1e-3, 1e-4)):
-        frames = run(sp.Scene([body], gravity=(0, 0, 0)), dt, round(2.8 / dt), "newmark")
-        np.testing.assert_allclose(flips_of(frames, dt), exact, rtol=late)
-        energies = np.array([frame.report.kinetic_energy for frame in frames])
-        assert np.abs(energies / energies[0] - 1.0).max() < drift
-        assert error_of(frames) < 1e-13
 
 
 def test_a_dropped_cube_comes_to_rest_and_presses_with_its_weight():
@@ -149,12 +125,12 @@ def test_a_collision_keeps_momentum(other):
     """Off the center, with friction. Contact acts where bodies are at the end of a step: L is not kept exactly."""
     hit = {"position": (0.13, 0.03, 0.02), "velocity": (-1.0, 0.0, 0.0), "friction": 0.5}
     bodies = [rigid("a", friction=0.5), rigid("b", **hit) if other == "rigid" else soft("b", **hit)]
-    frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 0.005, 24, "newmark")
+    frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 0.001, 120, "bdf2")
     P, L = momenta(frames)
     pushes = [np.linalg.norm(f.report.details.contact_forces["a"]) for f in frames]
     assert max(pushes) > 10.0
     assert np.abs(P - P[0]).max() <= 1e-10 * np.linalg.norm(P[0])
-    assert np.abs(L - L[0]).max() <= 5e-3 * np.linalg.norm(L[0])
+    assert np.abs(L - L[0]).max() <= 1e-2 * np.linalg.norm(L[0])
     assert frames[-1].poses["a"].velocity[0] < -0.2
 
 
@@ -246,3 +222,8 @@ def test_a_plate_pressed_on_a_soft_cube_in_equilibrium():
     np.testing.assert_allclose(details.contact_forces["plate"], up, atol=1e-6 * up[1])
     strain = (0.1 - np.ptp(frame.positions["soft"][:, 1])) / 0.1
     assert 1.0 < up[1] / (1e5 * 0.01 * strain) < 1.3
+
+
+def test_newmark_refuses_rigid_bodies():
+    with pytest.raises(SolverError, match=r"^body 'rigid': Implicit\(integrator='newmark'\) .* use 'bdf2'$"):
+        run(sp.Scene([rigid()]), 0.01, 1, "newmark")

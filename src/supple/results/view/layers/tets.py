@@ -1,0 +1,83 @@
+"""Bodies as tets: colored by a field, pulled apart, or cut."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.mesh.topology import TET_FACETS
+from supple.results.view.color_scale import NOT_KNOWN_COLOR, Limits, Range, bin_of, palette
+from supple.results.view.fields import Field
+from supple.results.view.layers.colored_triangles import ColoredTriangles
+from supple.results.view.layers.layer import Layer
+from supple.results.view.layers.section import Cut, Triangles, surface, whole
+from supple.results.view.model import Model, Moment
+from supple.results.view.picking import first_hit
+
+
+class TetView(Layer):
+    """Facets of tets.
+
+    Parameters
+    ----------
+    field : for coloring, or None for the colors of the bodies; ends : of the color scale
+    explode : displacement of the tets, as a share of their distance from the center of the body; 0 draws only the
+        surface
+    cut : a plane that hides what is behind it, or None
+
+    Attributes
+    ----------
+    range : ends of the color scale; None without a field, or where no value is known
+    values : of the tets (m,); None without a field
+    """
+
+    def __init__(
+        self, scene: Any, moment: Moment, field: Field | None, ends: Range, explode: float, cut: Cut | None
+    ) -> None:
+        model = moment.model
+        self._field, self._explode = field, explode
+        self._limits = Limits(field, ends) if field is not None else None
+        self.range: tuple[float, float] | None = None
+        colors = palette(field) if field is not None else np.array([body.color for body in model.bodies])
+        self._drawn = ColoredTriangles(scene, "/bodies/tets", np.vstack([colors, [NOT_KNOWN_COLOR]]))
+        self.nodes = self._drawn.handles
+        self._triangles = exploded_facets(model) if explode > 0.0 else surface(model, cut)
+        self._body = np.empty(len(model.tets), dtype=np.int64)
+        for i, body in enumerate(model.bodies):
+            self._body[body.tets] = i
+        self.values: NDArray[np.float64] | None = None
+        self.update(moment)
+
+    def update(self, moment: Moment) -> None:
+        x = self._triangles.corners(moment.finite_positions)
+        if self._explode > 0.0:
+            x = x + self._offsets(moment)[self._triangles.owner][:, None]
+        self._corners = x
+        if self._field is None or self._limits is None:
+            color = self._body
+        else:
+            self.values = self._field.values(moment)
+            self.range = self._limits.follow(self.values)
+            color = bin_of(self.values, *(self.range or (0.0, 1.0)))
+        self._drawn.update(x, color[self._triangles.owner])
+
+    def tet_on_ray(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
+        """The tet that a ray from `origin` (3,) in `direction` (3,) meets first, or None."""
+        hit = first_hit(self._corners, origin, direction)
+        return None if hit is None else int(self._triangles.owner[hit[0]])
+
+    def _offsets(self, moment: Moment) -> NDArray[np.float64]:
+        """(m, 3) displacement of each tet from the center of its body [m]."""
+        model = moment.model
+        centers = moment.finite_positions[model.tets].mean(axis=1)
+        offsets = np.empty_like(centers)
+        for body in model.bodies:
+            offsets[body.tets] = centers[body.tets] - centers[body.tets].mean(axis=0)
+        return self._explode * offsets
+
+
+def exploded_facets(model: Model) -> Triangles:
+    """All facets of all tets."""
+    return whole(model.tets[:, TET_FACETS].reshape(-1, 3), np.repeat(np.arange(len(model.tets)), 4))
