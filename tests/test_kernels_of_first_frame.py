@@ -11,7 +11,8 @@ import supple as sp
 from numba.core.dispatcher import Dispatcher
 from supple.runtime.kernel_cache import KernelCache
 
-ball = sp.Body("ball", sp.shapes.sphere(radius=0.5, edge_length=0.2), sp.StableNeoHookean(5e4, 0.45, 1000), (0, 1, 0))
+rubber = sp.StableNeoHookean(youngs=5e4, poisson=0.45, density=1000)
+ball = sp.Body("ball", sp.shapes.sphere(radius=0.5, edge_length=0.2), rubber, position=(0, 1, 0))
 floor = sp.HalfSpace(point=(0, 0, 0), normal=(0, 1, 0), friction=0.5)
 next(iter(sp.simulate(sp.Scene(bodies=[ball], obstacles=[floor]), sp.XPBD(substeps=20), dt=1 / 60, steps=1)))
 for kernel in gc.get_objects():
