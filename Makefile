@@ -28,9 +28,11 @@ test: .venv/.dev
 test-all: .venv/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# Every reader on many thousands of damaged files.
+# Every reader on many thousands of damaged files, which are new ones each time; with SEED, those of an earlier run.
 fuzz: .venv/.dev
-	SUPPLE_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 tests/fuzz
+	@seed=$${SEED:-$$(date +%s)}; again="The same again: make fuzz SEED=$$seed EXAMPLES=$(EXAMPLES)"; echo "$$again"; \
+	  SUPPLE_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 --hypothesis-profile=new --hypothesis-seed=$$seed \
+	  tests/fuzz || { echo "$$again"; exit 1; }
 
 # A hundred thousand steps of small scenes with every solver.
 soak: .venv/.dev

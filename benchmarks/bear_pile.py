@@ -26,9 +26,9 @@ from benchmarks.measuring import run_json
 from benchmarks.our_beam import peak_megabytes
 from benchmarks.published import publish
 from benchmarks.table import Table
-from supple.implicit.details import ImplicitDetails
-from supple.output.check.checker import check_recording
-from supple.output.check.settings import CheckSettings
+from supple.results.check.checker import check_recording
+from supple.results.check.settings import CheckSettings
+from supple.solvers.implicit.details import ImplicitDetails
 
 COUNTS = (5, 10, 20, 50, 100)
 SIDES = {5: (5, 1, 1), 10: (5, 2, 1), 20: (5, 2, 2), 50: (5, 2, 5), 100: (5, 4, 5)}

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from supple.demos.bears import BEARS
-from supple.system import build_system
-from supple.xpbd.assessment.surfaces import SurfaceCheck, crossings
-from supple.xpbd.contact.collisions import mean_edge_length
-from supple.xpbd.solver import XPBD
+from supple.app.demos.bears import BEARS
+from supple.model.system import build_system
+from supple.solvers.xpbd.assessment.surfaces import SurfaceCheck, crossings
+from supple.solvers.xpbd.contact.collisions import mean_edge_length
+from supple.solvers.xpbd.solver import XPBD
 
 ROOT = Path(__file__).parents[1]
 
@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[1]
 RUN = """
 import dataclasses, sys
 import numpy as np, supple as sp
-from supple.demos.bears import BEARS
+from supple.app.demos.bears import BEARS
 substeps, frames, file = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
 solver = BEARS.solver() if callable(BEARS.solver) else BEARS.solver
 if substeps:

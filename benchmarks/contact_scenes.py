@@ -26,8 +26,8 @@ import numpy as np
 
 import supple as sp
 from benchmarks.table import Table
-from supple.demos.torture.registry import TORTURE
-from supple.implicit.details import ImplicitDetails
+from supple.app.demos.torture.registry import TORTURE
+from supple.solvers.implicit.details import ImplicitDetails
 
 ROOT = Path(__file__).resolve().parents[1]
 MAX_STEPS = 100

@@ -19,8 +19,8 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 from benchmarks.live_page import FLAGS, source, wait
-from supple.viewer.app import Address, opened_page
-from supple.viewer.protocol.commands import Play
+from supple.app.viewer.app import Address, opened_page
+from supple.app.viewer.protocol.commands import Play
 
 ROUNDS, SECONDS = 3, 3.0
 # Of a process, by what its command line has.

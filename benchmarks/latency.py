@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from websockets.asyncio.server import ServerConnection
 
-from supple.viewer.drawing.layers.skin import drawn_points
+from supple.app.viewer.drawing.layers.skin import drawn_points
 
 # What ends at each time stamp after the first, which is that of the event in the browser.
 STAGES = {

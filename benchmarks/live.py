@@ -20,10 +20,10 @@ from typing import Any
 import supple as sp
 from benchmarks.published import publish
 from benchmarks.table import circumstances
-from supple.viewer.app import Address, opened_page
-from supple.viewer.engine.engine import Engine
-from supple.viewer.protocol.commands import Play, Reset, Step
-from supple.viewer.protocol.live_source import LiveSource
+from supple.app.viewer.app import Address, opened_page
+from supple.app.viewer.engine.engine import Engine
+from supple.app.viewer.protocol.commands import Play, Reset, Step
+from supple.app.viewer.protocol.live_source import LiveSource
 
 WAYS = {
     "headless": "simulate(), no page",

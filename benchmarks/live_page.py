@@ -33,11 +33,11 @@ import supple as sp
 from benchmarks.latency import MOTION, MOVED, WATCH, noted, printed, stages_of, summary
 from benchmarks.measuring import ROOT
 from benchmarks.published import publish
-from supple.viewer.app import Address, OpenPage, opened_page
-from supple.viewer.engine.scene.live_scene import LiveScene
-from supple.viewer.engine.scene.solvers import SOLVERS
-from supple.viewer.protocol.commands import Pause, Play, Reset
-from supple.viewer.protocol.live_source import LiveSource
+from supple.app.viewer.app import Address, OpenPage, opened_page
+from supple.app.viewer.engine.scene.live_scene import LiveScene
+from supple.app.viewer.engine.scene.solvers import SOLVERS
+from supple.app.viewer.protocol.commands import Pause, Play, Reset
+from supple.app.viewer.protocol.live_source import LiveSource
 
 # A part that takes longer is ended [s]: compiling kernels, once, may take minutes. Usually a size takes 80 s.
 LONGEST_PART = 400.0

@@ -32,8 +32,8 @@ from numpy.ctypeslib import ndpointer
 import supple as sp
 from benchmarks.published import publish
 from benchmarks.table import Table
-from supple.system import System, build_system, initial_state
-from supple.xpbd.solver import XPBD
+from supple.model.system import System, build_system, initial_state
+from supple.solvers.xpbd.solver import XPBD
 
 DIVISIONS = {"1k": 6, "10k": 12, "30k": 17, "100k": 26, "180k": 31, "1M": 55}
 GCC_FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")

@@ -19,8 +19,8 @@ import numpy as np
 
 import supple as sp
 from supple.materials.material import Material
-from supple.system import build_system, initial_state
-from supple.xpbd.solver import XPBD
+from supple.model.system import build_system, initial_state
+from supple.solvers.xpbd.solver import XPBD
 
 DIVISIONS = 17
 H = 1.0 / 1200.0

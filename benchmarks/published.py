@@ -12,7 +12,7 @@ from benchmarks.latency import live_page_text
 from benchmarks.measuring import ROOT
 from benchmarks.table import table_text
 from benchmarks.tables import live_text, reading_text, rigid_bodies_text, speed_text
-from supple.files.replacing import whole_file
+from supple.runtime.replacing import whole_file
 
 DOCS = ROOT / "docs"
 

@@ -19,9 +19,9 @@ from numba.np.ufunc.parallel import threading_layer
 import supple as sp
 from benchmarks.published import publish
 from benchmarks.table import circumstances
-from supple.demos.actuators.bellows import bellows
-from supple.readings.fields import FIELDS
-from supple.xpbd.details import XPBDDetails
+from supple.app.demos.actuators.bellows import bellows
+from supple.results.readings.fields import FIELDS
+from supple.solvers.xpbd.details import XPBDDetails
 
 CELL = 0.01
 SOFT, STIFFER = 2e4, 1e5  # Young's moduli of the finger [Pa]

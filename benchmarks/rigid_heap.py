@@ -16,7 +16,7 @@ import numpy as np
 import supple as sp
 from benchmarks.published import publish
 from benchmarks.table import Table
-from supple.xpbd.details import XPBDDetails
+from supple.solvers.xpbd.details import XPBDDetails
 
 SIZE, PER_SIDE, GAP = 0.1, 5, 1.8
 

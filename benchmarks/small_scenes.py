@@ -24,8 +24,8 @@ import numpy as np
 
 import supple as sp
 from benchmarks.table import Table
-from supple.demos.torture.registry import TORTURE
-from supple.system import build_system, initial_state
+from supple.app.demos.torture.registry import TORTURE
+from supple.model.system import build_system, initial_state
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -16,7 +16,7 @@ from benchmarks.table import Table
 
 FIRST_STEP = """
 import time, supple as sp
-from supple.demos.registry import DEMOS
+from supple.app.demos.registry import DEMOS
 demo = DEMOS["squash"]
 next(iter(sp.simulate(demo.scene(), demo.solver(), demo.dt, 1)))
 """

@@ -17,7 +17,7 @@ import numpy as np
 import supple as sp
 from benchmarks.published import publish
 from benchmarks.table import Table
-from supple.implicit.details import ImplicitDetails
+from supple.solvers.implicit.details import ImplicitDetails
 
 TOLERANCES = (None, 1e-1, 1e-2, 1e-3, 1e-4)
 REFERENCE = 1e-7

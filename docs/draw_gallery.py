@@ -16,8 +16,8 @@ import numpy as np
 from PIL import Image
 
 import supple as sp
-from supple.demos.registry import DEMOS
-from supple.output.export.video_worker import draw
+from supple.app.demos.registry import DEMOS
+from supple.results.export.video_worker import draw
 
 FOLDER = Path(__file__).parent
 PICTURES = FOLDER / "images" / "gallery"

@@ -12,10 +12,10 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import supple as sp
+from supple.app.viewer.app import Address, opened_page
+from supple.app.viewer.protocol.commands import Grab, ReleaseGrab, Reset, SetParameter, Step
+from supple.app.viewer.protocol.live_source import LiveSource
 from supple.mesh.primitives.surfaces import torus_surface
-from supple.viewer.app import Address, opened_page
-from supple.viewer.protocol.commands import Grab, ReleaseGrab, Reset, SetParameter, Step
-from supple.viewer.protocol.live_source import LiveSource
 
 FOLDER = Path(__file__).parent / "images"
 FLAGS = "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader"

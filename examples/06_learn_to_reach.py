@@ -7,8 +7,8 @@ Run it:  python examples/06_learn_to_reach.py
 
 import numpy as np
 
-from supple.learning.environments import BatchVectorEnv
-from supple.learning.reaching import Reaching
+from supple.app.learning.environments import BatchVectorEnv
+from supple.app.learning.reaching import Reaching
 
 CANDIDATES, GOALS = 8, 4
 # The first candidate of a round is the best one so far; the others are near it and far from it.

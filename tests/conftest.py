@@ -1,4 +1,4 @@
-"""One browser for all tests of pages: starting it takes seconds."""
+"""The examples that hypothesis draws, and one browser for all tests of pages: starting it takes seconds."""
 
 from __future__ import annotations
 
@@ -9,6 +9,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from hypothesis import settings
+from hypothesis.internal.conjecture import providers
+
+# `make test` draws the same examples each time; `make fuzz` draws those of a seed (`--hypothesis-seed`).
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("new", database=None, deadline=None)
+settings.load_profile("same")
+# Otherwise examples contain constants of all modules that were imported until then, which depends on the tests before.
+providers._get_local_constants = providers.Constants
 
 # Otherwise ffmpeg is started by a copy of this process, which takes a minute on some machines.
 os.environ.setdefault("IMAGEIO_FFMPEG_NO_PREVENT_SIGINT", "1")

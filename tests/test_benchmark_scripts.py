@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.readings.fields import FIELDS
+from supple.results.readings.fields import FIELDS
 
 ROOT = Path(__file__).parents[1]
 

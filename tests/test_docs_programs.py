@@ -13,18 +13,18 @@ from pathlib import Path
 import pytest
 
 import supple as sp
-from supple.cli.app import main
-from supple.demos.registry import DEMOS
-from supple.state import Status
+from supple.app.cli.app import main
+from supple.app.demos.registry import DEMOS
+from supple.model.state import Status
 
 DOCS = Path(__file__).parents[1] / "docs"
 # Pages with blocks that another test runs, or that are parts of a program.
 ELSEWHERE = {
     "tutorial.md": "tests/test_tutorial.py",
-    "studies.md": "tests/studies/test_docs.py",
-    "scene_files.md": "tests/scene_file/test_loader.py",
-    "check.md": "lines that need a recording; tests/output/check runs the same commands",
-    "runs.md": "lines that need a run; tests/cli/test_resume.py runs the same commands",
+    "studies.md": "tests/app/studies/test_docs.py",
+    "scene_files.md": "tests/app/scene_file/test_loader.py",
+    "check.md": "lines that need a recording; tests/results/check runs the same commands",
+    "runs.md": "lines that need a run; tests/app/cli/test_resume.py runs the same commands",
     "stitches.md": "two lines of the program of howto/stitching.md",
 }
 PAGES = [str(path.relative_to(DOCS).as_posix()) for path in sorted(DOCS.rglob("*.md"))]

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import supple as sp
-from supple.learning.reaching import Reaching
-from supple.scene_file.loader import load_run
+from supple.app.learning.reaching import Reaching
+from supple.app.scene_file.loader import load_run
 from supple.simulate import simulate
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

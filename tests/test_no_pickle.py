@@ -9,8 +9,8 @@ ROOT = Path(supple.__file__).parent
 MODULES = {"pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve", "_pickle"}
 # Calls that are safe: bytes are only hashed; a pipe to a child process of the same program.
 ALLOWED = {
-    "numerics/kernel_cache.py": {"pickle.dumps"},
-    "viewer/engine/engine.py": {"pickle.loads", "pickle.PicklingError"},
+    "runtime/kernel_cache.py": {"pickle.dumps"},
+    "app/viewer/engine/engine.py": {"pickle.loads", "pickle.PicklingError"},
 }
 
 

@@ -32,7 +32,7 @@ def test_importing_supple_loads_nothing_heavy():
 def test_help_loads_nothing_heavy():
     code = """
         import json, sys
-        from supple.cli.app import main
+        from supple.app.cli.app import main
         main(["--help"])
         print(json.dumps(sorted(sys.modules)))
     """
@@ -92,9 +92,9 @@ def test_every_module_imports_without_posix_modules():
     found = python(code, json.dumps([POSIX_ONLY, POSIX_NAMES])).split()
     assert {
         "supple.simulate",
-        "supple.cli.app",
+        "supple.app.cli.app",
         "supple.mesh.meshing.tetrahedralize",
-        "supple.scene_file.loader",
+        "supple.app.scene_file.loader",
     } <= set(found)
 
 

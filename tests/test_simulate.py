@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.implicit.contact.model import ContactModel
-from supple.simulate import NullSink, measure
-from supple.solver import Solver
-from supple.state import SolverDetails, State, Status, StepReport
-from supple.system import build_system, initial_state
+from supple.model.diagnostics import measure
+from supple.model.state import SolverDetails, State, Status, StepReport
+from supple.model.system import build_system, initial_state
+from supple.simulate import NullSink
+from supple.solvers.implicit.contact.model import ContactModel
+from supple.solvers.solver import Solver
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 CUBE_TETS = [[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]]

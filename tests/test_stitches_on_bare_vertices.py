@@ -6,24 +6,24 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.implicit.energies.inertia import Inertia
-from supple.implicit.energies.potential import HessianBlocks
-from supple.implicit.energies.stitches import StitchEnergy
-from supple.implicit.limits.inversion_guard import InversionGuard
-from supple.implicit.limits.step_limits import StepLimits
-from supple.implicit.newton.convergence import Convergence
-from supple.implicit.newton.direction import Tools
-from supple.implicit.newton.free_motion import FreeMotion
-from supple.implicit.newton.linear_solver import LinearSolver
-from supple.implicit.newton.minimize import Problem, minimize
-from supple.implicit.newton.objective import Objective
+from supple.model.state import Status
+from supple.model.system import PinRange, System
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitching import no_stitching
-from supple.state import Status
-from supple.system import PinRange, System
-from supple.xpbd.constraints.stitches import stitch_constraints
-from supple.xpbd.damping.element_matrices import matrices_of_tets
-from supple.xpbd.damping.elements import viscous_tets
+from supple.solvers.implicit.energies.inertia import Inertia
+from supple.solvers.implicit.energies.potential import HessianBlocks
+from supple.solvers.implicit.energies.stitches import StitchEnergy
+from supple.solvers.implicit.inversion_guard import InversionGuard
+from supple.solvers.implicit.newton.convergence import Convergence
+from supple.solvers.implicit.newton.direction import Tools
+from supple.solvers.implicit.newton.free_motion import FreeMotion
+from supple.solvers.implicit.newton.linear_solver import LinearSolver
+from supple.solvers.implicit.newton.minimize import Problem, minimize
+from supple.solvers.implicit.newton.objective import Objective
+from supple.solvers.implicit.step_limits import StepLimits
+from supple.solvers.xpbd.constraints.stitches import stitch_constraints
+from supple.solvers.xpbd.damping.element_matrices import matrices_of_tets
+from supple.solvers.xpbd.damping.elements import viscous_tets
 
 
 def side(points, triangles=()):

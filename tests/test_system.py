@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.state import State
-from supple.system import build_system, initial_state
+from supple.model.state import State
+from supple.model.system import build_system, initial_state
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 CUBE_TETS = [[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]]

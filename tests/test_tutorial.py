@@ -4,7 +4,7 @@ import re
 import shlex
 from pathlib import Path
 
-from supple.cli.app import main
+from supple.app.cli.app import main
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial.md"
 

@@ -26,11 +26,11 @@ API = (
 # Not public names, but what public ones return.
 RETURNED = {
     "simulation": (
-        "supple.readings.frame_readings.FrameReadings",
-        "supple.xpbd.details.XPBDDetails",
-        "supple.implicit.details.ImplicitDetails",
+        "supple.results.readings.frame_readings.FrameReadings",
+        "supple.solvers.xpbd.details.XPBDDetails",
+        "supple.solvers.implicit.details.ImplicitDetails",
     ),
-    "recordings": ("supple.output.recording.frame.RecordedFrame",),
+    "recordings": ("supple.results.recording.frame.RecordedFrame",),
 }
 
 

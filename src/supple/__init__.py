@@ -6,12 +6,12 @@ when the name is first used, so that the import of `supple` is quick.
 
 import lazy_loader
 
-from .displayed import supply
+from .runtime.displayed import supply
 
 __version__ = "0.1.0"
 __getattr__, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __all__ += ["__version__"]
-supply(player="supple.output.player:player_of", progress="supple.output.progress:ProgressBar")
+supply(player="supple.results.player:player_of", progress="supple.results.progress:ProgressBar")
 
 
 def __dir__() -> list[str]:

@@ -2,7 +2,7 @@
 
 import sys
 
-from supple.cli.app import main
+from supple.app.cli.app import main
 
 if __name__ == "__main__":
     sys.exit(main())

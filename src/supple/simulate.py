@@ -7,145 +7,29 @@ import math
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
-from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
+from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.materials.flows.internal import checked
-from supple.numerics.memory import require_memory
-from supple.readings.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
-from supple.readings.applied_values import with_applied_values
-from supple.readings.diagnostics import Diagnostics, measure
-from supple.readings.energy_balance import completed_works
-from supple.readings.frame_readings import FrameReadings
-from supple.readings.joint_readings import JointReading, joint_readings
+from supple.model.state import Problems, State, StepReport
+from supple.model.system import System, build_system, initial_state
+from supple.results.frame import Frame, completed_report, start_frame
+from supple.results.readings.applied_values import with_applied_values
+from supple.runtime.displayed import supplied
+from supple.runtime.memory import require_memory
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
-from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
-from supple.solver import Solver
-from supple.state import ContactPoints, Problems, SolverDetails, State, Status, StepReport
-from supple.system import BodyRange, System, build_system, initial_state
+from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)
 
 # Beyond these, dt^2 and 1 / dt^2 leave what float64 can hold.
 DT_RANGE = (1e-30, 1e30)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Report(DisplayedReport, Diagnostics):
-    """How the step of one frame ended, and what was measured on its state.
-
-    Attributes
-    ----------
-    status, iterations, message, min_distance, details : see `StepReport`
-    wall_seconds : time the step took [s]
-    """
-
-    status: Status
-    iterations: int
-    wall_seconds: float
-    message: str = ""
-    min_distance: float | None = None
-    details: SolverDetails = field(default_factory=SolverDetails)
-
-    @property
-    def softening(self) -> Mapping[str, float]:
-        """By body, the share of its stiffness that it lacks, estimated; empty where the solver does not soften."""
-        return getattr(self.details, "softening", {})
-
-    @property
-    def work(self) -> Mapping[str, float]:
-        """The works on the bodies over the frame by what does them, see `supple.readings.energy_balance` [J]."""
-        return self.details.work
-
-    @property
-    def energy_residual(self) -> float:
-        """The change of `energy` over the frame that the sum of `work` leaves open [J]."""
-        return self.details.energy_residual
-
-    @property
-    def joints(self) -> Mapping[str, JointReading]:
-        """What every joint does, by name."""
-        return joint_readings(self.details)
-
-    @property
-    def cavities(self) -> Mapping[str, CavityReading]:
-        """By name, the pressure [Pa] and volume [m^3] of each cavity, and its work over the frame [J]."""
-        return cavity_readings(self.details)
-
-    @property
-    def cables(self) -> Mapping[str, CableReading]:
-        """By name, the tensions [N] and the length [m] of each cable, and its work over the frame [J]."""
-        return cable_readings(self.details)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Frame(FrameReadings):
-    """The scene at one time. For stresses and forces, see `FrameReadings`.
-
-    Attributes
-    ----------
-    index : number of steps since the start; time : [s]
-    report : see `Report`; state : flat arrays of all bodies; system : what they belong to
-    find_contacts : finds the contacts of `contacts`; solver : which made it; each None where it is not known
-    """
-
-    index: int
-    state: State
-    system: System
-    report: Report
-    find_contacts: Callable[[], ContactPoints] | None = None
-    solver: Solver | None = None
-
-    @property
-    def time(self) -> float:
-        """[s]"""
-        return self.state.time
-
-    @cached_property
-    def positions(self) -> dict[str, NDArray[np.float64]]:
-        """By body name, (n, 3) [m]; of a rigid body, of its surface's vertices."""
-        return self.system.split(self.state.positions)
-
-    @cached_property
-    def velocities(self) -> dict[str, NDArray[np.float64]]:
-        """By body name, (n, 3) [m/s]."""
-        return self.system.split(self.state.velocities)
-
-    @cached_property
-    def poses(self) -> dict[str, Pose]:
-        """Of the rigid bodies, by name."""
-        x, v, rest = self.state.positions, self.state.velocities, self.system.rest_positions
-        rows = {part.name: part.vertices for part in self.system.rigid_bodies}
-        return {name: pose_of(rest[part], x[part], v[part]) for name, part in rows.items()}
-
-    @cached_property
-    def contacts(self) -> ContactPoints | None:
-        """All contacts, one by one; None where no step led to the frame, or `Implicit` has contact=None."""
-        return None if self.find_contacts is None else self.find_contacts()
-
-    @property
-    def _x(self) -> NDArray[np.float64]:
-        return self.state.positions
-
-    @cached_property
-    def _laws(self) -> TetLaws:
-        return self.system.laws_at(self.state.time)
-
-    @property
-    def _internal(self) -> NDArray[np.float64]:
-        return self.state.internal
-
-    @property
-    def _bodies(self) -> tuple[BodyRange, ...]:
-        return self.system.bodies
 
 
 class StartFrame(Protocol):
@@ -281,12 +165,6 @@ def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None =
     return start_frame(system, state, index, solver)
 
 
-def start_frame(system: System, state: State, index: int, solver: Solver | None) -> Frame:
-    """A frame without a step that led to it."""
-    report = completed_report(system, state, StepReport(Status.CONVERGED, 0), 0.0)
-    return Frame(index, state, system, report, solver=solver)
-
-
 def _with_internal(scene: Scene, state: State) -> State:
     """The state with the internal variables of the scene's materials, at rest where it has none."""
     material = joined_materials([tet_material(b.material, len(b.mesh.tets), b.mesh.order) for b in scene.bodies])
@@ -354,22 +232,3 @@ def _steps(
 def _warn(problems: Problems) -> None:
     if problems.bad:
         logger.warning("%s", problems)
-
-
-def completed_report(
-    system: System, state: State, step: StepReport, seconds: float, energy_before: float | None = None
-) -> Report:
-    """The report of a step that took so many seconds, with what is measured on its state.
-
-    energy_before : `energy` where the step began [J]; None where there was no step. Works of a solver that reports
-        some get the numerical one.
-    """
-    measured = measure(system, state)
-    values = vars(measured) | vars(step)
-    del values["contacts"]  # made when they are asked for: `Frame.contacts`
-    details = with_applied_values(step.details, system, state.time)
-    if energy_before is not None and details.work:
-        works = completed_works(details.work, details.energy_residual, measured.energy - energy_before)
-        details = replace(details, work=works)
-    values["details"] = details
-    return Report(**values, wall_seconds=seconds)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.obstacle_vertices import obstacle_positions, with_obstacles
+from supple.contact.mesh.obstacle_vertices import obstacle_positions, with_obstacles
+from supple.model.system import build_system
 from supple.scene.obstacles.polyhedra import SPHERE_SPLITS, round_ball
 from supple.scene.rotation import rotation_matrix
-from supple.system import build_system
 
 SHEET = sp.SurfaceMesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 2, 1], [0, 3, 2]])
 

@@ -22,14 +22,14 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 import supple as sp
+from supple.app.runs.checkpoints import frame_of
+from supple.app.runs.contents import RunPaths
+from supple.app.runs.journal import read_journal
+from supple.app.scene_file.loader import load_run
+from supple.app.studies.cases import read_result
 from supple.mesh import shapes
 from supple.mesh.io.mesh_files import SURFACE_WRITERS
-from supple.output.checkpoint.file import read_checkpoint
-from supple.runs.checkpoints import frame_of
-from supple.runs.contents import RunPaths
-from supple.runs.journal import read_journal
-from supple.scene_file.loader import load_run
-from supple.studies.cases import read_result
+from supple.results.checkpoint.file import read_checkpoint
 
 EXAMPLES = int(os.environ.get("SUPPLE_FUZZ_EXAMPLES", "40"))
 # Of `make fuzz`: an example of a time out of all proportion is an error there. The suite asserts no time.

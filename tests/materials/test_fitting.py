@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.cli.app import main
+from supple.app.cli.app import main
 from supple.errors import OutputError, SceneError
 
 RUBBER = Path(__file__).parents[2] / "examples" / "rubber"

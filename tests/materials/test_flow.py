@@ -5,13 +5,13 @@ import pytest
 
 import supple as sp
 from supple.errors import SceneError, SolverError
-from supple.implicit.energies.elasticity import elasticity_of
-from supple.implicit.energies.potential import HessianBlocks
 from supple.materials.flows.internal import at_rest, count_of
-from supple.output.check.elastic_energy import elastic_energy
-from supple.output.checkpoint.file import Checkpoint, RunFacts, read_checkpoint, write_checkpoint
-from supple.state import State
-from supple.system import build_system
+from supple.model.state import State
+from supple.model.system import build_system
+from supple.results.check.elastic_energy import elastic_energy
+from supple.results.checkpoint.file import Checkpoint, RunFacts, read_checkpoint, write_checkpoint
+from supple.solvers.implicit.energies.elasticity import elasticity_of
+from supple.solvers.implicit.energies.potential import HessianBlocks
 
 CUBE = sp.shapes.box((1, 1, 1), (1, 1, 1))
 RUBBER = sp.MooneyRivlin(c10=8e4, c01=2e4, bulk=1e7)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.implicit.energies.elasticity import elasticity_of
-from supple.implicit.energies.potential import HessianBlocks
 from supple.materials.flows.internal import at_rest, count_of
-from supple.system import build_system
+from supple.model.system import build_system
+from supple.solvers.implicit.energies.elasticity import elasticity_of
+from supple.solvers.implicit.energies.potential import HessianBlocks
 
 STATIC = sp.Implicit(integrator="static", contact=None)
 RUBBER = sp.MooneyRivlin(c10=8e4, c01=2e4, bulk=1e7)

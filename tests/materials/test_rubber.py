@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 import supple as sp
 from supple.errors import SceneError, SolverError
-from supple.implicit.energies.elasticity import elasticity_of
-from supple.implicit.energies.potential import HessianBlocks
-from supple.output.check.elastic_energy import elastic_energy
-from supple.system import build_system
+from supple.model.system import build_system
+from supple.results.check.elastic_energy import elastic_energy
+from supple.solvers.implicit.energies.elasticity import elasticity_of
+from supple.solvers.implicit.energies.potential import HessianBlocks
 
 MOONEY = sp.MooneyRivlin(c10=1e5, c01=3e4, bulk=4e6)
 YEOH = sp.Yeoh(c10=1e5, c20=-1e3, c30=120.0, bulk=4e6)

@@ -8,7 +8,7 @@ from tests.mesh.conftest import the_only_line, write
 import supple as sp
 from supple.errors import MeshError
 from supple.mesh.skin import Embedding
-from supple.numerics.quadratic_tets.shape_functions import (
+from supple.numerics.quadratic_shape_functions import (
     NODE_COORDINATES,
     NODE_EDGES,
     conical_rule,

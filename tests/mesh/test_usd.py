@@ -14,6 +14,14 @@ pxr = pytest.importorskip("pxr")
 from pxr import Gf, Usd, UsdGeom  # noqa: E402
 
 BOX = sp.shapes.box((0.1, 0.2, 0.3), (1, 2, 3))
+POINTS = "point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]"
+
+
+def tet(points: str, tets: str = "int4[] tetVertexIndices = [(0, 1, 2, 3)]", transform: str | None = None) -> str:
+    """A file with one TetMesh."""
+    order = 'uniform token[] xformOpOrder = ["xformOp:transform"]'
+    placed = [] if transform is None else [f"matrix4d xformOp:transform = {transform}", order]
+    return "\n".join(["#usda 1.0", 'def TetMesh "a" {', points, tets, *placed, "}\n"])
 
 
 @pytest.mark.parametrize("suffix", [".usd", ".usda", ".usdc"])
@@ -57,12 +65,22 @@ def test_prims_are_placed_in_metres(tmp_path: Path) -> None:
         ('#usda 1.0\ndef TetMesh "a" {\n', "OpenUSD cannot read it"),
         ("#usda 1.0\n", "no tetrahedra"),
         (
-            '#usda 1.0\ndef TetMesh "a" {\n point3f[] points = [(0, 0, 0)]\n'
-            " int4[] tetVertexIndices = [(0, 1, 2, 3)]\n}\n",
+            tet("point3f[] points = [(0, 0, 0)]"),
             "/a: a tet names a point outside of 0 to 0",
+        ),
+        (tet("pointXf[] points = [(0, 0, 0)]"), r"/a.points is not an array of the type point3f\[\]"),
+        (tet("float2[] points = [(0, 1), (2, 3), (4, 5)]"), r"/a.points is not an array of the type point3f\[\]"),
+        (tet('string points = "a"'), r"/a.points is not an array of the type point3f\[\]"),
+        (tet(POINTS, "float4[] tetVertexIndices = [(nan, 1, 2, 3)]"), r"/a.tetVertexIndices is not .* type int4\[\]"),
+        (tet("point3f[] points = [(nan, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]"), "which is not finite"),
+        (tet(POINTS, transform="((inf, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))"), "which is not finite"),
+        (
+            tet(POINTS, transform="((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (1e300, 0, 0, 1))"),
+            "coordinates beyond",
         ),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_malformed_files_are_one_line(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "bad.usda"
     path.write_text(text, encoding="utf-8")

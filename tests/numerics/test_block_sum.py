@@ -7,14 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import supple as sp
-from supple.implicit.energies.potential import HessianBlocks
-from supple.implicit.newton.free_motion import FreeMotion
-from supple.implicit.newton.linear_solver import LinearSolver
+from supple.model.system import build_system
 from supple.numerics.sparse.block_csr import build_pattern
 from supple.numerics.sparse.block_sum import JointPattern
 from supple.numerics.sparse.couplings import Couplings
-from supple.numerics.threads import numba_threads
-from supple.system import build_system
+from supple.runtime.threads import numba_threads
+from supple.solvers.implicit.energies.potential import HessianBlocks
+from supple.solvers.implicit.newton.free_motion import FreeMotion
+from supple.solvers.implicit.newton.linear_solver import LinearSolver
 
 
 def random_couplings(rng, n, count):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf, overlapping
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 def boxes(count, seed, size=0.2):

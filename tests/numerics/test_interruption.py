@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from supple.numerics.interruption import interruptible, interruption_point
+from supple.runtime.interruption import interruptible, interruption_point
 
 
 def test_a_point_without_a_check_does_nothing():

@@ -16,8 +16,8 @@ from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
 import supple
-from supple.numerics.kernel_cache import KernelCache, njit, reached_code
-from supple.numerics.parallel_kernel import ParallelKernel
+from supple.runtime.kernel_cache import KernelCache, njit, reached_code
+from supple.runtime.parallel_kernel import ParallelKernel
 
 SOURCES = Path(supple.__file__).parent
 # Prints the result of a kernel of svd3.py, and how often the cache had it.
@@ -142,7 +142,7 @@ def test_what_the_digest_depends_on():
 
 def test_names_of_a_module_and_constants_count(monkeypatch):
     from supple.numerics import mat3
-    from supple.xpbd import integration
+    from supple.solvers.xpbd import integration
 
     def calls_through_a_module(a):
         return mat3.dot(a, a)

@@ -8,8 +8,8 @@ import textwrap
 import pytest
 
 import supple as sp
-from supple.numerics import memory
-from supple.numerics.memory import available_bytes, in_words, require_memory
+from supple.runtime import memory
+from supple.runtime.memory import available_bytes, in_words, require_memory
 
 RUBBER = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
 
@@ -68,7 +68,7 @@ def test_the_limit_of_the_process_counts():
     code = """
         import resource
         resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
-        from supple.numerics.memory import available_bytes
+        from supple.runtime.memory import available_bytes
         print(available_bytes())
     """
     answer = subprocess.check_output([sys.executable, "-c", textwrap.dedent(code)], text=True)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from supple.errors import SolverError
-from supple.implicit.limits.inversion_guard import keeps_volume
 from supple.numerics.noninverting_step import largest_noninverting_step, noninverting_step
+from supple.solvers.implicit.inversion_guard import keeps_volume
 
 REGULAR = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.8, 0.0], [0.4, 0.3, 0.9]])
 

@@ -9,9 +9,9 @@ import numba
 import numpy as np
 import pytest
 
-from supple.numerics import parallel_kernel
-from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.threads import numba_threads
+from supple.runtime import parallel_kernel
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import numba_threads
 
 
 @njit(parallel=True)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from supple.numerics.quadratic_tets.bernstein import determinant_coefficients, positive_elements
-from supple.numerics.quadratic_tets.noninverting_step import noninverting_step
-from supple.numerics.quadratic_tets.shape_functions import NODE_COORDINATES, reference_gradients
-from supple.numerics.threads import one_thread
-from supple.output.check.geometry import quadratic_tets as of_check
+from supple.numerics.bernstein import determinant_coefficients, positive_elements
+from supple.numerics.quadratic_noninverting_step import noninverting_step
+from supple.numerics.quadratic_shape_functions import NODE_COORDINATES, reference_gradients
+from supple.results.check.geometry import quadratic_tets as of_check
+from supple.runtime.threads import one_thread
 
 KEEP = 0.2
 NODES = np.arange(10, dtype=np.int32)[None]

@@ -7,13 +7,13 @@ import sys
 import numba
 import pytest
 
-from supple.numerics.threads import is_alone, numba_threads
+from supple.runtime.threads import is_alone, numba_threads
 
 KILLED = """
 import os
 import numba
 from numba.np.ufunc import parallel
-import supple.numerics.threads
+import supple.runtime.threads
 
 numba.get_num_threads()
 child = os.fork()

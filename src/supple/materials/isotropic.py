@@ -32,9 +32,9 @@ from supple.materials.stretch_energies.stretches import (
     dispatch,
     shape_and_volume,
 )
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
 from supple.numerics.svd3 import svd3 as decompose
+from supple.runtime.kernel_cache import njit, prange
 
 density = dispatch("density", [energy.density for energy in STRETCH_ENERGIES], UNKNOWN_ONE)
 gradient = dispatch("gradient", [energy.gradient for energy in STRETCH_ENERGIES], UNKNOWN_THREE)

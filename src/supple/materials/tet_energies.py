@@ -17,9 +17,9 @@ from supple.materials.isotropic import (
     stable_piola,
     stress,
 )
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.svd3 import svd3 as decompose
+from supple.runtime.kernel_cache import njit, prange
 
 
 @njit(error_model="numpy")

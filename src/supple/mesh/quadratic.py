@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.mesh.topology import TET_FACETS
-from supple.numerics.kernel_cache import read_only
-from supple.numerics.quadratic_tets.bernstein import determinant_coefficients, positive_elements
-from supple.numerics.quadratic_tets.shape_functions import (
+from supple.numerics.bernstein import determinant_coefficients, positive_elements
+from supple.numerics.quadratic_shape_functions import (
     BETWEEN,
     NODE_EDGES,
     TURNED,
@@ -17,6 +16,7 @@ from supple.numerics.quadratic_tets.shape_functions import (
     reference_gradients,
     shape_functions,
 )
+from supple.runtime.kernel_cache import read_only
 
 
 def turned_nodes(nodes: NDArray[np.int32], negative: NDArray[np.bool_]) -> NDArray[np.int32]:

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.displayed import Displayed
 from supple.errors import MeshError
 from supple.mesh.io.cells import FormatError
 from supple.mesh.io.file_contents import file_contents
 from supple.mesh.io.models import abaqus_sets, gmsh_groups
 from supple.mesh.io.models.named_sets import NamedSets
+from supple.runtime.displayed import Displayed
 
 _READERS: dict[str, Callable[[bytes], NamedSets]] = {".inp": abaqus_sets.read, ".msh": gmsh_groups.read}
 SETS_EXTENSIONS = tuple(_READERS)

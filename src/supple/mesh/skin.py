@@ -11,7 +11,7 @@ from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, vertex_array
 from supple.mesh.quadratic import node_weights
 from supple.mesh.tetmesh import TetMesh
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 # How many tets, nearest by centre, are tried for each point. In even meshes nearly every point lies in one of them.
 NEAREST = 16

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.displayed import Displayed, extent
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, vertex_array
 from supple.mesh.io.mesh_files import read_surface, write_surface
 from supple.mesh.topology import Components, connected_components, is_used, unique_edges, without_unused
+from supple.runtime.displayed import Displayed, extent
 
 if TYPE_CHECKING:
     from supple.mesh.surface_checks import SurfaceReport

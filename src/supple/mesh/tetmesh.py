@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.displayed import Displayed, extent
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, place, vertex_array
 from supple.mesh.io.mesh_files import read_tets, write_tets
@@ -37,6 +36,7 @@ from supple.mesh.topology import (
     unique_edges,
     without_unused,
 )
+from supple.runtime.displayed import Displayed, extent
 
 logger = logging.getLogger(__name__)
 

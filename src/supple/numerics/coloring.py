@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 def breadth_first_order(constraints: list[NDArray[np.int32]], n_vertices: int) -> tuple[NDArray, NDArray]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
 from supple.numerics.geometry.double_double import two_product, two_sum
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 # Bounds on the rounding error of Horner's rule and of its compensated form, relative to the sum of the terms' sizes.
 _ROUND_OFF = 2e-15

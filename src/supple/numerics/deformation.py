@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(cache=True)

@@ -3,7 +3,7 @@
 A vector is (x, y, z). A matrix is nine numbers, row after row: M = (m00, m01, m02, m10, m11, m12, m20, m21, m22).
 """
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

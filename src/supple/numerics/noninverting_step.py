@@ -25,8 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SolverError
 from supple.numerics.cubic import last_positive_before_root, positive_on_unit_interval
 from supple.numerics.geometry import double_double as dd
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit, prange
 
 # The default share of its volume that a tet keeps in one step.
 KEEP = 0.2

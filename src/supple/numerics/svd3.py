@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, load_mat, store_mat
+from supple.runtime.kernel_cache import njit
 
 # The remaining error is below round-off after a sweep whose rotation angles are all below 1e-8 and whose cosines
 # between columns are all below 1e-9. (Both are needed: a small cosine needs a large angle where the lengths are nearly

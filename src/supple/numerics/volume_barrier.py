@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(cache=True, error_model="numpy")

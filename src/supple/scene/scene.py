@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.displayed import Showable, short_list
 from supple.errors import SceneError
+from supple.runtime.displayed import Showable, short_list
 from supple.scene.actuators.cable import Cable
 from supple.scene.actuators.cavity import Cavity
 from supple.scene.body import PlacedBody

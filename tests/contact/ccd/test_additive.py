@@ -6,8 +6,8 @@ import ipctk
 import numpy as np
 import pytest
 
-from supple.contact.ccd.additive import KEEP, ROUND_OFF, edge_edge_time, point_triangle_time
-from supple.numerics.kernel_cache import njit
+from supple.contact.additive_ccd import KEEP, ROUND_OFF, edge_edge_time, point_triangle_time
+from supple.runtime.kernel_cache import njit
 
 COUNT = 10_000
 POINT_TRIANGLE, EDGE_EDGE = 0, 1

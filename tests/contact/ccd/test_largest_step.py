@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.ccd.intersections import intersects
-from supple.contact.ccd.largest_step import largest_step, largest_step_in_pieces
+from supple.contact.intersections import intersects
+from supple.contact.largest_step import largest_step, largest_step_in_pieces
+from supple.contact.mesh.contact_mesh import mesh_of_triangles
 from supple.contact.search.finder import CandidateFinder
-from supple.contact.surface.contact_mesh import mesh_of_triangles
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.contact.mesh.contact_mesh import mesh_of_triangles
+from supple.contact.mesh.distances import edges_nearer, points_nearer
 from supple.contact.search.finder import CandidateFinder
-from supple.contact.surface.contact_mesh import mesh_of_triangles
-from supple.contact.surface.distances import edges_nearer, points_nearer
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 DHAT = 0.02

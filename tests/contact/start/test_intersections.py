@@ -9,9 +9,9 @@ import supple as sp
 from supple.contact.start.intersections import intersections_of
 from supple.contact.start.start_error import raise_if_intersecting
 from supple.contact.start.surfaces import start_surfaces
+from supple.model.system import build_system, initial_state
 from supple.numerics.geometry.exact_predicates import side_of_plane
 from supple.scene.contact_pairs import pair_table
-from supple.system import build_system, initial_state
 
 RUBBER = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
 

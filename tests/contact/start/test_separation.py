@@ -8,8 +8,8 @@ from supple.contact.start.intersections import intersections_of
 from supple.contact.start.separation import default_gap, separate
 from supple.contact.start.surfaces import start_surfaces
 from supple.errors import SceneError
+from supple.model.system import build_system, initial_state
 from supple.scene.contact_pairs import pair_table
-from supple.system import build_system, initial_state
 
 RUBBER = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
 

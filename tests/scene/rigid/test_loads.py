@@ -5,7 +5,7 @@ import pytest
 
 import supple as sp
 from supple.errors import SceneError
-from supple.system import build_system, initial_state
+from supple.model.system import build_system, initial_state
 
 CUBE = sp.shapes.box_surface((0.2, 0.2, 0.2))
 SOFT = sp.StableNeoHookean(youngs=1e5, poisson=0.3, density=1000, damping=0.02)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.implicit.energies.elasticity import elasticity_of
-from supple.implicit.energies.potential import HessianBlocks
+from supple.model.system import build_system, initial_state
 from supple.scene.rigid.pose import nearest_rigid, orthogonality_error, pose_of
 from supple.scene.rotation import rotation_matrix
-from supple.system import build_system, initial_state
+from supple.solvers.implicit.energies.elasticity import elasticity_of
+from supple.solvers.implicit.energies.potential import HessianBlocks
 
 BOX = sp.shapes.box_surface((1.0, 2.0, 3.0), (1, 1, 1))
 TORUS = sp.shapes.torus_surface(0.5, 0.2, 0.2).transformed(scale=(1.0, 2.0, 0.7), translation=(4.0, 0.0, 0.0))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.model.system import build_system, initial_state
 from supple.scene.rotation import rotation_matrix
 from supple.scene.stitches.registry import STITCHES
 from supple.scene.stitches.stitch import Stitch
-from supple.system import build_system, initial_state
 
 SOFT = sp.StableNeoHookean(youngs=1e4, poisson=0.3)
 BOX = sp.shapes.box((0.2, 0.2, 0.2), (2, 2, 2))

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.implicit.energies.potential import HessianBlocks
-from supple.implicit.energies.stitches import StitchEnergy
-from supple.implicit.newton.reduction import Reduction
-from supple.output.recording.actions.stitches import recorded_stitches
-from supple.stitched_points import stitched_state, with_stitched_points
-from supple.system import build_system, initial_state
+from supple.model.stitched_points import stitched_state, with_stitched_points
+from supple.model.system import build_system, initial_state
+from supple.results.recording.actions.stitches import recorded_stitches
+from supple.solvers.implicit.energies.potential import HessianBlocks
+from supple.solvers.implicit.energies.stitches import StitchEnergy
+from supple.solvers.implicit.newton.reduction import Reduction
 
 G = 9.81
 BAR = sp.shapes.box((0.4, 0.1, 0.1), (8, 2, 2))

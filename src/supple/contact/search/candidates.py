@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.surface.contact_mesh import ContactMesh
-from supple.contact.surface.distances import edges_nearer, points_nearer
+from supple.contact.mesh.contact_mesh import ContactMesh
+from supple.contact.mesh.distances import edges_nearer, points_nearer
 
 
 @dataclass(frozen=True, eq=False)

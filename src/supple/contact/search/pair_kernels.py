@@ -13,10 +13,10 @@ import math
 
 import numpy as np
 
-from supple.contact.surface.distances import edge_edge_square, point_triangle_square
+from supple.contact.mesh.distances import edge_edge_square, point_triangle_square
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import STACK, after_leaf, from_root, next_leaf, overlap
-from supple.numerics.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit, prange
 
 RUNS = 64
 

@@ -3,8 +3,8 @@
 import math
 
 from supple.numerics.geometry.closest_point import closest_on_triangle, combine
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
+from supple.runtime.kernel_cache import njit
 
 
 @njit

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.mesh.distances import point_triangle_square
 from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner, sort_pairs
 from supple.contact.search.room import Room
-from supple.contact.surface.distances import point_triangle_square
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import (
     GROUP,
@@ -25,7 +25,7 @@ from supple.numerics.geometry.box_tree import (
     next_leaf,
     which_overlap,
 )
-from supple.numerics.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit, prange
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

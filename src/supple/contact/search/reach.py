@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import mat_mul_transposed, row, subtract
 from supple.numerics.svd3 import svd3
+from supple.runtime.kernel_cache import njit
 
 
 @njit(cache=True)

@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacle_poses import ObstaclePoses
 from supple.contact.search.excluded_pairs import pairs_closer_than
 from supple.contact.search.surfaces import ContactSurfaces
+from supple.model.system import System
 from supple.scene.stitches.masks import Pair, stitched_triangles
-from supple.system import System
 
 
 def stitched_contacts(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses) -> Pair:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.mesh.contact_mesh import ContactMesh
 from supple.contact.search.candidates import Candidates
 from supple.contact.search.pair_kernels import (
     boxes_of_owners,
@@ -17,7 +18,6 @@ from supple.contact.search.pair_kernels import (
     swept_boxes,
 )
 from supple.contact.search.room import Room
-from supple.contact.surface.contact_mesh import ContactMesh
 from supple.numerics.adjacency import Adjacency
 from supple.numerics.geometry.box_tree import BoxTree, morton_codes
 

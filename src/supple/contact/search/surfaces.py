@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacle_poses import ObstaclePoses
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.topology import connected_components
+from supple.model.system import System
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.contact_pairs import PairTable
 from supple.scene.obstacles.obstacle import Obstacle
-from supple.system import System
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,12 @@ from supple.contact.start.intersections import Intersection, intersections_of
 from supple.contact.start.surfaces import StartSurfaces, start_surfaces
 from supple.errors import SceneError
 from supple.mesh.topology import graph_components
+from supple.model.system import PinRange, System, build_system, initial_state
+from supple.scene.actuators.muscle import Muscle
 from supple.scene.contact_pairs import PairTable, pair_table
-from supple.scene.loads.muscle import Muscle
 from supple.scene.loads.surface_loads import Pressure, Traction
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.system import PinRange, System, build_system, initial_state
 
 # How far a body may be moved, as a share of its diagonal.
 FURTHEST = 0.5

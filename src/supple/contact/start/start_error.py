@@ -9,8 +9,8 @@ from supple.contact.start.intersections import intersections_of
 from supple.contact.start.separation import Mover, default_gap
 from supple.contact.start.surfaces import start_surfaces
 from supple.errors import SceneError
+from supple.model.system import System
 from supple.scene.contact_pairs import PairTable
-from supple.system import System
 
 
 def raise_if_intersecting(

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.obstacle_vertices import with_obstacles
+from supple.contact.mesh.obstacle_vertices import with_obstacles
 from supple.mesh.topology import connected_components
-from supple.numerics.kernel_cache import njit
+from supple.model.system import System
 from supple.numerics.mat3 import cross, dot, row, subtract
-from supple.system import System
+from supple.runtime.kernel_cache import njit
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.quadratic_tets.bernstein import determinant_coefficients
-from supple.numerics.quadratic_tets.shape_functions import NODE_COORDINATES, four_point_rule, reference_gradients
+from supple.numerics.bernstein import determinant_coefficients
+from supple.numerics.quadratic_shape_functions import NODE_COORDINATES, four_point_rule, reference_gradients
+from supple.runtime.kernel_cache import njit, prange
 
 QUADRATURE_POINTS = 4
 

@@ -25,11 +25,11 @@ from supple.materials.isotropic import piolas
 from supple.materials.laws.pointwise import densities_at, piolas_at
 from supple.materials.patches.domains import Patches
 from supple.materials.patches.energy import star_states, tet_shares
+from supple.numerics.bernstein import determinant_coefficients
 from supple.numerics.deformation import deformation_gradients, determinants
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import det, load_mat, mat_mul_transposed, store_mat
-from supple.numerics.quadratic_tets.bernstein import determinant_coefficients
-from supple.numerics.threads import threads_for
+from supple.runtime.kernel_cache import njit
+from supple.runtime.threads import threads_for
 
 _SERIAL_EDGES = 20_000
 

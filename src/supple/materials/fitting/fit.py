@@ -16,7 +16,7 @@ from supple.materials.fitting.families import Family, family_of
 from supple.materials.fitting.picture import draw_fit
 from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.laws.isotropic_law import IsotropicLaw
-from supple.numerics.threads import threads_for
+from supple.runtime.threads import threads_for
 
 Source = str | Path | ArrayLike
 # Bulk modulus over shear modulus where none is given: Poisson's ratio .499.

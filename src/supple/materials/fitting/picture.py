@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.files.figures import paper_figure
 from supple.materials.fitting.curves import Curve
+from supple.runtime.figures import paper_figure
 
 _COLORS = {"uniaxial": "#30638e", "equibiaxial": "#d1495b", "pure_shear": "#3a7d44"}
 

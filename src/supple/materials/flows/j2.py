@@ -9,7 +9,7 @@ from supple.materials.flows.internal import DISSIPATED, FLOW, flowed
 from supple.materials.laws.hencky import HENCKY
 from supple.materials.laws.j2 import J2_STEP, plastic_increment, yield_stress
 from supple.materials.per_tet import Flow
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 class J2Flow(Flow):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.numerics.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit, prange
 
 
 @njit(parallel=True, cache=True, error_model="numpy")

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.per_tet import Law
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import det, load_mat
-from supple.numerics.threads import threads_for
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
 
 _SERIAL_TETS = 2_000
 

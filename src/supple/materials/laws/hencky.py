@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.laws.log_strains import law_kernel, log_strains
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from supple.materials.isotropic import nearest_semidefinite, store_hessian
 from supple.materials.laws.log_strains import VALUES
 from supple.materials.per_tet import Law
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
 from supple.numerics.svd3 import svd3 as decompose
-from supple.numerics.threads import threads_for
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
 
 # Fewer tets than this are processed by one thread.
 _SERIAL_TETS = 2_000

@@ -23,7 +23,7 @@ import math
 from supple.materials.laws.hencky import isotropic_tensor
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.laws.log_strains import law_kernel, log_strains
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from supple.materials.stretch_energies.stretches import volume_change
-from supple.numerics.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit, prange
 
 VALUES = 16  # of a tet: psi, psi_i, psi_ij, and the quotients d and t
 

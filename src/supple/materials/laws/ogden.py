@@ -22,7 +22,7 @@ from supple.materials.laws.log_strains import (
     log_strains,
     with_squared_volume_change,
 )
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.materials.isotropic import densities, hessians, piolas
 from supple.materials.per_tet import BY_LAW, TetMaterial
-from supple.numerics.threads import threads_for
+from supple.runtime.threads import threads_for
 
 # One pass over so many tets takes half a millisecond; waiting for a second thread on a busy machine takes several.
 _SERIAL_TETS = 20_000

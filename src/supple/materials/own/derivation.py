@@ -29,7 +29,7 @@ from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.laws.log_strains import exp_quotient, law_kernel, log_strains
 from supple.materials.own.formula import VARIABLES, Formula, symbols_of
 from supple.materials.stretch_energies.stretches import volume_change
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 to_fixed_tuple: Any = ndarray.to_fixed_tuple  # of an array, for a number of entries that the compiler knows
 _GAUSS = 0.5 * math.sqrt(0.6)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from supple.materials.isotropic import density, energy_density, principal_hessian, stress
 from supple.materials.laws.isotropic_law import principal_hessian_of
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
 from supple.numerics.svd3 import svd3 as decompose
+from supple.runtime.kernel_cache import njit, prange
 
 # Numbers of a patch's frame: U (9), psi_ij (6), alpha (3) and beta (3) times its volume, see `isotropic`.
 FRAME = 21

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from supple.materials.patches.domains import EdgePatches, Patches
 from supple.materials.patches.edge_kernels import edge_energies, mean_gradients
 from supple.materials.patches.star_kernels import star_pressures
-from supple.numerics.threads import threads_for
+from supple.runtime.threads import threads_for
 
 # Fewer tets than this are processed by one thread.
 SERIAL_TETS = 1_000

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from supple.materials.isotropic import hessian_block
-from supple.numerics.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit, prange
 
 
 @njit(error_model="numpy")

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from supple.materials.isotropic import nearest_semidefinite, volume_term
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient, put_hessian
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, det, load_mat
 from supple.numerics.svd3 import svd3 as decompose
+from supple.runtime.kernel_cache import njit, prange
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.adjacency import adjacency
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 # The least number of tets of a new patch, round after round. A patch with a vertex inside can deform without a change
 # of its volume; smaller ones are made only where a body is too thin for that.

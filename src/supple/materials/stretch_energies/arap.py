@@ -5,7 +5,7 @@ chapter 5.
 """
 
 from supple.materials.stretch_energies.stretches import StretchFunctions, distance_from_rotations, rotation_quotients
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

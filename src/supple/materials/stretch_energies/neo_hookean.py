@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from supple.materials.stretch_energies.stretches import StretchFunctions, shape_and_volume, volume_change
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import det
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

@@ -4,7 +4,7 @@ Source: Bonet, Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis"
 """
 
 from supple.materials.stretch_energies.stretches import StretchFunctions, green_strain
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

@@ -9,7 +9,7 @@ from supple.materials.stretch_energies.stretches import (
     squared_volume_change,
     volume_change,
 )
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import det
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

@@ -10,18 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.files.replacing import whole_files
 from supple.mesh.checked_arrays import vertex_array
-from supple.mesh.io import abaqus, msh, obj, off, ply, stl
+from supple.mesh.io import msh, obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.file_contents import file_contents
-from supple.mesh.io.models import glb, usd
+from supple.mesh.io.models import abaqus, glb, usd
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
-from supple.mesh.io.vtk import legacy as vtk_legacy
-from supple.mesh.io.vtk import xml as vtk_xml
 from supple.mesh.merge import merge_map
 from supple.mesh.topology import has_vertex_twice, repeats_another, without_unused
+from supple.runtime.replacing import whole_files
 
 logger = logging.getLogger(__name__)
 

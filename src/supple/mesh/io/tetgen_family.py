@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.files.replacing import whole_files
 from supple.mesh.io.tetgen_table import Header, Table, read_header, read_rows
 from supple.mesh.topology import TET_EDGES, TET_FACETS, edge_keys, facet_keys, has_vertex_twice
+from supple.runtime.replacing import whole_files
 
 SUFFIXES = (".node", ".ele", ".edge", ".face")
 

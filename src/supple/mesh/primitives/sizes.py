@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import LARGEST_LENGTH
-from supple.numerics.memory import require_memory
+from supple.runtime.memory import require_memory
 
 # With more tets or triangles than this, the sizes given are most likely a typing error.
 MAX_ELEMENTS = 50_000_000

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit, prange
 
 # Entries of a search's stack: a tree over 2^31 primitives has 32 levels, and a search begins with one node of each.
 STACK = 80

@@ -3,8 +3,8 @@
 Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.5.
 """
 
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, subtract
+from supple.runtime.kernel_cache import njit
 
 
 @njit

@@ -6,8 +6,8 @@ parallel: a a' - b b' of the usual formula loses all digits there.
 Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.9, for the cases.
 """
 
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, subtract
+from supple.runtime.kernel_cache import njit
 
 
 @njit

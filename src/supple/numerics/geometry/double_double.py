@@ -4,7 +4,7 @@ Sources: Dekker (1971); Knuth, "The Art of Computer Programming", volume 2, sect
 for Double-Double and Quad-Double Arithmetic" (2007).
 """
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @njit(error_model="numpy")

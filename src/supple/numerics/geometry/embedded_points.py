@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ coordinates must neither overflow nor underflow.
 import numpy as np
 
 from supple.numerics.geometry.double_double import two_product, two_sum
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 # (7 + 56 u) u with u = 2^-53: bound of the rounding error, relative to the sum of the products' magnitudes.
 _ERROR = (7.0 + 56.0 * 2.0**-53) * 2.0**-53

@@ -20,8 +20,8 @@ from supple.numerics.geometry.box_tree import (
 )
 from supple.numerics.geometry.exact_predicates import side_of_line, side_of_plane
 from supple.numerics.geometry.vertex_stars import simple_stars
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit, prange
 
 APART, TOUCHING, CROSSING = 0, 1, 2
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from supple.numerics.geometry.box_tree import boxes_of_triangles
 from supple.numerics.geometry.closest_point import area_normal, closest_on_triangle, combine
-from supple.numerics.kernel_cache import njit, prange, read_only
 from supple.numerics.mat3 import copy_elements, dot, row, subtract
+from supple.runtime.kernel_cache import njit, prange, read_only
 
 _LEAF = 4
 _DEPTH = 64  # of a balanced tree; more than any memory can hold

@@ -7,8 +7,8 @@ covered once. Every condition has a margin for round-off; a vertex that misses i
 
 import numpy as np
 
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit
 
 # The least cosine of the angle between a triangle and N; the sine of the angle to a sector at which it may be covered.
 _FACING, _MARGIN = 1e-6, 1e-6

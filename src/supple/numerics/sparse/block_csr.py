@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
-from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.threads import threads_for
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
 
 # Fewer blocks than this are worked on by one thread.
 SERIAL_BLOCKS = 15_000

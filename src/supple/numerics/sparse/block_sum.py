@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, assemble_row
 from supple.numerics.sparse.couplings import Couplings
-from supple.numerics.threads import threads_for
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
 
 
 @dataclass(frozen=True, eq=False)

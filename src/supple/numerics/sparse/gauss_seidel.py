@@ -9,7 +9,7 @@ Source: Eisenstat, "Efficient Implementation of a Class of Preconditioned Conjug
 
 import numpy as np
 
-from supple.numerics.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit, prange
 
 
 @njit(cache=True, error_model="numpy")

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import copy_elements
 from supple.numerics.sparse.gauss_seidel import backward, forward, update
 from supple.numerics.sparse.preconditioner import TwoLevel
 from supple.numerics.sparse.skyline_cholesky import solve
-from supple.numerics.threads import is_alone, threads_for
+from supple.runtime.kernel_cache import njit
+from supple.runtime.threads import is_alone, threads_for
 
 # Short passes in each iteration: fewer blocks than this are worked on by one thread.
 _SERIAL_BLOCKS = 50_000

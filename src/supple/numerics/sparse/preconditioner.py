@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockRows
 from supple.numerics.sparse.partition import bisected_groups
 from supple.numerics.sparse.skyline_cholesky import factorize
 from supple.numerics.sparse.sweep_order import SweepOrder
-from supple.numerics.threads import threads_for
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
 
 _GROUP_SIZE = 96
 _MOST_GROUPS = 128

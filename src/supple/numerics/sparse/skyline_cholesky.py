@@ -6,7 +6,7 @@ does not promise.
 
 import numpy as np
 
-from supple.numerics.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit, prange
 
 SIZE = 12
 

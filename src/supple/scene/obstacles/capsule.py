@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import lengths_and_directions
 from supple.scene.obstacles.polyhedra import hull, round_ball
 from supple.scene.obstacles.segment import SegmentObstacle

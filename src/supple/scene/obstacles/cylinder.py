@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import distances_from_corner
 from supple.scene.obstacles.polyhedra import prism
 from supple.scene.obstacles.segment import SegmentObstacle

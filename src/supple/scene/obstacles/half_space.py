@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.shape import Shape, frame_of

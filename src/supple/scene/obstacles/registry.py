@@ -18,7 +18,7 @@ KINDS: dict[str, type[Obstacle]] = {}
 def register(kind: type[Obstacle]) -> None:
     """Make a kind of obstacle known by the name of its class.
 
-    Scene files know the kinds that are registered before `supple.scene_file` is first imported.
+    Scene files know the kinds that are registered before `supple.app.scene_file` is first imported.
     """
     KINDS[kind.__name__] = kind
 

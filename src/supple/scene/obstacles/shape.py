@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit
+from supple.runtime.kernel_cache import njit
 
 
 @dataclass(frozen=True, eq=False)

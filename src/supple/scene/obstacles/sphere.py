@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot
+from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
 from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.polyhedra import round_ball

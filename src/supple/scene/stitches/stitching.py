@@ -95,7 +95,7 @@ class Stitching:
     Attributes
     ----------
     body_vertices : n, how many vertices the bodies have; in a solver, whose system has the points of rigid bodies as
-        vertices too (see `supple.stitched_points`), also these
+        vertices too (see `supple.model.stitched_points`), also these
     ranges : of each stitch of the scene
     tets, springs : of all of them
     rigid : points of rigid bodies; anchors : vertices of obstacles, whose numbers are the last ones

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.mesh.io.abaqus_blocks import Block, Numbers, blocks, elements_of
 from supple.mesh.io.cells import FormatError
+from supple.mesh.io.models.abaqus_blocks import Block, Numbers, blocks, elements_of
 from supple.mesh.io.models.named_sets import NamedSets
 from supple.mesh.io.text import decoded, integer, shortened
 

@@ -91,15 +91,27 @@ def _tets_of(stage) -> CellSoup:
         if not prim.IsA(UsdGeom.TetMesh):
             continue
         mesh = UsdGeom.TetMesh(prim)
-        x = np.array(mesh.GetPointsAttr().Get(time) or [], dtype=np.float64).reshape(-1, 3)
-        rows = np.array(mesh.GetTetVertexIndicesAttr().Get(time) or [], dtype=np.int64).reshape(-1, 4)
+        x = _rows_of(mesh.GetPointsAttr(), time, np.float64, 3)
+        rows = _rows_of(mesh.GetTetVertexIndicesAttr(), time, np.int64, 4)
         if len(rows) and not (rows.min() >= 0 and rows.max() < len(x)):
             raise FormatError(f"{prim.GetPath()}: a tet names a point outside of 0 to {len(x) - 1}")
         world = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time))
-        points.append(unit * (x @ world[:3, :3] + world[3, :3]))  # USD multiplies rows from the left
+        with np.errstate(all="ignore"):  # the mesh refuses what is not finite
+            points.append(unit * (x @ world[:3, :3] + world[3, :3]))  # USD multiplies rows from the left
         tets.append(rows + count)
         count += len(x)
     return CellSoup.of_rows(np.concatenate(points), np.concatenate(tets), TETRA)
+
+
+def _rows_of(attribute, time, kind: type, columns: int) -> NDArray:
+    """The values of an attribute as (n, columns) numbers. A file may declare any type for it, also an unknown one."""
+    value = attribute.Get(time)
+    rows = np.asarray([] if value is None else value)
+    if rows.size == 0:
+        return np.zeros((0, columns), dtype=kind)
+    if not np.can_cast(rows.dtype, kind, "same_kind") or rows.shape[1:] != (columns,):
+        raise FormatError(f"{attribute.GetPath()} is not an array of the type {attribute.GetTypeName()}")
+    return rows.astype(kind)
 
 
 def write(path: Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:

@@ -1,0 +1,127 @@
+"""`supple demo`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from supple.app.cli.checkpoints import CheckpointEvery, Overwrite, interval
+from supple.app.cli.exit_codes import ExitCode
+from supple.app.cli.live import Host, Open, Port, UseToken
+from supple.app.cli.numbers import Steps
+
+
+def demo(
+    name: str | None = None,
+    /,
+    *,
+    list_: Annotated[bool, Parameter(name=["--list", "-l"], negative="")] = False,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    steps: Steps = None,
+    solver: str | None = None,
+    trace: Path | None = None,
+    page: bool = True,
+    plot: bool = True,
+    checkpoint_every: CheckpointEvery = None,
+    overwrite: Overwrite = False,
+    quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
+    live: Annotated[bool, Parameter(name="--live", negative="")] = False,
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    open_: Open = True,
+    token: UseToken = True,
+) -> int:
+    """Run a named demo, record it, and measure what it claims. Exit code 0: all claims hold, 1: one does not.
+
+    Parameters
+    ----------
+    name
+        Name of the demo; without it, the demos are listed.
+    list_
+        List the demos.
+    output
+        Run folder, which may not contain an earlier run; without it, out/NAME.
+    steps
+        Number of frames, instead of the demo's own. Claims that need more frames do not hold then.
+    solver
+        Kind of solver, xpbd or implicit, for a demo that has both.
+    trace
+        CSV file with every iteration of Newton's method; for the implicit solver.
+    page
+        Write index.html, which plays the recording in a browser.
+    plot
+        Write plot.png: energies, momentum, volume ratio and smallest J over time.
+    checkpoint_every
+        Number of frames from checkpoint to checkpoint; 0: only at the start and the end. 100 without this.
+    overwrite
+        Replace an earlier run in the folder.
+    quiet
+        Print only the claims and what was measured.
+    live
+        Show the scene in a browser while it runs, until Ctrl-C, so that it can be dragged and tuned. Nothing is
+        recorded.
+    host
+        With --live: address to serve at; 0.0.0.0 is all addresses of this machine.
+    port
+        With --live: port to serve at; without it, 8080 or the next free one.
+    open_
+        With --live: open the page in a browser.
+    token
+        With --live: let in only browsers that have the page's secret; --no-token lets in all of this machine.
+    """
+    from rich.markup import escape
+
+    from supple.app.cli.console import shell_console
+    from supple.app.demos.registry import DEMOS, find_demo
+
+    console = shell_console()
+    if list_ or name is None:
+        width = max(map(len, DEMOS))
+        for known in DEMOS.values():
+            console.print(f"[bold]{known.name:<{width}}[/]  {escape(known.summary)}")
+        return ExitCode.OK
+
+    chosen = find_demo(name)
+    if solver is not None:
+        chosen = chosen.on(solver)
+    if live:
+        from supple.app.cli.live import serve_page
+        from supple.app.viewer.protocol.live_source import LiveSource
+
+        serve_page(LiveSource(chosen.name, chosen.scene(), chosen.solver(solver), chosen.dt), host, port, open_, token)
+        return ExitCode.OK
+
+    from supple.app.cli.session import Products, run_session
+    from supple.app.cli.trace import traces
+    from supple.app.runs.run_folder import SceneSource
+
+    products = Products(
+        Path("out") / chosen.name if output is None else output,
+        page,
+        plot,
+        quiet,
+        checkpoint_every=interval(checkpoint_every),
+        overwrite=overwrite,
+    )
+    products.refuse_a_run()
+    used = chosen.solver(solver)
+    measurement = chosen.measurement()
+    if not quiet:
+        console.print(f"[bold]{chosen.name}[/]: {escape(chosen.explanation)}")
+    outcome = run_session(
+        chosen.scene(),
+        used,
+        chosen.dt,
+        chosen.steps if steps is None else steps,
+        products=products,
+        source=SceneSource({"kind": "demo", "name": name, "solver": solver, "page": page, "plot": plot}),
+        sinks=[measurement, *traces(trace, used)],
+    )
+    claims = measurement.claims() if outcome.frames else []
+    for claim in claims:
+        mark = "[green]holds[/]" if claim.holds else "[red]does not hold[/]"
+        console.print(f"{mark}: {escape(claim.text)} ({escape(claim.measured)})")
+    failed = outcome.code is ExitCode.OK and not all(claim.holds for claim in claims)
+    return ExitCode.FAILED if failed else outcome.code

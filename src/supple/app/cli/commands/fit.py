@@ -1,0 +1,65 @@
+"""`supple fit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "psi": 6894.757293168361, "kg/cm2": 98066.5}
+
+
+def fit(
+    kind: Literal["mooney_rivlin", "yeoh", "ogden"],
+    /,
+    *,
+    uniaxial: list[Path] | None = None,
+    equibiaxial: list[Path] | None = None,
+    pure_shear: list[Path] | None = None,
+    unit: Literal["Pa", "kPa", "MPa", "psi", "kg/cm2"] = "Pa",
+    terms: int = 2,
+    bulk: float | None = None,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+) -> None:
+    """Fit the parameters of rubber to its tests; prints them with 95 % confidence, and as a line of a scene file.
+
+    Parameters
+    ----------
+    kind
+        Which energy.
+    uniaxial
+        CSV file with columns stretch and stress (nominal); may be given several times.
+    equibiaxial
+        Likewise, of equibiaxial tension.
+    pure_shear
+        Likewise, of pure shear.
+    unit
+        Of the stresses.
+    terms
+        Of Ogden's energy, 1 to 3.
+    bulk
+        Bulk modulus of the result [Pa]; without it, 500 times the shear modulus.
+    output
+        Picture of the tests and the fit (.png, .pdf or .svg).
+    """
+    from supple.app.scene_file.entries.materials import BY_LAW_KINDS, scene_file_line
+    from supple.materials.fitting.fit import fit_material
+    from supple.runtime.replacing import refuse_to_replace
+
+    if output is not None:
+        for path in (*(uniaxial or ()), *(equibiaxial or ()), *(pure_shear or ())):
+            refuse_to_replace(path, output)
+    found = fit_material(
+        BY_LAW_KINDS[kind],
+        uniaxial,
+        equibiaxial=equibiaxial,
+        pure_shear=pure_shear,
+        terms=terms,
+        bulk=bulk,
+        stress_unit=_UNITS[unit],
+    )
+    print(found)
+    print(f"material: {scene_file_line(found.material)}")
+    if output is not None:
+        print(found.plot(output))

@@ -1,0 +1,353 @@
+"""`supple info`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from supple.app.cli.console import print_table
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from supple.app.scene_file.loader import Run
+    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetmesh import TetMesh
+    from supple.model.state import State
+    from supple.model.system import System
+    from supple.scene.body import PlacedBody
+    from supple.scene.joints.joint import Joint
+    from supple.scene.rigid.rigid_body import RigidBody
+    from supple.scene.stitches.stitching import Stitching
+
+SCENE_FILES = (".yaml", ".yml", ".urdf")
+RECORDINGS = (".vtkhdf", ".hdf", ".h5")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic", "arro3-io")
+EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
+
+
+def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negative="")] = False) -> None:
+    """Print what a file contains: counts, sizes, quality, problems. Without a file: versions, platform and threads.
+
+    Parameters
+    ----------
+    file
+        A scene (.yaml), a robot (.urdf), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
+    time
+        Of a scene: simulate its first frames, and print how long one takes. The first run of a solver compiles it.
+    """
+    if file is None:
+        print_table(_platform(), "Supple")
+        return
+    if file.is_dir():
+        from supple.app.cli.run_rows import run_rows
+
+        print_table(run_rows(file), str(file))
+        return
+    suffix = file.suffix.lower()
+    if suffix in SCENE_FILES:
+        _scene(file, time)
+    elif suffix in RECORDINGS:
+        _recording(file)
+    else:
+        _mesh(file, suffix)
+
+
+def _platform() -> list[tuple[str, str]]:
+    import os
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    import supple
+
+    rows = [
+        ("supple", supple.__version__),
+        ("python", f"{platform.python_version()} ({platform.python_implementation()})"),
+        ("platform", platform.platform()),
+        ("processors", str(os.cpu_count())),
+    ]
+    import numba
+
+    rows.append(("threads", str(numba.get_num_threads())))
+    for name in (*PACKAGES, *EXTRAS):
+        try:
+            rows.append((name, version(name)))
+        except PackageNotFoundError:
+            rows.append((name, "not installed (an extra)" if name in EXTRAS else "missing"))
+    return rows
+
+
+def _extent(low: np.ndarray, high: np.ndarray) -> str:
+    return " x ".join(f"{x:.6g}" for x in high - low) + " m"
+
+
+def _surface_rows(surface: SurfaceMesh) -> list[tuple[str, str]]:
+    report = surface.check()
+    return [
+        ("kind", "surface"),
+        ("vertices", str(len(surface.vertices))),
+        ("triangles", str(len(surface.triangles))),
+        ("components", str(report.component_count)),
+        ("size", _extent(*surface.bounds)),
+        ("area", f"{surface.area:.6g} m^2"),
+        ("volume", f"{surface.volume:.6g} m^3" if report.watertight else "none, the surface is open"),
+        ("problems", "none" if report.ok else "\n".join(report.problems)),
+    ]
+
+
+def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
+    return [
+        ("kind", "tetrahedral mesh" if mesh.order == 1 else "mesh of quadratic tetrahedra"),
+        ("vertices", str(len(mesh.vertices))),
+        ("tets", str(len(mesh.tets))),
+        ("edges", str(len(mesh.edges))),
+        ("surface triangles", str(len(mesh.surface.triangles))),
+        ("components", str(mesh.components.count)),
+        ("size", _extent(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))),
+        ("volume", f"{mesh.volume:.6g} m^3"),
+        ("tet volumes", f"{mesh.volumes.min():.3g} to {mesh.volumes.max():.3g} m^3"),
+        ("smallest dihedral", f"{mesh.min_dihedrals.min():.2f} degrees (tet {int(mesh.min_dihedrals.argmin())})"),
+        ("radius ratio", f"worst {mesh.radius_ratios.min():.3f}, mean {mesh.radius_ratios.mean():.3f} (1 is regular)"),
+        ("tets turned", str(mesh.turned)),
+    ]
+
+
+def _mesh(file: Path, suffix: str) -> None:
+    from supple.errors import MeshError
+    from supple.mesh.io.mesh_files import SURFACE_READERS, TET_EXTENSIONS
+    from supple.mesh.sets import SETS_EXTENSIONS, read_sets
+    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetmesh import TetMesh
+
+    known = (*SCENE_FILES, *RECORDINGS[:1], *dict.fromkeys((*SURFACE_READERS, *TET_EXTENSIONS)))
+    if suffix not in known:
+        raise MeshError(f"{file}: unknown extension {suffix or '(none)'}; known are {', '.join(known)}")
+    mesh: TetMesh | SurfaceMesh
+    if suffix not in TET_EXTENSIONS:
+        mesh = SurfaceMesh.load(file)
+    else:
+        try:
+            mesh = TetMesh.load(file)
+        except MeshError as error:
+            if suffix not in SURFACE_READERS:
+                raise
+            try:  # a file of this format may hold a surface
+                mesh = SurfaceMesh.load(file)
+            except MeshError:
+                raise error from None
+    rows = _tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh)
+    if isinstance(mesh, TetMesh) and suffix in SETS_EXTENSIONS:
+        rows += [(f"sets of {kind}", listed) for kind, listed in read_sets(file).listed().items()]
+    print_table(rows, str(file))
+
+
+def _scene(file: Path, timed: bool) -> None:
+    from supple.app.scene_file.loader import load_run
+    from supple.model.system import build_system, initial_state
+    from supple.scene.rigid.rigid_body import RigidBody
+
+    run = load_run(file)
+    start = initial_state(run.scene, **{key.removeprefix("initial_"): value for key, value in run.start.items()})
+    scene, system = run.scene, build_system(run.scene, start)
+    points = system.split(start.positions)
+    rows = [
+        ("kind", "scene"),
+        ("bodies", str(len(scene.bodies))),
+        ("vertices", str(len(system.masses))),
+        ("tets", str(len(system.tets))),
+        ("obstacles", ", ".join(f"{o.name} ({type(o).__name__})" for o in scene.obstacles) or "none"),
+        ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
+        ("loads", ", ".join(load.label for load in scene.loads) or "none"),
+        ("sensors", ", ".join(sensor.label for sensor in scene.sensors) or "none"),
+        ("solver", str(run.solver)),
+        ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
+        ("memory", f"about {run.solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
+        ("intersections", _start_problem(system, start)),
+        ("each frame", _frame_time(run) if timed else "--time simulates the first ones, and says how long one takes"),
+    ]
+    for part in system.bodies:
+        mass = system.masses[part.vertices].sum()
+        rows.append((f"place of {part.name}", _place(points[part.name])))
+        if isinstance(part.body, RigidBody):
+            rows.append((f"body {part.name}", _rigid_text(part.body)))
+            continue
+        mesh = part.body.mesh
+        tets = f"{len(mesh.tets)} {'tets' if mesh.order == 1 else 'quadratic tets'}"
+        text = f"{_material_text(part.body)}, {tets}, {mesh.volume:.6g} m^3, {mass:.6g} kg"
+        rows.append((f"body {part.name}", text))
+        rows += _locking_rows(part.body)
+    for each in system.actuators:
+        unit = "m^3" if each.kind == "cavity" else "m"
+        rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} {unit} at the start"))
+    rows += _stitch_rows(system.stitching)
+    rows += [(joint.label, _joint_text(joint)) for joint in scene.joints]
+    for k, weld in enumerate(scene.welds):
+        count = int((scene.welding.weld == k).sum())
+        rows.append((weld.name or weld.kind, f"{count} vertices of {weld.body} are points of {weld.rigid}"))
+    print_table(rows, str(file))
+
+
+def _place(x: np.ndarray) -> str:
+    """The bounding box of points (n, 3) [m]."""
+    low, high = (", ".join(f"{value:.4g}" for value in corner) for corner in (x.min(axis=0), x.max(axis=0)))
+    return f"({low}) to ({high}) m"
+
+
+def _start_problem(system: System, start: State) -> str:
+    """Which surfaces are not apart at the start; of stitched or welded things, the solver decides."""
+    from supple.contact.start.start_error import raise_if_intersecting
+    from supple.errors import SceneError
+    from supple.scene.contact_pairs import pair_table
+
+    try:
+        raise_if_intersecting(system, start.positions, start.time, pair_table(system.scene), joined=False)
+    except SceneError as problem:
+        return str(problem)
+    joined = len(system.scene.stitches) + len(system.scene.welds) > 0
+    return "none at the start" + joined * "; things that are stitched or welded to each other are not compared"
+
+
+def _frame_time(run: Run) -> str:
+    """Time of the fastest of the first frames after the one that may compile."""
+    from supple.simulate import simulate
+
+    start: dict[str, Any] = {**run.start}
+    reports = [frame.report for frame in simulate(run.scene, run.solver, run.dt, 4, **start)]
+    seconds = min(report.wall_seconds for report in reports[1:] or reports)
+    whole = seconds * run.steps
+    return f"{1e3 * seconds:.3g} ms at the start; {run.steps} steps take about {whole:.3g} s if all are like these"
+
+
+def _joint_text(joint: Joint) -> str:
+    from supple.scene.joints.axis_joint import AxisJoint
+    from supple.scene.joints.ball_joint import BallJoint
+
+    text = f"{type(joint).__name__} of {joint.first} and {joint.second or 'the world'}"
+    if isinstance(joint, AxisJoint):
+        if joint.limits is not None:
+            text += f", from {joint.limits[0]:g} to {joint.limits[1]:g}"
+        if joint.motor is not None:
+            bound = "" if joint.motor.max_force is None else f" of at most {joint.motor.max_force:g}"
+            text += f", {joint.motor.label}{bound}"
+        given = {"damping": joint.damping, "friction": joint.friction, "largest effort": joint.max_effort}
+        given |= {"largest rate": joint.max_velocity}
+        text += "".join(f", {key} {value:g}" for key, value in given.items() if value)
+    elif isinstance(joint, BallJoint) and joint.max_swing is not None:
+        text += f", swings by {joint.max_swing:g} rad at most"
+        if joint.twist_limits is not None:
+            text += f", twists from {joint.twist_limits[0]:g} to {joint.twist_limits[1]:g}"
+    return text
+
+
+def _material_text(body: PlacedBody) -> str:
+    """The material, with the moduli of small strains where other parameters were given."""
+    import numpy as np
+
+    from supple.materials.hyperelastic.by_law import ByLaw
+    from supple.materials.viscoelastic import Viscoelastic
+
+    material = body.material
+    name = type(material).__name__
+    if isinstance(material, Viscoelastic):
+        name = f"{name} {type(material.material).__name__}"
+    elif not isinstance(material, ByLaw):
+        return name
+    youngs, poisson = (
+        " to ".join(f"{value:.6g}" for value in sorted({np.min(of_tets), np.max(of_tets)}))
+        for of_tets in (material.youngs, material.poisson)
+    )
+    return f"{name} (small strains: E = {youngs} Pa, nu = {poisson})"
+
+
+def _rigid_text(body: RigidBody) -> str:
+    import numpy as np
+
+    p = body.properties
+    inertia = ", ".join(f"{value:.6g}" for value in np.linalg.eigvalsh(p.inertia))
+    return (
+        f"rigid, {len(body.triangles)} triangles, {p.volume:.6g} m^3, {p.mass:.6g} kg, principal moments of inertia "
+        f"{inertia} kg m^2, stiffness {body.kappa:.3g} Pa"
+    )
+
+
+# Of the surface: below it, a few thin parts such as edges of a wedge are not worth a warning.
+_THIN_SHARE = 0.1
+
+
+def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
+    """A warning where nearly incompressible tets are too few across to deform (docs/locking.md)."""
+    import numpy as np
+
+    from supple.materials.material import Hyperelastic
+    from supple.materials.per_tet import NO_REGION
+    from supple.mesh.quality import thickness
+
+    material, mesh = body.material, body.mesh
+    if not isinstance(material, Hyperelastic) or mesh.order == 2:
+        return []
+    poisson = np.broadcast_to(np.asarray(material.poisson, dtype=np.float64), len(mesh.tets))
+    locking = (poisson > 0.4) & (material.per_tet(len(mesh.tets)).region == NO_REGION)
+    if not locking.any():
+        return []
+    lines = thickness(mesh.vertices, mesh.tets, limit=9)
+    thin = (lines.crossed < 9) & locking[lines.tets]
+    share = lines.areas[thin].sum() / lines.areas.sum()
+    if share <= _THIN_SHARE:
+        return []
+    text = (
+        f"{100 * share:.0f} % of the surface has fewer than three tets across behind it, with Poisson's ratio up to "
+        f"{poisson[locking].max():g}: linear tets are too stiff there; give integration='patches' or quadratic tets "
+        "(order: 2; both for Implicit only), or smaller tets"
+    )
+    return [(f"warning {body.name}", text)]
+
+
+def _stitch_rows(stitching: Stitching) -> list[tuple[str, str]]:
+    """How many pairs each stitch has, how far they are apart, and how many rest vertices had to be moved."""
+    rows = []
+    for part in stitching.ranges:
+        near, far = part.pairs.distances.min(), part.pairs.distances.max()
+        text = f"{type(part.stitch).__name__}, {len(part.pairs.vertices)} pairs, {near:.6g} to {far:.6g} m apart"
+        if part.tets.stop > part.tets.start:
+            text += f", {int(stitching.tets.offset[part.tets].sum())} rest vertices offset"
+        rows.append((part.stitch.label, text))
+    return rows
+
+
+def _recording(file: Path) -> None:
+    import numpy as np
+
+    from supple.results.recording.reader import read_recording
+
+    with read_recording(file) as recording:
+        J = recording.series("min_det_F")
+        soft = [body for body in recording.bodies if not body.rigid]
+        rows = [
+            ("kind", "recording"),
+            ("frames", f"{len(recording)} to t = {recording.times[-1]:.6g} s, dt = {recording.dt:.6g} s"),
+            ("bodies", ", ".join(f"{body.name} ({body.material})" for body in recording.bodies)),
+            ("obstacles", ", ".join(f"{o.name} ({o.kind})" for o in recording.obstacles) or "none"),
+            ("vertices", str(len(recording.masses))),
+            ("tets", str(len(recording.tets))),
+            ("volume", f"{sum(recording.rest_volumes[b.tets].sum() for b in soft):.6g} m^3 of soft bodies at rest"),
+            ("mass", f"{recording.masses.sum():.6g} kg"),
+            ("solver", recording.solver or "unknown"),
+            ("smallest J", f"{J.min():.6g} at t = {recording.times[int(np.argmin(J))]:.6g} s"),
+            ("ended", str(recording.statuses[-1])),
+            ("scene file", "inside" if recording.scene_text else "none"),
+            ("written by", f"supple {recording.supple_version}"),
+        ]
+        bad = [k for k, status in enumerate(recording.statuses) if not status.can_go_on]
+        rows.append(("problems", _recording_problems(float(J.min()), bad)))
+    print_table(rows, str(file))
+
+
+def _recording_problems(smallest_J: float, stopped: list[int]) -> str:
+    problems = []
+    if smallest_J <= 0.0:
+        problems.append("a tetrahedron is inverted or flat (J <= 0)")
+    if stopped:
+        problems.append(f"the solver stopped at frame {stopped[0]}")
+    return "; ".join(problems) or "none"

@@ -1,0 +1,171 @@
+"""`supple mesh`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from supple.app.cli.numbers import whole_number
+from supple.errors import MeshError, MeshingError
+
+if TYPE_CHECKING:
+    from supple.mesh.meshing.tetrahedralize import MeshingReport
+    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetmesh import TetMesh
+
+# Fine enough that a body bends, coarse enough for a laptop.
+DEFAULT_TETS = 10_000
+# Few soft bodies are longer; many files are in millimetres [m].
+LARGE = 10.0
+
+
+def mesh(
+    surface: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    scale: float = 1.0,
+    tets: Annotated[int | None, Parameter(converter=whole_number)] = None,
+    edge: float | None = None,
+    max_volume: float | None = None,
+    quality: float = 1.4,
+    min_dihedral: float | None = None,
+    keep_surface: Annotated[bool, Parameter(negative="")] = False,
+    mesher: Literal["auto", "tetgen", "ftetwild"] = "auto",
+    repair: Annotated[bool, Parameter(negative="")] = False,
+    decimate: Annotated[int | None, Parameter(converter=whole_number)] = None,
+    envelope: float = 1e-3,
+    time_limit: float = 120.0,
+    memory_limit: float = 4.0,
+    base_index: Literal[0, 1] = 1,
+) -> None:
+    """Fill a surface with tets: TetGen for clean surfaces, fTetWild for dirty ones.
+
+    Parameters
+    ----------
+    surface
+        STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file.
+    output
+        One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu, .vtk, .inp or
+        USD file. Without it, the surface's name with .vtu, in this folder.
+    scale
+        Factor of all coordinates: 0.001 for a surface in millimetres.
+    tets
+        Number of tets, within 10 %: 10,000 where no other size and no --keep-surface is given.
+    edge
+        Length of the tets' edges [m], instead of a number of tets.
+    max_volume
+        No tet is larger than this [m^3].
+    quality
+        TetGen's bound on circumradius over shortest edge, above 1: smaller is better shaped, and more tets.
+    min_dihedral
+        Smallest dihedral angle that TetGen tries to reach [degrees]; with values much above 18 it may not end.
+    keep_surface
+        Add no vertices on the surface.
+    mesher
+        "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other, and where TetGen fails.
+    repair
+        Repair a surface that is not clean first, and list the changes. Where that fails, fTetWild meshes it as it is.
+    decimate
+        Number of triangles to which the surface is reduced first: TetGen keeps all of them.
+    envelope
+        How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
+    time_limit
+        Time limit of the mesher [s].
+    memory_limit
+        Limit on the mesher's address space [GiB].
+    base_index
+        Number of the first vertex in TetGen's files.
+    """
+    from rich.console import Console
+
+    from supple.mesh.io.mesh_files import TET_EXTENSIONS
+    from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path
+    from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
+    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetgen_files import write_tetgen
+    from supple.runtime.replacing import refuse_to_replace
+
+    output = Path(surface.with_suffix(".vtu").name) if output is None else output
+    # Checked before the meshing, which can take minutes.
+    if output.suffix.lower() not in TET_EXTENSIONS:
+        raise MeshError(f"{output}: the extension must be one of {', '.join(TET_EXTENSIONS)}")
+    if not output.absolute().parent.is_dir():
+        raise MeshError(f"{output}: there is no folder {output.absolute().parent}")
+    if not os.access(output.absolute().parent, os.W_OK):
+        raise MeshError(f"{output}: the folder cannot be written to")
+    targets = list(family_paths(output).values()) if is_tetgen_path(output) else [output]
+    for target in targets:
+        if target.is_dir():
+            raise MeshError(f"{target}: is a folder; give another name")
+        refuse_to_replace(surface, target)
+    if tets is edge is max_volume is None and not keep_surface:
+        tets = DEFAULT_TETS
+    loaded = _scaled(SurfaceMesh.load(surface), scale, surface)
+    with Console(stderr=True).status(f"meshing {len(loaded.triangles)} triangles"):
+        try:
+            filled, report = tetrahedralize_reported(
+                loaded,
+                max_volume=max_volume,
+                edge=edge,
+                tets=tets,
+                quality=quality,
+                min_dihedral=min_dihedral,
+                keep_surface=keep_surface,
+                mesher=mesher,
+                repair=repair,
+                decimate=decimate,
+                envelope=envelope,
+                time_limit=time_limit,
+                memory_limit=_bytes(memory_limit),
+            )
+        except MeshingError as error:
+            raise MeshingError(f"{surface}: {error}") from None
+    if is_tetgen_path(output):
+        write_tetgen(filled, output, base_index)
+    else:
+        filled.save(output)
+    _summarize(filled, report, targets)
+
+
+def _scaled(surface: SurfaceMesh, scale: float, path: Path) -> SurfaceMesh:
+    import sys
+
+    import numpy as np
+
+    from supple.mesh.surface import SurfaceMesh
+
+    if not 0.0 < scale < np.inf:
+        raise MeshError(f"scale must be a number above 0 and finite, not {scale:g}")
+    size = scale * float(np.ptp(surface.vertices, axis=0).max())
+    if size > LARGE and scale == 1.0:
+        hint = f"{path} is {size:.4g} m long; where it is in millimetres, use --scale 0.001"
+        print(f"warning: {hint}", file=sys.stderr)
+    return surface if scale == 1.0 else SurfaceMesh(scale * surface.vertices, surface.triangles)
+
+
+def _bytes(gibibytes: float) -> int:
+    if not 0.0 < gibibytes < 2.0**33:
+        raise MeshingError(f"memory limit must be a number of GiB above 0, not {gibibytes:g}")
+    return max(1, int(gibibytes * 2**30))
+
+
+def _summarize(tets: TetMesh, report: MeshingReport, files: list[Path]) -> None:
+    from supple.app.cli.console import print_table
+
+    rows = {
+        "mesher": f"{report.mesher}, {report.seconds:.2f} s",
+        "vertices": str(len(tets.vertices)),
+        "tets": str(len(tets.tets)),
+        "surface triangles": str(len(tets.surface.triangles)),
+        "volume": f"{tets.volume:.6g} m^3",
+        "largest tet": f"{tets.volumes.max():.4g} m^3",
+        "smallest dihedral": f"{tets.min_dihedrals.min():.2f} degrees",
+        "files": "\n".join(map(str, files)),
+    }
+    if report.repair is not None:
+        rows["repair"] = str(report.repair)
+    print_table(rows.items())

@@ -1,0 +1,69 @@
+"""`supple new`."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from supple.app.cli.commands.mesh import LARGE
+from supple.errors import SceneError
+
+
+def new(
+    scene: Path = Path("scene.yaml"),
+    /,
+    *,
+    surface: Path | None = None,
+    scale: float | None = None,
+    overwrite: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Write a scene file with comments, to begin with: a ball, or a surface of yours, above a floor.
+
+    Parameters
+    ----------
+    scene
+        The file to write (.yaml).
+    surface
+        STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file that becomes the body.
+    scale
+        Factor of the surface's coordinates; without it, 0.001 where the surface is longer than 10 m, otherwise 1.
+    overwrite
+        Replace the file where it exists.
+    """
+    import numpy as np
+
+    from supple.app.scene_file.template import new_scene, new_scene_of
+    from supple.mesh.io.mesh_files import SURFACE_READERS
+    from supple.mesh.surface import SurfaceMesh
+    from supple.runtime.replacing import whole_file
+
+    if scene.suffix.lower() in SURFACE_READERS:
+        raise SceneError(f"{scene}: is a surface, not a scene file; give it as supple new --surface {scene}")
+    if scene.suffix.lower() not in (".yaml", ".yml"):
+        raise SceneError(f"{scene}: a scene file ends in .yaml; name it {scene.name}.yaml")
+    if scene.exists() and not overwrite:
+        raise SceneError(f"{scene}: exists already; give another name, or --overwrite")
+    if not scene.absolute().parent.is_dir():
+        raise SceneError(f"{scene}: there is no folder {scene.absolute().parent}")
+    if surface is None:
+        if scale is not None:
+            raise SceneError("--scale is of a surface; give --surface, too")
+        text = new_scene(scene.name)
+    else:
+        vertices = SurfaceMesh.load(surface).vertices
+        length, lowest = float(np.ptp(vertices, axis=0).max()), float(vertices[:, 1].min())
+        used = (0.001 if length > LARGE else 1.0) if scale is None else scale
+        if not 0.0 < used < np.inf:
+            raise SceneError(f"scale must be a number above 0 and finite, not {used:g}")
+        file = Path(os.path.relpath(surface.absolute(), scene.absolute().parent)).as_posix()
+        body = re.sub(r"[^A-Za-z0-9_-]+", "_", surface.stem)[:50] or "body"
+        text = new_scene_of(scene.name, file, body, used, used * length, used * lowest)
+        if scale is None and used != 1.0:
+            print(f"{surface} is {length:.4g} m long; it is taken to be in millimetres (scale: {used:g})")
+    with whole_file(scene) as fresh:
+        fresh.write_text(text, encoding="utf-8")
+    print(f"wrote {scene}; try: supple view {scene}")

@@ -1,0 +1,104 @@
+"""`supple run`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from supple.app.cli.checkpoints import CheckpointEvery, Overwrite, interval
+from supple.app.cli.numbers import Seconds, Steps
+
+
+def run(
+    scene: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("out"),
+    steps: Steps = None,
+    dt: Seconds = None,
+    solver: str | None = None,
+    trace: Path | None = None,
+    separate: Annotated[bool, Parameter(negative="")] = False,
+    strict: Annotated[bool, Parameter(negative="")] = False,
+    page: bool | None = None,
+    plot: bool | None = None,
+    fields: str | None = None,
+    checkpoint_every: CheckpointEvery = None,
+    overwrite: Overwrite = False,
+    quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
+) -> int:
+    """Simulate a scene file into a run folder.
+
+    The recording is written while the scene runs, and is always readable up to the last complete frame. After Ctrl-C or
+    a kill, `supple resume` goes on.
+
+    Parameters
+    ----------
+    scene
+        The scene file (.yaml); `supple schema` describes it. Or a robot (.urdf); docs/robots.md describes what is read.
+    output
+        Run folder; it is created where it does not exist, and may not contain an earlier run.
+    steps
+        Number of frames, instead of the file's.
+    dt
+        Time from frame to frame [s], instead of the file's; 1/60 may be written as such.
+    solver
+        Kind of solver, instead of the file's, with its default parameters.
+    trace
+        CSV file with every iteration of Newton's method; for the implicit solver.
+    separate
+        Move bodies apart that intersect at the start, where a small translation separates them, and print the moves.
+    strict
+        Exit with code 1 where a frame did not converge: see its status. The recording is complete.
+    page
+        Write index.html, which plays the recording in a browser; without this, as the scene file specifies.
+    plot
+        Write plot.png; without this, as the scene file specifies.
+    fields
+        Fields to record in addition, separated by commas, such as von_mises,contact_force; without this, as the scene
+        file specifies. Their cost in bytes is printed before the run.
+    checkpoint_every
+        Number of frames from checkpoint to checkpoint; 0: only at the start and the end. 100 without this.
+    overwrite
+        Replace an earlier run in the folder.
+    quiet
+        Print neither progress nor summary.
+    """
+    from supple.app.cli.session import Products, run_session
+    from supple.app.cli.trace import traces
+    from supple.app.runs.run_folder import SceneSource
+    from supple.app.scene_file.entries.solvers import solver_of_kind
+    from supple.app.scene_file.loader import load_run
+    from supple.app.scene_file.resolved import resolved_scene
+
+    products = Products(output, quiet=quiet, checkpoint_every=interval(checkpoint_every), overwrite=overwrite)
+    products.refuse_a_run()
+    if trace is not None:
+        from supple.runtime.replacing import refuse_to_replace
+
+        refuse_to_replace(scene, trace)
+    described = load_run(scene)
+    if separate:
+        from supple.app.cli.separation import moved_apart
+
+        described = moved_apart(described)
+    used = described.solver if solver is None else solver_of_kind(solver)
+    dt, steps = described.dt if dt is None else dt, described.steps if steps is None else steps
+    page = described.output.page if page is None else page
+    plot = described.output.plot if plot is None else plot
+    names = described.output.fields if fields is None else [name.strip() for name in fields.split(",") if name.strip()]
+    origin = {"kind": "scene_file", "file": str(scene), "separate": separate, "page": page, "plot": plot}
+    return run_session(
+        described.scene,
+        used,
+        dt,
+        steps,
+        start=described.start,
+        strict=strict,
+        sinks=traces(trace, used),
+        products=replace(products, page=page, plot=plot, compress=described.output.compress, fields=tuple(names)),
+        source=SceneSource(origin, described.text, resolved_scene(described, solver=solver, dt=dt, steps=steps)),
+    ).code

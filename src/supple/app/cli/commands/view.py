@@ -1,0 +1,80 @@
+"""`supple view`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from supple.app.cli.live import Host, Open, Port, UseToken
+from supple.app.cli.recordings import recording_at
+
+SCENE_FILES = (".yaml", ".yml", ".urdf")
+RECORDINGS = (".vtkhdf", ".hdf", ".h5")
+
+
+def view(
+    source: Path,
+    /,
+    *,
+    solver: str | None = None,
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    open_: Open = True,
+    token: UseToken = True,
+) -> None:
+    """Show a recording, or a scene that is simulated live and can be dragged and tuned, in a browser.
+
+    Runs until Ctrl-C. Without --host, only this machine can open the page. Its address contains a secret, and only
+    browsers with that address are accepted. A scene's meshes must be in the folder of its file.
+
+    Parameters
+    ----------
+    source
+        A scene file (.yaml), a robot (.urdf), or a recording (.vtkhdf, or the folder that holds it).
+    solver
+        Kind of solver, instead of the file's, with its default parameters.
+    host
+        Address to serve at; 0.0.0.0 is all addresses of this machine.
+    port
+        Port to serve at; without it, 8080 or the next free one.
+    open_
+        Open the page in a browser.
+    token
+        Let in only browsers that have the page's secret; --no-token lets in all of this machine.
+    """
+    from supple.app.cli.live import serve_page
+
+    found = find_source(source)
+    if found.suffix.lower() not in SCENE_FILES:
+        if solver is not None:
+            from supple.errors import OutputError
+
+            raise OutputError(f"{found} is a recording, which uses no solver; remove --solver")
+        serve_page(found, host, port, open_, token)
+        return
+
+    from supple.app.scene_file.confined import ConfinedMeshStore
+    from supple.app.scene_file.entries.solvers import solver_of_kind
+    from supple.app.scene_file.loader import load_run
+    from supple.app.viewer.protocol.live_source import LiveSource
+
+    run = load_run(found, ConfinedMeshStore)
+    used = run.solver if solver is None else solver_of_kind(solver)
+    live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions)
+    serve_page(live, host, port, open_, token)
+
+
+def find_source(path: Path) -> Path:
+    """The scene file or recording at a path, which may be a folder.
+
+    Raises
+    ------
+    OutputError : where there is no such file.
+    """
+    from supple.errors import OutputError
+
+    path = recording_at(path)
+    if not path.exists():
+        raise OutputError(f"{path}: there is no such file")
+    if path.suffix.lower() not in (*SCENE_FILES, *RECORDINGS):
+        raise OutputError(f"{path} is neither a scene file (.yaml) nor a recording (.vtkhdf)")
+    return path

@@ -1,0 +1,42 @@
+"""Numbers on the command line, parsed as strictly as those of a scene file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from cyclopts import Parameter, Token
+
+
+def whole_number(_: Any, tokens: Sequence[Token]) -> int:
+    """A count. Nothing is rounded: 1.5 is an error."""
+    text = tokens[0].value
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a whole number") from None
+
+
+def steps(_: Any, tokens: Sequence[Token]) -> int:
+    """A number of frames, no larger than that of a scene file."""
+    from supple.app.scene_file.document import MAX_STEPS
+
+    number = whole_number(_, tokens)
+    if number > MAX_STEPS:
+        raise ValueError(f"at most {MAX_STEPS} frames are possible")
+    return number
+
+
+def seconds(_: Any, tokens: Sequence[Token]) -> float:
+    """A time [s], as a number or a fraction such as 1/60."""
+    from supple.app.scene_file.fraction import number_or_fraction
+
+    text = tokens[0].value
+    try:
+        return number_or_fraction(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is neither a number nor a fraction such as 1/60") from None
+
+
+Steps = Annotated[int | None, Parameter(converter=steps)]
+Seconds = Annotated[float | None, Parameter(converter=seconds)]

@@ -1,0 +1,131 @@
+"""Keeps one process's part of a run in a folder that is locked: frames, checkpoints, journal, log and tables."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from supple.app.runs.checkpoints import checkpoint_of
+from supple.app.runs.contents import RunPaths
+from supple.app.runs.journal import Journal, Session, now, write_journal
+from supple.app.runs.log import RunLog
+from supple.errors import OutputError
+from supple.results.checkpoint.file import RunFacts, write_checkpoint
+from supple.results.export.exporter import export
+from supple.results.frame import Frame
+from supple.results.recording.recorder import Recorder
+
+logger = logging.getLogger(__name__)
+
+
+class Keeper:
+    """A sink for the rest of a run from one frame on.
+
+    Parameters
+    ----------
+    paths : in the folder; recorder : of the recording in it; journal : of the run so far
+    checkpointed : index of the checkpoint that the run goes on from, or -1
+    """
+
+    def __init__(self, paths: RunPaths, recorder: Recorder, journal: Journal, checkpointed: int = -1) -> None:
+        self.paths, self.recorder, self.journal = paths, recorder, journal
+        self.log = RunLog(paths.log)
+        self._last: Frame | None = None  # that was recorded
+        self._good: Frame | None = None  # the last one that another step may start from
+        self._checkpointed = checkpointed
+        self._first_index: int | None = None  # of the session, once it is in the journal
+        self._failure = ""  # the error that interrupted `begin` or `write`
+
+    @property
+    def run(self) -> RunFacts:
+        return self.journal.run
+
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        with self._watched():
+            # In this order, a run can be resumed as soon as it has a journal.
+            if self._checkpointed != first.index:
+                self._write_checkpoint(first)
+            self.journal = self.journal.with_session(Session(first_frame=first.index, last_frame=first.index))
+            write_journal(self.paths.journal, self.journal)
+            self._first_index = first.index
+            self.log.note(f"frame {first.index} of {self.run.last_index}: begins, with {self.run.solver}")
+            self.recorder.begin(first, dt, steps)
+            self._last = self._good = first
+
+    def write(self, frame: Frame) -> None:
+        with self._watched():
+            self.recorder.write(frame)
+            self._last = frame
+            if frame.report.status.can_go_on:
+                self._good = frame
+                every = self.journal.checkpoint_every
+                if every is not None and frame.index % every == 0:
+                    self._write_checkpoint(frame)
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        try:
+            yield
+        except OutputError as error:
+            self._failure = str(error)
+            raise
+
+    def end(self) -> None:
+        """Write the last checkpoint and the tables, and close everything; all that is possible after an error.
+
+        Raises
+        ------
+        OutputError : where the system refuses for the first time; otherwise, the first error has been raised before.
+        """
+        first: OutputError | None = None
+        try:
+            for act in (self._write_last_checkpoint, self.recorder.end, self._end_session, self._write_tables):
+                try:
+                    act()
+                except OutputError as error:
+                    if self._failure:
+                        logger.warning("%s", error)
+                    else:
+                        first, self._failure = error, str(error)
+        finally:
+            self.recorder.end()
+            self.log.close()
+        if first is not None:
+            raise first
+
+    def _write_last_checkpoint(self) -> None:
+        is_there = self.paths.checkpoint_folder.is_dir()  # where somebody has removed it, it is not made again
+        if self._good is not None and self._good.index != self._checkpointed and is_there:
+            self._write_checkpoint(self._good)
+
+    def _end_session(self) -> None:
+        if self._first_index is None or not self.paths.own.is_dir():
+            return
+        outcome, message = self._outcome()
+        index = self._first_index if self._last is None else self._last.index
+        ended = self.journal.with_last(ended=now(), last_frame=index, outcome=outcome, message=message)
+        write_journal(self.paths.journal, ended)
+        self.log.note(f"frame {index} of {self.run.last_index}: {outcome}{message and ': '}{message}")
+
+    def _write_tables(self) -> None:
+        if self._last is not None and self.paths.recording.exists():
+            for path in self.paths.tables:
+                export(self.paths.recording, path.suffix[1:], path)
+
+    def _outcome(self) -> tuple[str, str]:
+        """How the session ended, and why."""
+        if self._failure or self._last is None:
+            return "failed", self._failure
+        report = self._last.report
+        if not report.status.can_go_on:
+            return "stopped", f"{report.status}: {report.message}"
+        return ("finished" if self._last.index == self.run.last_index else "interrupted"), ""
+
+    def _write_checkpoint(self, frame: Frame) -> None:
+        """Write a frame that was recorded."""
+        self.recorder.sync()  # a power failure must not leave a checkpoint without its frame
+        write_checkpoint(self.paths.checkpoint(frame.index), checkpoint_of(frame, self.run))
+        self._checkpointed = frame.index
+        self.paths.remove_old_checkpoints()
+        self.log.note(f"frame {frame.index}: checkpoint")

@@ -1,0 +1,204 @@
+"""Bodies of a scene file: mesh, material, placement, and copies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from supple.app.scene_file.entries.materials import MaterialModel
+from supple.app.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
+from supple.app.scene_file.entries.regions import RegionModel, with_regions
+from supple.app.scene_file.entries.shapes import ShapeModel
+from supple.app.scene_file.model import Count, Extents, Model, Name, NonNegative, Positive, Vector
+from supple.scene.body import Body, PlacedBody
+from supple.scene.located import at
+from supple.scene.rigid.rigid_body import RigidBody
+
+MAX_COPIES = 10_000
+
+
+class CopiesModel(Model):
+    """Copies of the body, named name01, name02, ...: at given offsets, or in a grid."""
+
+    offsets: list[Vector] | None = Field(
+        default=None, min_length=1, max_length=MAX_COPIES, description="from `position` [m]"
+    )
+    rotations: list[Vector] | None = Field(default=None, description="one per offset, instead of the body's [rad]")
+    grid: Annotated[list[Count], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="instead of `offsets`: how many along x, y and z"
+    )
+    spacing: Vector | None = Field(default=None, description="between neighbours of the grid [m]")
+
+    @model_validator(mode="after")
+    def _one_layout(self) -> CopiesModel:
+        if (self.offsets is None) == (self.grid is None):
+            raise ValueError("copies need either `offsets` or `grid`; give one of them")
+        if (self.grid is None) != (self.spacing is None):
+            raise ValueError("`grid` needs `spacing`; give both or neither")
+        if self.grid is not None and np.prod([float(n) for n in self.grid]) > MAX_COPIES:
+            raise ValueError(f"grid {self.grid} makes more than {MAX_COPIES} copies; make it smaller")
+        if self.rotations is not None and (self.offsets is None or len(self.rotations) != len(self.offsets)):
+            raise ValueError("`rotations` needs one entry for each of `offsets`")
+        return self
+
+    def placements(self) -> Iterator[tuple[NDArray[np.float64], list[float] | None]]:
+        """Offset (3,) [m], and rotation where one is given, of each copy."""
+        if self.offsets is not None:
+            for i, offset in enumerate(self.offsets):
+                yield np.array(offset), self.rotations[i] if self.rotations else None
+        if self.grid is not None:
+            for cell in np.ndindex(*reversed(self.grid)):
+                yield np.array(cell[::-1]) * np.array(self.spacing), None
+
+
+class InitialModel(Model):
+    """A deformed start of a body."""
+
+    scale: Extents = Field(
+        description="along the world's x, y and z about the center of volume; [1, 0.5, 1] squeezes to half the height"
+    )
+
+
+class RigidModel(Model):
+    """What makes a body rigid (implicit solver). A surface file is used as it is; it must be closed."""
+
+    alternatives = ("density", "mass", "a rigid body needs either `density` or `mass`; give one of them")
+
+    density: Positive | None = Field(default=None, description="[kg/m^3]")
+    mass: Positive | None = Field(default=None, description="instead of `density` [kg]")
+    inertia: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="rows of the tensor about the center of mass, with `mass` [kg m^2]"
+    )
+    center: Vector | None = Field(
+        default=None, description="of mass, with `inertia`, in the coordinates of the shape; default: of the solid [m]"
+    )
+    stiffness: Positive | None = Field(
+        default=None, description="of the energy that keeps it rigid [Pa]; default: from the heaviest load of the scene"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltBody:
+    """A body, and its vertices (n, 3) [m] at the start if it starts deformed."""
+
+    body: PlacedBody
+    initial_positions: NDArray[np.float64] | None
+
+
+class BodyModel(Model):
+    """One body. Give `mesh` (a file) or `shape`, and `material` for a soft body or `rigid` for a rigid one."""
+
+    alternatives = ("mesh", "shape", "a body needs either `mesh` or `shape`; give one of them")
+
+    name: Name = Field(description="unique in the scene")
+    mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
+    shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: a ready-made shape")
+    order: Literal[1, 2] | None = Field(
+        default=None,
+        description="of the tets: 2 for quadratic ones (implicit solver), 1 for linear ones; default: as in the file",
+    )
+    material: MaterialModel | None = Field(default=None, description="of a soft body")
+    rigid: RigidModel | None = Field(default=None, description="instead of `material`: the body is rigid")
+    regions: list[RegionModel] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=1000,
+        description="parts of the body with other materials; where two overlap, the later one counts",
+    )
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="where the mesh's origin is placed [m]")
+    rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the mesh's origin [rad]")
+    velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="of the center of mass, at the start [m/s]")
+    angular_velocity: Vector = Field(
+        default=[0.0, 0.0, 0.0], description="about the center of mass, at the start [rad/s]"
+    )
+    friction: NonNegative = Field(default=0.0, description="Coulomb coefficient against other bodies and itself")
+    skin: SurfaceModel | None = Field(
+        default=None, description="a finer surface that follows the body in pages and exports"
+    )
+    collide: Literal["tets", "skin"] | None = Field(
+        default=None, description="what touches other things: the surface of the tets (default), or the skin"
+    )
+    copies: CopiesModel | None = Field(default=None, description="copies of the body")
+    initial: InitialModel | None = Field(default=None, description="a deformed start")
+
+    @model_validator(mode="after")
+    def _soft_or_rigid(self) -> BodyModel:
+        if (self.material is None) == (self.rigid is None):
+            raise ValueError("a body needs either `material` or `rigid`; give one of them")
+        if self.rigid is not None:
+            for key in ("regions", "skin", "collide", "initial", "order"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"a rigid body has no `{key}`; remove it")
+        return self
+
+    def build(self, meshes: MeshStore) -> list[BuiltBody]:
+        """The body, or all its copies."""
+        alone = self._rigid(self.rigid, meshes) if self.rigid is not None else self._soft(meshes)
+        copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
+        digits = max(2, len(str(len(copies))))
+        built = []
+        for i, (offset, rotation) in enumerate(copies):
+            body = alone.changed(
+                name=self.name if self.copies is None else f"{self.name}{i + 1:0{digits}d}",
+                position=np.array(self.position) + offset,
+                rotation=self.rotation if rotation is None else rotation,
+            )
+            built.append(BuiltBody(body, _scaled(body, self.initial.scale) if self.initial else None))
+        return built
+
+    def _placement(self) -> dict[str, Any]:
+        keys = ("position", "rotation", "velocity", "angular_velocity", "friction")
+        return {key: getattr(self, key) for key in keys}
+
+    def _rigid(self, rigid: RigidModel, meshes: MeshStore) -> RigidBody:
+        """Without copies."""
+        if self.mesh is not None:
+            with at("mesh"):
+                shape = meshes.solid(self.mesh)
+        else:
+            assert self.shape is not None
+            with at("shape"):
+                shape = meshes.solid_shape(self.shape)
+        with at("rigid"):
+            return RigidBody(
+                self.name,
+                shape,
+                density=rigid.density,
+                mass=rigid.mass,
+                inertia=rigid.inertia,
+                center=rigid.center,
+                stiffness=rigid.stiffness,
+                **self._placement(),
+            )
+
+    def _soft(self, meshes: MeshStore) -> Body:
+        """Without copies."""
+        assert self.material is not None
+        if self.mesh is not None:
+            with at("mesh"):
+                mesh = meshes.tets(self.mesh)
+                mesh = mesh if self.order is None else mesh.to_order(self.order)
+        else:
+            assert self.shape is not None
+            with at("shape"):
+                mesh = meshes.shape(self.shape, self.order or 1)
+        with at("skin"):
+            skin = meshes.surface(self.skin) if self.skin is not None else None
+        with at("material"):
+            material = self.material.build()
+        if self.regions is not None:
+            with at("regions"):
+                material = with_regions(material, self.regions, mesh)
+        return Body(self.name, mesh, material, skin=skin, collide=self.collide or "tets", **self._placement())
+
+
+def _scaled(body: PlacedBody, scale: list[float]) -> NDArray[np.float64]:
+    placed = body.place(body.mesh.vertices)
+    corners = placed[body.mesh.tets].mean(axis=1)
+    center = body.mesh.volumes @ corners / body.mesh.volume
+    return center + (placed - center) * np.array(scale)

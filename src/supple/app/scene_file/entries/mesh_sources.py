@@ -1,0 +1,160 @@
+"""The sources of the meshes of a scene file, and the store that reads or makes each mesh once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from supple.app.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, SurfaceShapeModel
+from supple.app.scene_file.model import FilePath, Model, Positive, Vector
+from supple.errors import MeshError
+from supple.mesh.sets import MeshSets, read_sets
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
+from supple.scene.located import at
+from supple.scene.rotation import rotation_matrix
+
+SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".glb", ".vtp")
+TET_FILES = (".node", ".ele", ".edge", ".face", ".msh", ".inp", ".usd", ".usda", ".usdc")
+MESHING_OPTIONS = (
+    "tets",
+    "edge",
+    "max_volume",
+    "quality",
+    "min_dihedral",
+    "keep_surface",
+    "mesher",
+    "repair",
+    "decimate",
+    "time_limit",
+)
+
+
+class MeshFileModel(Model):
+    """A mesh file. A surface is filled with tetrahedra according to the meshing options."""
+
+    file: FilePath = Field(description="relative to the scene file")
+    scale: Positive = Field(default=1.0, description="of all coordinates: 0.001 for a file in millimetres")
+    tets: int | None = Field(default=None, gt=0, le=10**8, description="number of tetrahedra, within 10 %")
+    edge: Positive | None = Field(default=None, description="length of the tetrahedra's edges [m], after scaling")
+    max_volume: Positive | None = Field(default=None, description="of a tetrahedron [m^3], after scaling")
+    quality: float | None = Field(
+        default=None, ge=1.0, le=100.0, description="largest ratio of circumradius to shortest edge"
+    )
+    min_dihedral: float | None = Field(default=None, ge=0.0, lt=70.0, description="[degrees]")
+    keep_surface: bool | None = Field(default=None, description="true: no new vertices on the surface")
+    mesher: Literal["auto", "tetgen", "ftetwild"] | None = Field(default=None, description="program for the tetrahedra")
+    repair: bool | None = Field(default=None, description="true: repair the surface first, if it has faults")
+    decimate: int | None = Field(
+        default=None, ge=4, le=10**8, description="number of triangles to which the surface is reduced first"
+    )
+    time_limit: Positive | None = Field(default=None, description="of the mesher [s]")
+
+    @property
+    def meshing(self) -> dict[str, Any]:
+        """The meshing options that were given."""
+        return {key: getattr(self, key) for key in MESHING_OPTIONS if getattr(self, key) is not None}
+
+    def is_surface(self) -> bool:
+        """Whether the file is a surface to be filled: by its extension; where it can be both, by the options."""
+        suffix = Path(self.file).suffix.lower()
+        if suffix in TET_FILES and self.meshing:
+            with at(next(iter(self.meshing))):
+                raise MeshError(f"{self.file} already holds tetrahedra; remove this")
+        return suffix in SURFACE_FILES or (suffix not in TET_FILES and bool(self.meshing))
+
+
+class SurfaceModel(Model):
+    """A triangle surface: of a file or of a shape, scaled, then rotated, then moved."""
+
+    alternatives = ("file", "shape", "a surface needs either `file` or `shape`; give one of them")
+
+    file: FilePath | None = Field(default=None, description="relative to the scene file")
+    shape: SurfaceShapeModel | None = Field(default=None, description="instead of `file`")
+    scale: Positive = Field(default=1.0, description="of all coordinates")
+    rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the origin [rad]")
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
+
+
+class MeshStore:
+    """Reads and makes meshes; equal descriptions share one mesh.
+
+    Parameters
+    ----------
+    folder : the folder of relative paths.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._made: dict[str, Any] = {}
+
+    def _once(self, description: BaseModel, make: Any, kind: str = "") -> Any:
+        key = f"{kind}{type(description).__name__}{description.model_dump_json()}"
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
+
+    def tets(self, source: MeshFileModel) -> TetMesh:
+        """The tet mesh of a file, or of the surface in it."""
+        return self._once(source, lambda: self._read(source))
+
+    def sets(self, source: MeshFileModel) -> MeshSets:
+        """The named sets of a file of tets."""
+        return self._once(source, lambda: read_sets(self.located(source.file)), "sets ")
+
+    def shape(self, shape: ShapeModel, order: int = 1) -> TetMesh:
+        """The tet mesh of a shape."""
+        return self._once(shape, lambda: shape.build(order), f"order {order} ")
+
+    def solid(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
+        """The surface in a file as it is, without meshing options; otherwise its tet mesh."""
+        if not source.is_surface() or source.meshing:
+            return self.tets(source)
+        return self._once(source, lambda: self._read_surface(source), "solid ")
+
+    def solid_shape(self, shape: ShapeModel) -> SurfaceMesh | TetMesh:
+        """The surface of a shape, or its tet mesh where the surface has no other description."""
+        if isinstance(shape, GummyBearShapeModel):
+            return self.shape(shape)
+        return self._once(shape, shape.build_surface, "solid ")
+
+    def surface(self, source: SurfaceModel) -> SurfaceMesh:
+        """The surface of a file or a shape, placed."""
+        return self._once(source, lambda: self._surface(source))
+
+    def located(self, file: str) -> Path:
+        """The path of a mesh file that a scene names.
+
+        Raises
+        ------
+        SceneError : where reading it is not allowed.
+        """
+        return self.folder / file
+
+    def _read(self, source: MeshFileModel) -> TetMesh:
+        if source.is_surface():
+            from supple.mesh.meshing.tetrahedralize import tetrahedralize
+
+            return tetrahedralize(self._read_surface(source), **source.meshing)
+        with at("file"):
+            mesh = TetMesh.load(self.located(source.file))
+        return mesh if source.scale == 1.0 else mesh.transformed(source.scale)
+
+    def _read_surface(self, source: MeshFileModel) -> SurfaceMesh:
+        with at("file"):
+            surface = SurfaceMesh.load(self.located(source.file))
+        return surface if source.scale == 1.0 else surface.transformed(source.scale)
+
+    def _surface(self, source: SurfaceModel) -> SurfaceMesh:
+        if source.file is not None:
+            with at("file"):
+                surface = SurfaceMesh.load(self.located(source.file))
+        else:
+            assert source.shape is not None
+            with at("shape"):
+                surface = source.shape.build_surface()
+        if source.scale == 1.0 and not any(source.rotation) and not any(source.position):
+            return surface
+        return surface.transformed(source.scale, rotation_matrix(source.rotation), source.position)

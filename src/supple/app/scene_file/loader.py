@@ -1,0 +1,162 @@
+"""From a scene file to a scene, and to a whole run."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from supple.app.scene_file.document import OutputModel, SceneFileModel
+from supple.app.scene_file.entries.joints import with_shared_inputs
+from supple.app.scene_file.entries.mesh_sources import MeshStore
+from supple.app.scene_file.mesh_sets import with_numbers
+from supple.app.scene_file.urdf.document import read_urdf
+from supple.app.scene_file.validation_errors import scene_error
+from supple.app.scene_file.yaml_reader import Key, YamlDocument, read_yaml
+from supple.errors import SceneError
+from supple.scene.body import PlacedBody
+from supple.scene.located import LocatedError, at
+from supple.scene.scene import Scene
+from supple.solvers.solver import Solver
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The contents of a scene file: `simulate(run.scene, run.solver, run.dt, run.steps, **run.start)`.
+
+    Attributes
+    ----------
+    scene, solver : what to simulate, and how
+    dt : time from frame to frame [s]; steps : number of frames
+    initial_positions : by body name, (n, 3) [m], of bodies that start deformed
+    output : what to write beside the recording
+    text : of the file, stored in the recording
+    description : the content of the file, with all defaults; folder : that paths in it are relative to
+    """
+
+    scene: Scene
+    solver: Solver
+    dt: float
+    steps: int
+    initial_positions: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    output: OutputModel = field(default_factory=OutputModel)
+    text: str | None = None
+    description: SceneFileModel | None = None
+    folder: Path = Path()
+
+    @property
+    def start(self) -> dict[str, dict[str, NDArray[np.float64]]]:
+        """The keywords of `simulate` for the start of the bodies."""
+        return {"initial_positions": self.initial_positions} if self.initial_positions else {}
+
+
+def load_scene(path: str | Path) -> Scene:
+    """The scene of a scene file (YAML), or of a robot (URDF). Paths in it are relative to the file.
+
+    The format of scene files: `supple schema`; what is read of a URDF: docs/robots.md.
+
+    Solver, timing and deformed starts in the file are checked too, but only `load_run` returns them.
+
+    Parameters
+    ----------
+    path : of the scene file.
+
+    Raises
+    ------
+    SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
+    """
+    run = load_run(path)
+    for name in run.initial_positions:
+        logger.warning("%s: the deformed start of %r is not a part of the scene; load_run returns it", path, name)
+    return run.scene
+
+
+def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) -> Run:
+    """The scene of a scene file, with its solver, timing and start.
+
+    Parameters
+    ----------
+    path : of the scene file (YAML).
+    meshes : makes the store of meshes from the file's folder; `ConfinedMeshStore` reads only files in this folder.
+
+    Raises
+    ------
+    SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
+    """
+    document = read_urdf(path) if Path(path).suffix.lower() == ".urdf" else read_yaml(path)
+    model = validated(document)
+    try:
+        built = _built(model, meshes(Path(path).parent))
+        return replace(built, text=document.text, description=model, folder=Path(path).parent)
+    except LocatedError as error:
+        raise document.error(_keys_of_message(document.data, error.keys, str(error)), str(error)) from None
+
+
+def validated(document: YamlDocument) -> SceneFileModel:
+    """The contents of a scene file, of which no mesh was read or made yet.
+
+    Raises
+    ------
+    SceneError : where a value is missing, unknown or not allowed; one line that begins with `file:line:`.
+    """
+    try:
+        return SceneFileModel.model_validate(document.data)
+    except ValidationError as error:
+        raise scene_error(document, error) from None
+
+
+def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
+    model = with_numbers(model, meshes)
+    bodies: dict[str, PlacedBody] = {}
+    starts: dict[str, NDArray[np.float64]] = {}
+    for i, described in enumerate(model.bodies):
+        with at("bodies", i):
+            for built in described.build(meshes):
+                if built.body.name in bodies:
+                    raise SceneError(f"another body has the name {built.body.name!r}; give each a different name")
+                bodies[built.body.name] = built.body
+                if built.initial_positions is not None:
+                    starts[built.body.name] = built.initial_positions
+    obstacles = _each("obstacles", model.obstacles, meshes)
+    lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs", "loads", "cavities", "cables", "sensors")
+    lists += ("joints", "welds")
+    parts = {key: _each(key, getattr(model, key)) for key in lists}
+    parts["joints"] = with_shared_inputs(parts["joints"])
+    with at("solver"):
+        solver = model.solver.build()
+    with at():
+        scene = Scene(list(bodies.values()), obstacles, gravity=model.gravity, **parts)
+        # The pairs are found here, where an error's place in the file is known; the scene caches them.
+        logger.debug("%d stitched pairs", len(scene.stitching))
+    return Run(scene, solver, model.dt, model.steps, starts, model.output)
+
+
+def _each(key: str, models: Sequence[Any], *arguments: MeshStore) -> list[Any]:
+    """What each entry of a list in the file builds; errors get the place of their entry."""
+    built = []
+    for i, model in enumerate(models):
+        with at(key, i):
+            built.append(model.build(*arguments))
+    return built
+
+
+def _keys_of_message(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Key, ...]:
+    """`keys`, and the first key below them that the message names after its subject."""
+    for key in keys:
+        if not (isinstance(data, list) and isinstance(key, int)) and not (isinstance(data, dict) and key in data):
+            return keys
+        data = data[key]  # pyright: ignore[reportCallIssue, reportArgumentType]
+    if isinstance(data, dict):
+        for word in re.findall(r"\w+", re.sub(r"^[^:]*: ", "", message)):
+            if word in data:
+                return (*keys, word)
+    return keys

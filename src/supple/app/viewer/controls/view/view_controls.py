@@ -1,0 +1,181 @@
+"""The folder "View" of the panel: view options, for simulations and recordings."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.app.viewer.controls.view.color_range import ColorRange
+from supple.app.viewer.controls.view.overlay import Overlay
+from supple.app.viewer.controls.view.probe import Probe
+from supple.app.viewer.drawing.camera import PRESETS, follow, look_from
+from supple.app.viewer.drawing.coloring.color_scale import bar_html
+from supple.app.viewer.drawing.coloring.fields import FIELDS
+from supple.app.viewer.drawing.layers.forces import COLOR
+from supple.app.viewer.drawing.options import COLOR_BY_BODY, SURFACES, ViewOptions
+from supple.app.viewer.drawing.stage import Stage
+from supple.app.viewer.protocol.quantities import written
+from supple.app.viewer.server.browser_values import number, one_of
+
+_AXES = ("x", "y", "z")
+_NOTHING = "nothing"
+
+
+class ViewControls:
+    """Inputs for the view options of a stage, and the legend.
+
+    Parameters
+    ----------
+    server : of viser; stage : draws with the options; overlay : has the legend
+    changed : called with every change, before it is drawn
+    """
+
+    def __init__(
+        self,
+        server: Any,
+        stage: Stage,
+        overlay: Overlay,
+        changed: Callable[[ViewOptions], None] = lambda options: None,
+    ) -> None:
+        self._server, self._stage, self._overlay, self._changed = server, stage, overlay, changed
+        self._lock = threading.RLock()
+        self._center: NDArray[np.float64] | None = None
+        gui, options = server.gui, stage.options
+        with gui.add_folder("View"):
+            self.surface = gui.add_dropdown(
+                "Surface", SURFACES, initial_value=options.surface, hint="What is drawn of the bodies"
+            )
+            self.color_by = gui.add_dropdown(
+                "Color", (COLOR_BY_BODY, *FIELDS), initial_value=options.color_by, hint="The legend is in the picture"
+            )
+            self.range = ColorRange(gui, stage, self.apply)
+            self.explode = gui.add_slider(
+                "Apart", 0.05, 1.5, 0.05, initial_value=options.explode, visible=False, hint="Distance between tets"
+            )
+            self.cut_axis = gui.add_dropdown(
+                "Cut across", _AXES, initial_value=options.cut_axis, visible=False, hint="Axis across the section"
+            )
+            self.cut_place = gui.add_slider(
+                "Cut at", 0.0, 1.0, 0.01, initial_value=options.cut_place, visible=False, hint="Share of each body"
+            )
+            self.velocities = gui.add_checkbox(
+                "Velocities", initial_value=options.velocities, hint="Arrows: the distance in 0.15 s"
+            )
+            self.contacts = gui.add_checkbox(
+                "Contacts", initial_value=options.contacts, hint="Where surfaces touch, with arrows of the forces"
+            )
+            self.stitches = gui.add_checkbox(
+                "Stitches", initial_value=options.stitches, hint="Lines between stitched surfaces"
+            )
+            self._message = gui.add_markdown("", visible=False)
+            self.camera = gui.add_button_group("Camera", PRESETS, hint="Keys 1 to 5; F fits the picture to the bodies")
+            self.follow = gui.add_dropdown(
+                "Follow",
+                self._bodies(),
+                initial_value=_NOTHING,
+                hint="The camera moves with a body; a double click on a body fits the picture to it",
+            )
+        self.probe = Probe(server, stage)
+        shape = self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place
+        for handle in (*shape, self.velocities, self.contacts, self.stitches):
+            handle.on_update(lambda _: self.apply())
+        self.camera.on_click(self._look)
+        self.follow.on_update(lambda _: self._begin_to_follow())
+
+    def apply(self) -> None:
+        """Draw with the options of the panel."""
+        # Inputs that change together arrive in any order; the last one must see the values of all.
+        with self._lock:
+            options = replace(
+                self._stage.options,
+                surface=one_of(self.surface.value, SURFACES),
+                color_by=one_of(self.color_by.value, (COLOR_BY_BODY, *FIELDS)),
+                ends=self.range.ends,
+                explode=number(self.explode.value, 0.05, 1.5),
+                cut_axis=one_of(self.cut_axis.value, _AXES),
+                cut_place=number(self.cut_place.value, 0.0, 1.0),
+                velocities=bool(self.velocities.value),
+                contacts=bool(self.contacts.value),
+                stitches=bool(self.stitches.value),
+            )
+            self.explode.visible = options.surface == "exploded tets"
+            self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
+            self._changed(options)
+            self._stage.apply(options)
+            self.range.show()
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Update the legend, the labels at pointers, and the text about contacts."""
+        stage = self._stage
+        field = stage.field if stage.options.surface != "wireframe" else None
+        legend = "" if field is None else bar_html(field, stage.color_range)
+        self._overlay.show("legend", legend, pointer=self.probe.pointer._impl.uuid)
+        self.probe.refresh()
+        full = stage.force_scale
+        self._overlay.show("arrows", "" if full is None else arrows_html(full))
+        found = stage.moment.contact_points
+        forces = "" if full is not None or not found_some(found) else " Their forces are not known."
+        self._message.content = f"Contacts: {'not known' if found is None else len(found)}.{forces}"
+        self._message.visible = stage.options.contacts
+        names = self._bodies()
+        if self.follow.options != names:
+            if self.follow.value not in names:
+                self.follow.value = _NOTHING
+            self.follow.options = names
+
+    def move_cameras(self) -> None:
+        """Called with every drawn moment: the cameras of all visitors move with the body that they follow."""
+        center = self._followed()
+        with self._lock:
+            before = self._center
+            if before is None or center is None:
+                return
+            way = center - before
+            if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
+                return
+            self._center = center
+        for client in self._server.get_clients().values():
+            follow(client, way)
+
+    def _bodies(self) -> tuple[str, ...]:
+        return _NOTHING, *(body.name for body in self._stage.model.bodies)
+
+    def _followed(self) -> NDArray[np.float64] | None:
+        """(3,) the center of the body that is followed [m], or None."""
+        moment = self._stage.moment
+        rows = (body.vertices for body in moment.model.bodies if body.name == self.follow.value)
+        chosen = next(rows, None) if self.follow.value != _NOTHING else None
+        return None if chosen is None else moment.finite_positions[chosen].mean(axis=0)
+
+    def _begin_to_follow(self) -> None:
+        center = self._followed()
+        with self._lock:
+            self._center = center
+        if center is not None:
+            for client in self._server.get_clients().values():
+                follow(client, center - np.asarray(client.camera.look_at))
+
+    def _look(self, event: Any) -> None:
+        if event.client is not None:
+            look_from(event.client, one_of(self.camera.value, PRESETS), self._stage.model.view)
+
+
+def found_some(points: NDArray[np.float64] | None) -> bool:
+    """Whether there are contacts."""
+    return points is not None and len(points) > 0
+
+
+def arrows_html(full: float) -> str:
+    """The legend of the arrows of forces: the force of one of half the size of the scene."""
+    color = "rgb({},{},{})".format(*COLOR)
+    arrow = f'<path d="M2 7H74M66 2L76 7L66 12" fill="none" stroke="{color}" stroke-width="2"/>'
+    return (
+        f'<svg viewBox="0 0 80 14" style="width:80px;display:block">{arrow}</svg>'
+        f"<div>contact force, half the scene: {written(full, 'N')}</div>"
+    )

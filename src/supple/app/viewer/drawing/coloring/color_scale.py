@@ -1,0 +1,92 @@
+"""Color scales for values, and the color bar."""
+
+from __future__ import annotations
+
+import html
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.app.viewer.drawing.coloring.fields import Field
+from supple.app.viewer.protocol.quantities import written
+
+BINS = 16  # colors of a scale; each is one mesh on the page, because a mesh has one color
+NOT_KNOWN_COLOR = (150, 152, 158)
+# A scale grows immediately, and shrinks only where less than this share of it is used: otherwise its ends flicker.
+_SHRINK_BELOW = 0.3
+
+
+def palette(field: Field) -> NDArray[np.uint8]:
+    """(BINS, 3) colors: from blue over white to red where the field has a center, otherwise from dark to bright."""
+    from matplotlib import colormaps
+
+    colors = colormaps["RdBu" if field.center is not None else "viridis"](np.linspace(0.0, 1.0, BINS))
+    return np.round(255.0 * np.asarray(colors)[:, :3]).astype(np.uint8)
+
+
+def bin_of(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.int64]:
+    """The color (0 to BINS - 1) of each value; BINS where it is not finite."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        place = np.floor((values - low) / (high - low) * BINS)
+    known = np.isfinite(values)
+    return np.where(known, np.clip(np.where(known, place, 0.0), 0, BINS - 1), BINS).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Range:
+    """How the ends of a scale are found.
+
+    Attributes
+    ----------
+    share : of the values within the scale; the others have the colors of its ends
+    fixed : (low, high) instead, or None
+    """
+
+    share: float = 0.98
+    fixed: tuple[float, float] | None = None
+
+
+class Limits:
+    """The ends of a scale: fixed, or round numbers that follow the displayed values in steps."""
+
+    def __init__(self, field: Field, ends: Range) -> None:
+        self.field, self.ends = field, ends
+        self._reach = 0.0
+
+    def follow(self, values: NDArray[np.float64]) -> tuple[float, float] | None:
+        """(low, high) for these values (m,); None where no value is known."""
+        center = self.field.center
+        finite = values[np.isfinite(values)]
+        if not len(finite):
+            return None
+        if self.ends.fixed is not None:
+            return self.ends.fixed
+        away = np.abs(finite - center) if center is not None else finite
+        needed = float(np.quantile(away, self.ends.share))
+        needed = round_up(max(needed, 0.02 if center is not None else 1e-9))
+        if needed > self._reach or needed < _SHRINK_BELOW * self._reach:
+            self._reach = needed
+        return (0.0, self._reach) if center is None else (center - self._reach, center + self._reach)
+
+
+def round_up(value: float) -> float:
+    """The next of 1, 2, 5, 10, 20, 50, ..."""
+    scale = 10.0 ** math.floor(math.log10(value))
+    return next(scale * step for step in (1.0, 2.0, 5.0, 10.0) if scale * step >= value * (1.0 - 1e-12))
+
+
+def bar_html(field: Field, ends: tuple[float, float] | None) -> str:
+    """The legend: name, colors, and the values at both ends and in the middle with their unit."""
+    title = f"<div>{html.escape(field.name)}</div>"
+    if ends is None:
+        return f"{title}<div>not known</div>"
+    colors = ["rgb({},{},{})".format(*color) for color in palette(field)]
+    stops = ",".join(f"{color} {100 * i / BINS:.2f}% {100 * (i + 1) / BINS:.2f}%" for i, color in enumerate(colors))
+    low, high = ends
+    numbers = "".join(f"<span>{written(value, field.unit)}</span>" for value in (low, 0.5 * (low + high), high))
+    return (
+        f'{title}<div class="bar" style="background:linear-gradient(to right,{stops})"></div>'
+        f'<div class="numbers">{numbers}</div>'
+    )

@@ -1,0 +1,49 @@
+"""Points of a moment as dots, such as pinned vertices and contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
+from supple.app.viewer.drawing.moments.model import Moment
+
+
+class Dots(Layer):
+    """A dot for each point.
+
+    Parameters
+    ----------
+    name : of the node; size : of a dot, as a share of the size of the scene
+    points : returns those of a moment, (k, 3) [m]
+    """
+
+    def __init__(
+        self,
+        scene: Any,
+        moment: Moment,
+        name: str,
+        color: tuple[int, int, int],
+        size: float,
+        points: Callable[[Moment], NDArray[np.float64]],
+    ) -> None:
+        self._points = points
+        self._dots = scene.add_point_cloud(
+            name,
+            np.zeros((1, 3), dtype=np.float32),
+            color,
+            point_size=size * moment.model.view.radius,
+            point_shape="circle",
+            visible=False,
+        )
+        self.nodes = [self._dots]
+        self.update(moment)
+
+    def update(self, moment: Moment) -> None:
+        points = self._points(moment)
+        self._dots.visible = len(points) > 0
+        if len(points):
+            self._dots.points = single(points)

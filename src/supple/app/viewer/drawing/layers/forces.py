@@ -1,0 +1,56 @@
+"""Forces of contacts, as arrows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from supple.app.viewer.drawing.coloring.color_scale import round_up
+from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
+from supple.app.viewer.drawing.moments.model import Moment
+
+COLOR = (200, 30, 90)
+_LONGEST = 0.5  # length of the arrow of `full`, as a share of the size of the scene
+_HEAD = 0.04  # length of the head of an arrow, as a share of the size of the scene
+
+
+class ForceView(Layer):
+    """An arrow from each contact, along its force on the first of its two bodies.
+
+    Attributes
+    ----------
+    full : the force of an arrow of half the size of the scene [N], a round number that follows the strongest one; None
+        where there is none
+    """
+
+    def __init__(self, scene: Any, moment: Moment) -> None:
+        self._size = moment.model.view.radius
+        self.full: float | None = None
+        head = _HEAD * self._size
+        self._arrows = scene.add_arrows(
+            "/forces",
+            np.zeros((1, 2, 3)),
+            COLOR,
+            shaft_radius=0.15 * head,
+            head_radius=0.4 * head,
+            head_length=head,
+            visible=False,
+        )
+        self.nodes = [self._arrows]
+        self.update(moment)
+
+    def update(self, moment: Moment) -> None:
+        points, forces = moment.contact_forces or (np.zeros((0, 3)), np.zeros((0, 3)))
+        sizes = np.linalg.norm(forces, axis=1)
+        known = np.isfinite(sizes) & (sizes > 1e-9)
+        strongest = float(sizes[known].max(initial=0.0))
+        self._arrows.visible = strongest > 0.0
+        if strongest <= 0.0:
+            self.full = None
+            return
+        # It grows at once, and shrinks late: otherwise all arrows would flicker.
+        if self.full is None or strongest > self.full or strongest < 0.15 * self.full:
+            self.full = round_up(strongest)
+        ends = points[known] + _LONGEST * self._size / self.full * forces[known]
+        self._arrows.points = single(np.stack([points[known], ends], axis=1))

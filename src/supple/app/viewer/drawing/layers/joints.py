@@ -1,0 +1,101 @@
+"""Joints of rigid bodies: their points, axes and limits, and where between the limits they are."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
+from supple.app.viewer.drawing.moments.model import Model, Moment
+from supple.results.recording.actions.joints import RecordedJoint
+
+_COLOR = (225, 120, 20)
+_ARC = 32  # lines of a whole turn
+# Lengths as shares of the longest distance of the first body's control points: axes reach out of the body.
+_AXIS, _LIMIT, _POINT = 0.7, 0.35, 0.08
+
+
+class JointView(Layer):
+    """Lines for each joint.
+
+    A cross is its point, a line the axis. An arc, a line along the axis or the rim of a cone shows limits; it moves
+    with the second side, and a line that moves with the first shows where the joint is.
+    """
+
+    def __init__(self, scene: Any, moment: Moment) -> None:
+        joints = moment.model.joints
+        self._lines = [_lines(joint, _size(moment.model, joint)) for joint in joints]
+        self.nodes = []
+        if joints:
+            ends = single(joint_segments(moment, self._lines))
+            self.nodes = [scene.add_line_segments("/joints", ends, _COLOR, thickness=3.0, thickness_units="screen")]
+
+    def update(self, moment: Moment) -> None:
+        for handle in self.nodes:
+            handle.points = single(joint_segments(moment, self._lines))
+
+
+Sides = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def joint_segments(moment: Moment, lines: list[Sides]) -> NDArray[np.float64]:
+    """(k, 2, 3) ends of all lines [m], of those in the coordinates of the two sides of each joint."""
+    placed = []
+    for joint, sides in zip(moment.model.joints, lines, strict=True):
+        for side, own in zip(joint.sides, sides, strict=True):
+            placed.append(_moved(moment, side, own.reshape(-1, 3)).reshape(-1, 2, 3))
+    return np.concatenate(placed)
+
+
+def _moved(moment: Moment, side: int | None, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (k, 3) of a body, an obstacle or the world, where they are now."""
+    bodies = moment.model.bodies
+    if side is None:
+        return points
+    if side >= len(bodies):
+        pose = moment.poses[side - len(bodies)]
+        return points @ pose[:, :3].T + pose[:, 3]
+    rows = bodies[side].vertices
+    rest = np.column_stack([moment.model.rest_positions[rows], np.ones(4)])
+    return np.column_stack([points, np.ones(len(points))]) @ np.linalg.solve(rest, moment.finite_positions[rows])
+
+
+def _size(model: Model, joint: RecordedJoint) -> float:
+    return float(np.ptp(model.rest_positions[model.bodies[joint.sides[0]].vertices], axis=0).max())
+
+
+def _lines(joint: RecordedJoint, size: float) -> Sides:
+    """Lines (k, 2, 3) that move with the first side, and with the second, in their coordinates."""
+    p, e = joint.point, joint.axis / np.linalg.norm(joint.axis)
+    low, high = joint.limits
+    limited = bool(np.isfinite(low) and np.isfinite(high))
+    across = np.linalg.svd(e[None])[2][1:]
+    if np.dot(np.cross(e, across[0]), across[1]) < 0.0:
+        across = across[::-1]
+    first = [(p - _POINT * size * d, p + _POINT * size * d) for d in np.eye(3)]
+    second: list[Any] = []
+    if joint.kind in ("hinge", "slider"):
+        second.append((p - _AXIS * size * e, p + _AXIS * size * e))
+    turn = joint.limits if joint.kind == "hinge" else joint.twist_limits
+    if np.isfinite(turn).all():
+        ends = np.linspace(turn[0], min(turn[1], turn[0] + 2.0 * np.pi), _ARC)
+        rim = p + _LIMIT * size * np.column_stack([np.cos(ends), np.sin(ends)]) @ across
+        second += [*pairwise(rim), (p, rim[0]), (p, rim[-1])]
+        first.append((p, p + 1.2 * _LIMIT * size * across[0]))
+    if joint.kind == "slider" and limited:
+        tick = _POINT * size * across[0]
+        second += [(p + end * e - tick, p + end * e + tick) for end in (low, high)]
+    elif joint.kind == "ball" and limited:
+        turn = np.linspace(0.0, 2.0 * np.pi, _ARC)
+        circle = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
+        rim = p + _LIMIT * size * (np.cos(high) * e + np.sin(high) * circle)
+        second += [*pairwise(rim), *((p, rim[k]) for k in range(0, _ARC, 8))]
+        first.append((p, p + 1.2 * _LIMIT * size * e))
+    own = []
+    for lines, pose in zip((first, second), joint.placed, strict=True):
+        ends = np.array(lines, dtype=np.float64).reshape(-1, 3)
+        own.append(((ends - pose[:, 3]) @ pose[:, :3]).reshape(-1, 2, 3))
+    return own[0], own[1]

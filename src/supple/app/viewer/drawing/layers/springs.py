@@ -1,0 +1,71 @@
+"""Grabs of visitors, as springs with their length, and the pusher."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
+from supple.app.viewer.drawing.moments.model import Moment
+
+_SPRING_COLOR, _PUSHER_COLOR = (20, 150, 70), (120, 90, 200)
+
+
+class SpringView(Layer):
+    """A line for each spring, and a label with its length."""
+
+    def __init__(self, scene: Any, moment: Moment) -> None:
+        self._scene = scene
+        self._lines = scene.add_line_segments(
+            "/springs/lines",
+            np.zeros((1, 2, 3), dtype=np.float32),
+            _SPRING_COLOR,
+            thickness=5.0,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._labels: dict[int, Any] = {}
+        self.update(moment)
+
+    def update(self, moment: Moment) -> None:
+        springs = moment.springs
+        self._lines.visible = bool(springs)
+        if springs:
+            self._lines.points = single(np.array(list(springs.values())))
+        for gone in set(self._labels) - set(springs):
+            self._labels.pop(gone).remove()
+        for number, (point, target) in springs.items():
+            text = length_text(float(np.linalg.norm(target - point)))
+            middle = tuple(0.5 * (point + target))
+            if number in self._labels:
+                self._labels[number].position, self._labels[number].text = middle, text
+            else:
+                self._labels[number] = self._scene.add_label(f"/springs/{number}", text, position=middle)
+
+    def remove(self) -> None:
+        for node in (self._lines, *self._labels.values()):
+            node.remove()
+
+
+class PusherView(Layer):
+    """The ball of the pusher."""
+
+    def __init__(self, scene: Any, moment: Moment) -> None:
+        self._ball = scene.add_icosphere(
+            "/pusher", radius=1.0, color=_PUSHER_COLOR, opacity=0.85, subdivisions=4, visible=False
+        )
+        self.nodes = [self._ball]
+        self.update(moment)
+
+    def update(self, moment: Moment) -> None:
+        self._ball.visible = moment.pusher is not None
+        if moment.pusher is not None:
+            self._ball.position, self._ball.radius = tuple(moment.pusher[0]), moment.pusher[1]
+
+
+def length_text(meters: float) -> str:
+    """A length in m, cm or mm."""
+    if meters >= 1.0:
+        return f"{meters:.2f} m"
+    return f"{100.0 * meters:.1f} cm" if meters >= 0.01 else f"{1000.0 * meters:.1f} mm"

@@ -1,0 +1,85 @@
+"""Bodies as tets: colored by a field, pulled apart, or cut."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.app.viewer.drawing.coloring.color_scale import NOT_KNOWN_COLOR, Limits, Range, bin_of, palette
+from supple.app.viewer.drawing.coloring.fields import Field
+from supple.app.viewer.drawing.layers.primitives.layer import Layer
+from supple.app.viewer.drawing.layers.primitives.triangles import ColoredTriangles
+from supple.app.viewer.drawing.layers.section import Cut, Triangles, surface, whole
+from supple.app.viewer.drawing.moments.model import Model, Moment
+from supple.app.viewer.drawing.picking import first_hit
+from supple.mesh.topology import TET_FACETS
+
+
+class TetView(Layer):
+    """Facets of tets.
+
+    Parameters
+    ----------
+    field : for coloring, or None for the colors of the bodies; ends : of the color scale
+    explode : displacement of the tets, as a share of their distance from the center of the body; 0 draws only the
+        surface
+    cut : a plane that hides what is behind it, or None
+
+    Attributes
+    ----------
+    range : ends of the color scale; None without a field, or where no value is known
+    """
+
+    def __init__(
+        self, scene: Any, moment: Moment, field: Field | None, ends: Range, explode: float, cut: Cut | None
+    ) -> None:
+        model = moment.model
+        self._field, self._explode = field, explode
+        self._limits = Limits(field, ends) if field is not None else None
+        self.range: tuple[float, float] | None = None
+        colors = palette(field) if field is not None else np.array([body.color for body in model.bodies])
+        self._drawn = ColoredTriangles(scene, "/bodies/tets", np.vstack([colors, [NOT_KNOWN_COLOR]]))
+        self.nodes = self._drawn.handles
+        self._triangles = exploded_facets(model) if explode > 0.0 else surface(model, cut)
+        self._body = np.empty(len(model.tets), dtype=np.int64)
+        for i, body in enumerate(model.bodies):
+            self._body[body.tets] = i
+        self._values: NDArray[np.float64] | None = None
+        self.update(moment)
+
+    def update(self, moment: Moment) -> None:
+        x = self._triangles.corners(moment.finite_positions)
+        if self._explode > 0.0:
+            x = x + self._offsets(moment)[self._triangles.owner][:, None]
+        self._corners = x
+        if self._field is None or self._limits is None:
+            color = self._body
+        else:
+            self._values = self._field.values(moment)
+            self.range = self._limits.follow(self._values)
+            color = bin_of(self._values, *(self.range or (0.0, 1.0)))
+        self._drawn.update(x, color[self._triangles.owner])
+
+    def value_on_ray(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[int, float] | None:
+        """The tet that a ray from `origin` (3,) in `direction` (3,) meets first, and its value; None where none."""
+        hit = None if self._values is None else first_hit(self._corners, origin, direction)
+        if hit is None or self._values is None:
+            return None
+        tet = int(self._triangles.owner[hit[0]])
+        return tet, float(self._values[tet])
+
+    def _offsets(self, moment: Moment) -> NDArray[np.float64]:
+        """(m, 3) displacement of each tet from the center of its body [m]."""
+        model = moment.model
+        centers = moment.finite_positions[model.tets].mean(axis=1)
+        offsets = np.empty_like(centers)
+        for body in model.bodies:
+            offsets[body.tets] = centers[body.tets] - centers[body.tets].mean(axis=0)
+        return self._explode * offsets
+
+
+def exploded_facets(model: Model) -> Triangles:
+    """All facets of all tets."""
+    return whole(model.tets[:, TET_FACETS].reshape(-1, 3), np.repeat(np.arange(len(model.tets)), 4))

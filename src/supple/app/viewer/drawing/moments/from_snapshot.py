@@ -1,0 +1,120 @@
+"""Converts snapshots of a live simulation to the data that the page draws."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.app.viewer.drawing.moments.model import Model, ModelBody, Moment
+from supple.app.viewer.protocol.snapshots import PUSHER, RIGID, BodyDescription, SceneDescription, Snapshot
+from supple.mesh.skin import Embedding
+from supple.mesh.tetmesh import TetMesh
+from supple.results.drawing import View
+from supple.results.recording.scene import RecordedObstacle
+from supple.results.recording.skinned_surface import SkinnedSurface
+
+
+class MomentBuilder:
+    """Converts snapshots to moments. Data that do not change are converted once."""
+
+    def __init__(self) -> None:
+        self._generation: int | None = None
+        self._model: Model | None = None
+        self._key: tuple[Any, ...] = ()
+        self._skins: dict[tuple[int, int], SkinnedSurface] = {}
+
+    def moment(self, snapshot: Snapshot) -> Moment:
+        """The moment of a snapshot."""
+        if self._model is None or snapshot.description.generation != self._generation:
+            self._generation = snapshot.description.generation
+            # The pusher also changes the generation, but a new model would interrupt a drag.
+            key = _model_key(snapshot.description)
+            if self._model is None or key != self._key:
+                self._model, self._key = self._model_of(snapshot.description), key
+        rotations, translations = snapshot.obstacle_poses
+        poses = np.concatenate([rotations.reshape(-1, 3, 3), translations.reshape(-1, 3, 1)], axis=2)
+        poses = poses[: len(self._model.obstacles)]
+        values = {}
+        if snapshot.tet_values is not None and snapshot.tet_quantity is not None:
+            values[snapshot.tet_quantity] = snapshot.tet_values
+        pusher = snapshot.pusher
+        return Moment(
+            self._model,
+            snapshot.time,
+            snapshot.positions,
+            snapshot.velocities,
+            poses,
+            contact_points=snapshot.contact_points,
+            contact_forces=snapshot.contact_forces,
+            pinned=snapshot.pinned.astype(np.int64),
+            springs={grab.grab: (np.array(grab.point), np.array(grab.target)) for grab in snapshot.grabs},
+            pusher=None if pusher is None else (np.array(pusher[0]), pusher[1]),
+            tet_values=values,
+        )
+
+    def _model_of(self, scene: SceneDescription) -> Model:
+        bodies = tuple(
+            ModelBody(
+                body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), i, body.material == RIGID
+            )
+            for i, body in enumerate(scene.bodies)
+        )
+        tets = np.concatenate([body.nodes[:, :4] + body.vertices.start for body in scene.bodies])
+        return Model(
+            bodies,
+            _scene_obstacles(scene),
+            np.concatenate([body.rest_positions for body in scene.bodies]),
+            np.ascontiguousarray(tets, dtype=np.int32),
+            _view_of(scene),
+            scene.stitches,
+            joints=scene.joints,
+        )
+
+    def _skin_of(self, body: BodyDescription) -> SkinnedSurface | None:
+        """The fine surface with the tet of each of its vertices; cached, so that a body is searched once."""
+        if body.skin is None:
+            return None
+        vertices, triangles = body.skin
+        key = _fingerprint(vertices), _fingerprint(body.rest_positions)
+        if key not in self._skins:
+            held = Embedding.of(TetMesh(body.rest_positions, body.nodes), vertices)
+            self._skins[key] = SkinnedSurface(held.corners, held.weights, np.asarray(triangles, dtype=np.int32))
+        return self._skins[key]
+
+
+def _scene_obstacles(scene: SceneDescription) -> tuple[RecordedObstacle, ...]:
+    """The obstacles without the pusher, which is the last one and has its own layer."""
+    some = scene.obstacles
+    return some[:-1] if some and some[-1].name == PUSHER else some
+
+
+def _model_key(scene: SceneDescription) -> tuple[Any, ...]:
+    """A key that is equal for scenes with the same things to draw, apart from their positions."""
+    bodies = ((b.name, _fingerprint(b.rest_positions), _fingerprint(b.nodes), b.skin is None) for b in scene.bodies)
+    return (
+        *bodies,
+        *((o.name, o.kind) for o in _scene_obstacles(scene)),
+        _fingerprint(scene.stitches.nodes),
+        len(scene.joints),
+    )
+
+
+def _view_of(scene: SceneDescription) -> View:
+    """The view of the bodies at the start, and of the floor where it is not far below them."""
+    low, high, up = np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)
+    bodies = View(low, high, up)
+    for obstacle in scene.obstacles:
+        plane = obstacle.obstacle.plane
+        if plane is not None and float(plane[1] @ up) > 0.99:
+            below = float((bodies.center - plane[0]) @ up)
+            if 0.0 < below < 4.0 * bodies.radius:
+                floor = bodies.center - below * up
+                low, high = np.minimum(low, floor), np.maximum(high, floor)
+    return View(low, high, up)
+
+
+def _fingerprint(values: NDArray[Any]) -> int:
+    return zlib.crc32(np.ascontiguousarray(values).tobytes())

@@ -1,0 +1,175 @@
+"""The data that the page draws, of a live simulation or of a recording.
+
+A `Model` contains what no frame changes; a `Moment` is one frame. Layers use only these two, neither engine nor file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.flows.internal import NEVER_FLOWED
+from supple.mesh.topology import TET_FACETS, facet_keys
+from supple.numerics.deformation import deformation_gradients
+from supple.results.drawing import View, body_color
+from supple.results.recording.actions.joints import RecordedJoint
+from supple.results.recording.actions.stitches import RecordedStitches, no_stitches
+from supple.results.recording.scene import RecordedObstacle
+from supple.results.recording.skinned_surface import SkinnedSurface
+
+
+@dataclass(frozen=True, eq=False)
+class ModelBody:
+    """One body.
+
+    Attributes
+    ----------
+    name : of the body
+    vertices, tets : its rows in the arrays of the model
+    triangles : (t, 3) its boundary, numbered in the body, counter-clockwise from outside
+    skin : a finer surface that follows its tets, or None
+    number : place among the bodies, which selects the color
+    rigid : whether its vertices are the control points of a rigid body, whose surface is the skin
+    """
+
+    name: str
+    vertices: slice
+    tets: slice
+    triangles: NDArray[np.int32]
+    skin: SkinnedSurface | None
+    number: int
+    rigid: bool = False
+
+    @property
+    def color(self) -> tuple[int, int, int]:
+        """(r, g, b) from 0 to 255."""
+        return body_color(self.number)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """All data that do not change from frame to frame.
+
+    Attributes
+    ----------
+    bodies : see `ModelBody`
+    obstacles : at time 0
+    rest_positions : (n, 3) [m]; tets : (m, 4) rows of them
+    view : bounds of the motion, and the up direction
+    stitches : of all kinds
+    joints : of rigid bodies
+    """
+
+    bodies: tuple[ModelBody, ...]
+    obstacles: Sequence[RecordedObstacle]
+    rest_positions: NDArray[np.float64]
+    tets: NDArray[np.int32]
+    view: View
+    stitches: RecordedStitches = field(default_factory=no_stitches)
+    joints: tuple[RecordedJoint, ...] = ()
+
+    @cached_property
+    def surface_vertices(self) -> NDArray[np.int64]:
+        """(k,) vertices on the boundaries of all bodies, ascending."""
+        parts = [np.unique(body.triangles) + body.vertices.start for body in self.bodies]
+        return np.concatenate(parts).astype(np.int64)
+
+    @cached_property
+    def facets(self) -> Facets:
+        """The facets of all tets."""
+        return facets_of(self.tets)
+
+    @cached_property
+    def rest_shape_inverse(self) -> NDArray[np.float64]:
+        """(m, 3, 3) Dm^-1 of every tet [1/m]."""
+        corners = self.rest_positions[self.tets]
+        return np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).astype(np.float64, copy=False)
+
+    @cached_property
+    def rest_centers(self) -> NDArray[np.float64]:
+        """(m, 3) centers of the tets at rest [m]."""
+        return self.rest_positions[self.tets].sum(axis=1) / 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Triangles between tets.
+
+    Attributes
+    ----------
+    triangles : (f, 3) vertices, counter-clockwise as seen from outside of `inner`
+    inner, outer : (f,) the two tets of each; outer is -1 on the boundary
+    """
+
+    triangles: NDArray[np.int32]
+    inner: NDArray[np.int64]
+    outer: NDArray[np.int64]
+
+
+def facets_of(tets: NDArray[np.int32]) -> Facets:
+    """All facets, each one once."""
+    triangles = tets[:, TET_FACETS].reshape(-1, 3)
+    owner = np.repeat(np.arange(len(tets)), 4)
+    key = facet_keys(triangles, int(tets.max()) + 1)
+    order = np.argsort(key, kind="stable")
+    second = np.diff(key[order], prepend=-1) == 0
+    first = np.flatnonzero(~second)
+    outer = np.full(len(key), -1)
+    outer[np.flatnonzero(second) - 1] = owner[order[second]]
+    return Facets(triangles[order[first]], owner[order[first]], outer[first])
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """One frame.
+
+    Attributes
+    ----------
+    model : its constant data; time : [s]
+    positions : (n, 3) [m]; velocities : (n, 3) [m/s], or None where they are not known
+    poses : (obstacles, 3, 4) rotation and translation of each obstacle since time 0
+    contact_points : (c, 3) [m], or None where they are not known
+    contact_forces : points (c, 3) [m] and forces (c, 3) [N] of contacts, or None where they are not known
+    pinned : (p,) vertices that are pinned
+    springs : point of a body and target (3,) [m], by number of the grab
+    pusher : center (3,) and radius of a ball [m], or None
+    tet_values : values of tets (m,) that the simulation sent, by the key of their field
+    internal : (k, 11) internal variables of a recorded frame, see `State`
+    laws : the elastic laws of a recorded frame's tets; None of a live simulation, which sends what follows from them
+    """
+
+    model: Model
+    time: float
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None
+    poses: NDArray[np.float64]
+    contact_points: NDArray[np.float64] | None = None
+    contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    pinned: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
+    pusher: tuple[NDArray[np.float64], float] | None = None
+    tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    internal: NDArray[np.float64] = field(default_factory=lambda: NEVER_FLOWED)
+    laws: TetLaws | None = None
+
+    @cached_property
+    def deformation_gradients(self) -> NDArray[np.float64]:
+        """(m, 3, 3) F of every tet."""
+        return deformation_gradients(
+            np.ascontiguousarray(self.positions), self.model.tets, self.model.rest_shape_inverse
+        )
+
+    @cached_property
+    def stitch_segments(self) -> NDArray[np.float64]:
+        """(k, 2, 3) the two ends of every stitch [m]."""
+        return self.model.stitches.segments(self.finite_positions, self.poses)
+
+    @cached_property
+    def finite_positions(self) -> NDArray[np.float64]:
+        """(n, 3) [m], with zeros instead of values that are not finite, which a browser cannot read."""
+        return np.nan_to_num(self.positions, posinf=0.0, neginf=0.0)

@@ -1,0 +1,130 @@
+"""Points on the surfaces of bodies, found from points and rays in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.app.viewer.drawing.moments.model import Model, ModelBody, Moment
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoint:
+    """A point on the boundary of a body.
+
+    Attributes
+    ----------
+    body : the body
+    vertices : (3,) of the triangle that contains it, numbered in the body, or in the surface of a rigid one
+    weights : (3,) barycentric coordinates
+    place : (3,) its position [m]
+    """
+
+    body: ModelBody
+    vertices: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    place: NDArray[np.float64]
+
+    @property
+    def nearest_vertex(self) -> int:
+        """The vertex of the triangle with the largest weight, numbered in the body; 0 for a rigid one, held whole."""
+        return 0 if self.body.rigid else int(self.vertices[np.argmax(self.weights)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Triangles:
+    """The boundaries of all bodies: `corners` (t, 3, 3) [m], `vertices` (t, 3) as of `SurfacePoint`, body (t,)."""
+
+    corners: NDArray[np.float64]
+    vertices: NDArray[np.int64]
+    body: NDArray[np.int64]
+
+
+def _triangles(moment: Moment) -> _Triangles:
+    corners, vertices = [], []
+    for body in moment.model.bodies:
+        points, triangles = moment.finite_positions[body.vertices], body.triangles
+        if body.rigid and body.skin is not None:
+            points, triangles = body.skin.positions(points), body.skin.triangles
+        corners.append(points[triangles])
+        vertices.append(triangles.astype(np.int64))
+    owners = np.repeat(np.arange(len(vertices)), [len(rows) for rows in vertices])
+    return _Triangles(np.concatenate(corners), np.concatenate(vertices), owners)
+
+
+def nearest_surface_point(moment: Moment, place: ArrayLike) -> SurfacePoint:
+    """The point on any boundary that is nearest to a point (3,) [m]."""
+    from trimesh.triangles import closest_point
+
+    triangles = _triangles(moment)
+    query = np.asarray(place, dtype=np.float64)
+    points = closest_point(triangles.corners, np.broadcast_to(query, (len(triangles.corners), 3)))
+    nearest = int(np.argmin(np.linalg.norm(points - query, axis=1)))
+    return _on_triangle(moment.model, triangles, nearest, points[nearest])
+
+
+def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
+    """The first intersection of a ray from `origin` (3,) in `direction` (3,) with any boundary, or None."""
+    triangles = _triangles(moment)
+    hit = first_hit(triangles.corners, origin, direction)
+    if hit is None:
+        return None
+    place = np.asarray(origin, dtype=np.float64) + hit[1] * np.asarray(direction)
+    return _on_triangle(moment.model, triangles, hit[0], place)
+
+
+def first_hit(corners: NDArray[np.float64], origin: ArrayLike, direction: ArrayLike) -> tuple[int, float] | None:
+    """The triangle of `corners` (t, 3, 3) that a ray meets first, and the multiple of `direction` to it, or None.
+
+    Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997).
+    """
+    a, b, c = (corners[:, k] for k in range(3))
+    start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+    h = np.cross(along, c - a)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        inverse = 1.0 / np.einsum("ij,ij->i", b - a, h)
+        u = inverse * np.einsum("ij,ij->i", start - a, h)
+        q = np.cross(start - a, b - a)
+        v = inverse * (q @ along)
+        t = inverse * np.einsum("ij,ij->i", c - a, q)
+        met = np.isfinite(t) & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (t > 0.0)
+    if not met.any():
+        return None
+    first = int(np.argmin(np.where(met, t, np.inf)))
+    return first, float(t[first])
+
+
+def _on_triangle(model: Model, triangles: _Triangles, row: int, place: NDArray[np.float64]) -> SurfacePoint:
+    from trimesh.triangles import points_to_barycentric
+
+    corners = triangles.corners[row]
+    with np.errstate(all="ignore"):
+        weights = points_to_barycentric(corners[None], place[None], method="cross")[0]
+    if not np.isfinite(weights).all():  # a triangle without area
+        weights = (np.arange(3) == np.argmin(np.linalg.norm(corners - place, axis=1))).astype(np.float64)
+    weights = np.clip(weights, 0.0, 1.0)
+    return SurfacePoint(model.bodies[triangles.body[row]], triangles.vertices[row], weights / weights.sum(), place)
+
+
+def point_on_camera_plane(
+    eye: ArrayLike, toward: ArrayLike, look: ArrayLike, through: ArrayLike
+) -> NDArray[np.float64] | None:
+    """Intersection of the line from the eye (3,) to a point (3,) with the plane through a point that faces the camera.
+
+    Parameters
+    ----------
+    look : (3,) viewing direction of the camera; through : (3,) a point of the plane
+
+    Returns
+    -------
+    (3,) [m], or None where there is no intersection in front of the eye.
+    """
+    start, along, normal = (np.asarray(v, dtype=np.float64) for v in (eye, toward, look))
+    along = along - start
+    slope = float(along @ normal)
+    reach = float((np.asarray(through, dtype=np.float64) - start) @ normal)
+    if slope * reach <= 0.0:
+        return None
+    return start + reach / slope * along

@@ -1,0 +1,111 @@
+"""Describes a live scene for the page: its description, and the measures of a snapshot."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.app.viewer.engine.scene.live_scene import LiveScene
+from supple.app.viewer.engine.scene.solvers import kind_of, solver_values
+from supple.app.viewer.protocol.parameters import PARAMETERS, Value
+from supple.app.viewer.protocol.snapshots import RIGID, BodyDescription, Measures, SceneDescription
+from supple.model.diagnostics import measure
+from supple.model.state import State
+from supple.model.system import BodyRange, System
+from supple.results.readings.joint_readings import joint_readings
+from supple.results.recording.actions.joints import joints_of
+from supple.results.recording.actions.stitches import recorded_stitches
+from supple.results.recording.scene import RecordedObstacle
+from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.rigid.rigid_body import RigidBody
+from supple.solvers.xpbd.details import XPBDDetails
+
+
+def describe(live: LiveScene) -> SceneDescription:
+    """All properties of the scene that do not change from frame to frame."""
+    system, setup = live.system, live.setup
+    gravity = -float(np.asarray(setup.scene.gravity) @ live.up)
+    positions = system.points.positions(live.state.positions)
+    return SceneDescription(
+        generation=live.generation,
+        revision=live.revision,
+        bodies=tuple(_body(part, system.masses, setup.added) for part in system.bodies),
+        obstacles=tuple(_obstacle(obstacle) for obstacle in system.obstacles),
+        solver=kind_of(setup.solver),
+        values={**solver_values(setup.solver), "dt": setup.dt, "gravity": gravity},
+        up=live.up,
+        low=positions.min(axis=0),
+        high=positions.max(axis=0),
+        stitches=recorded_stitches(system),
+        n_vertices=len(live.state.positions),
+        n_tets=len(system.tets),
+        n_constraints=sum(int(made.count) for made in getattr(live.workspace, "sets", ())),
+        joints=joints_of(system),
+    )
+
+
+def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -> BodyDescription:
+    body = part.body
+    skin = body.skin
+    return BodyDescription(
+        name=body.name,
+        vertices=part.vertices,
+        tet_rows=part.tets,
+        rest_positions=body.mesh.vertices,
+        triangles=body.mesh.surface.triangles.astype(np.int32),
+        nodes=body.mesh.nodes.astype(np.int32),
+        skin=None if skin is None else (skin.vertices, skin.triangles.astype(np.int32)),
+        material=RIGID if isinstance(body, RigidBody) else type(body.material).__name__,
+        values={"friction": body.friction, **({} if isinstance(body, RigidBody) else _material_values(body.material))},
+        mass=float(masses[part.vertices].sum()),
+        added=body.name in added,
+    )
+
+
+def _material_values(material: Any) -> dict[str, Value]:
+    """The parameters of the material that a page can change: those that are one number."""
+    values: dict[str, Value] = {}
+    for field in fields(material):
+        value = getattr(material, field.name)
+        if field.name in PARAMETERS and np.ndim(value) == 0:
+            values[field.name] = float(value)
+    return values
+
+
+def _obstacle(obstacle: Obstacle) -> RecordedObstacle:
+    mesh, name = obstacle.surface_mesh, obstacle.name or obstacle.label
+    vertices = np.zeros((0, 3)) if mesh is None else mesh.vertices
+    triangles = np.zeros((0, 3), dtype=np.int32) if mesh is None else mesh.triangles.astype(np.int32)
+    parameters = {"friction": obstacle.friction, **obstacle.values()}
+    return RecordedObstacle(name, type(obstacle).__name__, parameters, vertices, triangles)
+
+
+def measures(live: LiveScene) -> Measures:
+    """The numbers of the present state, and of the last step."""
+    report, details = live.report, live.report.details
+    return Measures(
+        **vars(measure(live.system, live.state)),
+        status=str(report.status),
+        message=report.message,
+        spin=np.array([spin(live.system, part, live.state) for part in live.system.bodies]),
+        contacts=details.contacts,
+        min_distance=details.smallest_gap if isinstance(details, XPBDDetails) else report.min_distance,
+        iterations=int(report.iterations),
+        joints=joint_readings(details),
+    )
+
+
+def spin(system: System, part: BodyRange, state: State) -> NDArray[np.float64]:
+    """(3,) angular velocity of a body about its center of mass [rad/s]: I w = L."""
+    m, x, v = system.masses[part.vertices], state.positions[part.vertices], state.velocities[part.vertices]
+    M = m.sum()
+    r = x - m @ x / M
+    L = m @ np.cross(r, v - m @ v / M)
+    S = (r * m[:, None]).T @ r
+    inertia = np.trace(S) * np.eye(3) - S
+    if not np.isfinite(inertia).all() or np.linalg.cond(inertia) > 1e12:
+        return np.zeros(3)
+    return np.linalg.solve(inertia, L)

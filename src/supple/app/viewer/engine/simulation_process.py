@@ -1,0 +1,63 @@
+"""The main function of the simulation process: connects the pipes with the loop."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import os
+import signal
+import threading
+from multiprocessing.connection import Connection
+
+from supple.app.viewer.protocol.command_queue import CommandQueue
+from supple.app.viewer.protocol.live_source import LiveSource
+from supple.errors import SuppleError
+
+
+def run_simulation(source: LiveSource, commands: Connection, snapshots: Connection, log_level: int) -> None:
+    """Simulate until the other end of `commands` is closed, by `Engine.close` or by the end of the page's process."""
+    # Ctrl-C in a terminal reaches both processes; the process of the page ends this one.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    logging.basicConfig(level=log_level, format="%(levelname)s: %(message)s")
+    inbox = CommandQueue()
+    threading.Thread(target=_read, args=(commands, inbox), name="inbox", daemon=True).start()
+
+    import numba
+
+    from supple.runtime.threads import numba_threads
+
+    # One core is left to the page and the browser: a kernel waits long for a thread that does not get a core.
+    with numba_threads(max(1, numba.get_num_threads() - 1)):
+        _simulate(source, inbox, snapshots)
+
+
+def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) -> None:
+    from supple.app.viewer.engine.pulse import report_long_steps
+    from supple.app.viewer.engine.scene.live_scene import LiveScene
+    from supple.app.viewer.engine.simulation_loop import SimulationLoop
+    from supple.app.viewer.protocol.outbox import ERROR, Outbox, packed
+
+    try:
+        live = LiveScene(source)
+        live.warm_up()
+        # Otherwise a collection looks at the objects of all loaded libraries, for a tenth of a second or more.
+        gc.freeze()
+    except (SuppleError, MemoryError) as error:
+        snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
+        return
+    loop = SimulationLoop(live, inbox, Outbox(snapshots))
+    report_long_steps(loop.watch, loop.outbox)
+    loop.run()
+
+
+def _read(commands: Connection, inbox: CommandQueue) -> None:
+    while True:
+        try:
+            inbox.put_all(commands.recv())
+        except (EOFError, OSError):
+            break
+        except Exception:
+            logging.getLogger(__name__).exception("commands could not be read")
+    inbox.close()
+    # The loop may be within a long step, and its result is not needed.
+    os._exit(0)

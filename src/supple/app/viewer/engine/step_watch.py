@@ -1,0 +1,65 @@
+"""Gives up a step that takes too long: a solver may need minutes where a person waits for an answer."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from supple.app.viewer.engine.compile_clock import CompileClock
+from supple.app.viewer.protocol.snapshots import Progress
+from supple.errors import SolverError
+from supple.runtime.interruption import interruptible
+
+
+class StepWatch:
+    """Ends a computation by an exception once it takes too long, at the next interruption point of the solver.
+
+    Solvers create new states and do not change old ones. After an interruption only the workspace has to be prepared
+    again. The time in which kernels are compiled does not count: an interrupted compilation would start from zero.
+
+    Parameters
+    ----------
+    longest : limit for one step [s].
+    is_awaited, longest_awaited : whether a person waits for the end of the step, and the limit in this case [s].
+    """
+
+    def __init__(
+        self, longest: float, is_awaited: Callable[[], bool] = lambda: False, longest_awaited: float = 1.0
+    ) -> None:
+        self.longest, self.longest_awaited = longest, longest_awaited
+        self._is_awaited = is_awaited
+        self._compiled = CompileClock()
+        self._began: float | None = None
+        self._rounds = 0
+
+    @contextmanager
+    def limited(self, at_each: Callable[[], None] = lambda: None) -> Iterator[None]:
+        """A block that ends with a `SolverError` where it takes too long; `at_each` is called where it could end."""
+        began, compiled = time.monotonic(), self._compiled.seconds
+        self._began, self._rounds = began, 0
+
+        def check() -> None:
+            self._rounds += 1
+            seconds = time.monotonic() - began - (self._compiled.seconds - compiled)
+            if seconds > self.longest or (seconds > self.longest_awaited and self._is_awaited()):
+                raise SolverError(f"given up after {seconds:.1f} s")
+            at_each()
+
+        try:
+            with interruptible(check):
+                yield
+        finally:
+            self._began = None
+
+    @property
+    def progress(self) -> Progress | None:
+        """Of the present computation; None where there is none. Another thread may ask."""
+        running = self._began is not None
+        return Progress(self.seconds, self._rounds, self._compiled.running) if running else None
+
+    @property
+    def seconds(self) -> float:
+        """Of the present computation so far [s]; 0 where there is none."""
+        began = self._began
+        return 0.0 if began is None else time.monotonic() - began

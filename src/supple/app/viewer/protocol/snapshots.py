@@ -1,0 +1,220 @@
+"""What the simulation sends to the page: a description of the scene, and snapshots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.app.viewer.protocol.parameters import Value
+from supple.model.diagnostics import Diagnostics
+from supple.results.readings.joint_readings import JointReading
+from supple.results.recording.actions.joints import RecordedJoint
+from supple.results.recording.actions.stitches import RecordedStitches
+from supple.results.recording.scene import RecordedObstacle
+
+RIGID = "rigid"  # in place of a material
+PUSHER = "pusher"  # name of the obstacle that the mouse moves
+
+
+@dataclass(frozen=True, eq=False)
+class BodyDescription:
+    """One body. `vertices` and `tet_rows` are its rows in the arrays of a snapshot.
+
+    Attributes
+    ----------
+    vertices, tet_rows : slices of a snapshot's `positions` and `tet_values`
+    rest_positions : (n, 3) in the coordinates of the mesh [m]
+    triangles : (t, 3) surface, counter-clockwise from outside; nodes : (m, 4) or (m, 10) of the tets; both numbered
+        from 0 in the body
+    skin : vertices (s, 3) in the coordinates of the mesh [m] and triangles (u, 3) of the finer surface, or None
+    material : name of its class, or `RIGID`; values : of the parameters that a page can change, by name
+    mass : [kg]
+    added : whether it was added on the page
+    """
+
+    name: str
+    vertices: slice
+    tet_rows: slice
+    rest_positions: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    nodes: NDArray[np.int32]
+    skin: tuple[NDArray[np.float64], NDArray[np.int32]] | None
+    material: str
+    values: dict[str, Value]
+    mass: float
+    added: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class SceneDescription:
+    """Everything that does not change from frame to frame.
+
+    Attributes
+    ----------
+    obstacles : at time 0; `Snapshot.obstacle_poses` transforms them to other times
+    generation : changes where bodies or obstacles are added or removed; the page then has to draw all of them again
+    revision : changes with every change, also of a parameter or of the solver
+    solver : "xpbd" or "implicit"; values : of the parameters of solver and scene, by name
+    up : (3,) unit vector against gravity
+    low, high : (3,) corners of the bounding box of the bodies at the start [m]
+    stitches : of all kinds
+    joints : of rigid bodies
+    n_vertices, n_tets, n_constraints : of the whole scene; constraints are the solver's, 0 where it has none
+    """
+
+    generation: int
+    revision: int
+    bodies: tuple[BodyDescription, ...]
+    obstacles: tuple[RecordedObstacle, ...]
+    solver: str
+    values: dict[str, Value]
+    up: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    stitches: RecordedStitches
+    n_vertices: int
+    n_tets: int
+    n_constraints: int
+    joints: tuple[RecordedJoint, ...] = ()
+
+    def body(self, name: str) -> BodyDescription:
+        """The body of that name; raises `KeyError` where there is none."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class GrabState:
+    """A spring to draw: from `point` (3,) on the body to `target` (3,) [m]; `body` is its name."""
+
+    grab: int
+    body: str
+    point: tuple[float, float, float]
+    target: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A line of text for the page. Numbers increase, so that each notice appears once. `level` is "info" or "error"."""
+
+    number: int
+    level: str
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Measures(Diagnostics):
+    """Numbers of one frame, for the panel.
+
+    Attributes
+    ----------
+    status, message : of the last step, see `supple.model.state.Status`
+    spin : (bodies, 3) angular velocity of each body about its own center of mass [rad/s]
+    contacts : number of active contacts; min_distance : smallest gap [m] or None
+    iterations : of the last step
+    joints : what joints do, by name
+    """
+
+    status: str
+    message: str
+    spin: NDArray[np.float64]
+    contacts: int
+    min_distance: float | None
+    iterations: int
+    joints: Mapping[str, JointReading] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Timing:
+    """The speed of the simulation, measured over the last second.
+
+    Attributes
+    ----------
+    step_ms : wall-clock time of one step [ms]
+    frames_per_second : steps simulated in a second of wall-clock time
+    real_time_ratio : simulated time over wall-clock time; 1 is real time
+    keeps_up : whether this ratio reaches the requested speed (within a tenth)
+    """
+
+    step_ms: float = 0.0
+    frames_per_second: float = 0.0
+    real_time_ratio: float = 0.0
+    keeps_up: bool = True
+
+
+@dataclass(frozen=True)
+class Progress:
+    """A step that takes long.
+
+    Attributes
+    ----------
+    seconds : since it began; rounds : substeps or Newton iterations so far
+    compiling : whether kernels are compiled now
+    """
+
+    seconds: float
+    rounds: int = 0
+    compiling: bool = False
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What one sensor, cavity or cable reads. `unit` is that of `value`."""
+
+    name: str
+    unit: str
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The simulation at one time.
+
+    Attributes
+    ----------
+    description : of the scene that this snapshot belongs to
+    frame : steps since the start or the last reset; time : simulated [s]
+    positions : (n, 3) of all bodies [m]
+    obstacle_poses : rotations (k, 3, 3) and translations (k, 3) [m] of the obstacles
+    pinned : (p,) global vertices that are pinned
+    grabs : springs that pull; pusher : center (3,) and radius of the ball [m], or None
+    paused : whether the time is stopped; speed : see `SetSpeed`
+    measures, timing : numbers for the panel
+    notices : the newest ones; see `Notice`
+    applied : number of the newest command that was executed, see `Engine.send`
+    velocities : (n, 3) [m/s], tet_values : (m,), contact_points : (c, 3) [m], where `SetView` requests them
+    contact_forces : points (c, 3) [m] and forces (c, 3) [N] of the strongest contacts, each on the first of its two
+        bodies, where `SetView` requests contacts and the solver knows them
+    readings : of sensors, cavities and cables
+    tet_quantity : the quantity of `tet_values`: "J", "von_mises", "energy" or None
+    """
+
+    description: SceneDescription
+    frame: int
+    time: float
+    positions: NDArray[np.float64]
+    obstacle_poses: tuple[NDArray[np.float64], NDArray[np.float64]]
+    pinned: NDArray[np.int32]
+    grabs: tuple[GrabState, ...]
+    pusher: tuple[tuple[float, float, float], float] | None
+    paused: bool
+    speed: float
+    measures: Measures
+    timing: Timing
+    notices: tuple[Notice, ...] = ()
+    applied: int = 0
+    velocities: NDArray[np.float64] | None = None
+    tet_values: NDArray[np.float64] | None = None
+    tet_quantity: str | None = None
+    contact_points: NDArray[np.float64] | None = None
+    contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    readings: tuple[Reading, ...] = ()
+
+    def body_positions(self, name: str) -> NDArray[np.float64]:
+        """(n, 3) of one body [m]."""
+        return self.positions[self.description.body(name).vertices]

@@ -1,0 +1,164 @@
+"""The energy of a barrier over contacts, with its derivatives by the points of the surfaces.
+
+    E = kappa sum_k a_k e(d_k)
+
+with the areas a_k, and e as in `barrier_function`. Areas are not differentiated.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.barrier.barrier_function import barrier_slopes, barrier_value
+from supple.contact.barrier.pair_hessian import write_pair_hessian
+from supple.contact.features.contacts import Contacts
+from supple.contact.features.pair_geometry import EDGE_EDGE, point_count
+from supple.numerics.mat3 import row
+from supple.numerics.sparse.couplings import Couplings
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
+
+# Contacts from which a second thread pays.
+_PARALLEL_FROM = 300
+
+
+@njit(cache=True, error_model="numpy")
+def barrier_energy(contacts, dhat, stiffness):
+    """E [J]; stiffness : kappa [Pa]."""
+    _, _, _, _, distances, weights = contacts
+    total = 0.0
+    for k in range(len(distances)):
+        total += weights[k] * barrier_value(distances[k], dhat)
+    return stiffness * total
+
+
+@njit(cache=True, error_model="numpy")
+def barrier_forces(contacts, dhat, stiffness):
+    """(k,) normal forces -dE/dd [N], zero or more."""
+    _, _, _, _, distances, weights = contacts
+    out = np.empty(len(distances))
+    for k in range(len(distances)):
+        out[k] = -stiffness * weights[k] * barrier_slopes(distances[k], dhat)[0]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def add_barrier_gradient(contacts, dhat, stiffness, out):
+    """Add the gradient by the points [N] to `out` (s, 3)."""
+    kinds, points, coefficients, vectors, distances, weights = contacts
+    for k in range(len(distances)):
+        size = stiffness * weights[k] * barrier_slopes(distances[k], dhat)[0] / distances[k]
+        for i in range(point_count(kinds[k])):
+            for j in range(3):
+                out[points[k, i], j] += size * coefficients[k, i] * vectors[k, j]
+
+
+def barrier_hessian(
+    x: NDArray[np.float64], contacts: Contacts, dhat: float, stiffness: float, project: bool
+) -> Couplings:
+    """The Hessian by the points x (s, 3) [N/m]; with `project`, larger and positive semi-definite."""
+    start = block_starts(contacts.kinds)
+    rows, columns = block_points(contacts.kinds, contacts.points, start)
+    blocks = np.empty((start[-1], 3, 3))
+    with threads_for(len(contacts.kinds), _PARALLEL_FROM):
+        _write_hessians(x, contacts, start, dhat, stiffness, project, blocks)
+    return Couplings(rows, columns, blocks)
+
+
+@njit(cache=True, error_model="numpy")
+def block_starts(kinds):
+    """(k + 1,) where the blocks of each contact begin: one for each unordered pair of its points."""
+    start = np.zeros(len(kinds) + 1, dtype=np.int64)
+    for k in range(len(kinds)):
+        count = point_count(kinds[k])
+        start[k + 1] = start[k] + count * (count + 1) // 2
+    return start
+
+
+@njit(cache=True, error_model="numpy")
+def block_points(kinds, points, start):
+    """Rows and columns (t,) of the blocks (i, j), i <= j, of contacts."""
+    rows = np.empty(start[-1], dtype=np.int32)
+    columns = np.empty(start[-1], dtype=np.int32)
+    b = 0
+    for k in range(len(kinds)):
+        count = point_count(kinds[k])
+        for i in range(count):
+            for j in range(i, count):
+                rows[b], columns[b] = points[k, i], points[k, j]
+                b += 1
+    return rows, columns
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _write_hessians(x, contacts, start, dhat, stiffness, project, out):
+    kinds, _, _, _, _, weights = contacts
+    for k in prange(len(kinds)):
+        follows = k > 0 and kinds[k - 1] == EDGE_EDGE and weights[k] < 0.0
+        followed = k + 1 < len(kinds) and kinds[k] == EDGE_EDGE and weights[k + 1] < 0.0
+        if project and follows:
+            out[start[k] : start[k + 1]] = 0.0  # part of the matrix of the one before
+        elif project and followed:
+            _write_joint_hessian(x, contacts, k, dhat, stiffness, out[start[k] : start[k + 1]])
+        else:
+            _write_hessian(x, contacts, k, dhat, stiffness, project, out, start[k])
+
+
+@njit(error_model="numpy")
+def _write_hessian(x, contacts, k, dhat, stiffness, project, out, first):
+    """The blocks (i, j), i <= j, of contact k."""
+    kinds, points, coefficients, vectors, distances, weights = contacts
+    c = (coefficients[k, 0], coefficients[k, 1], coefficients[k, 2], coefficients[k, 3])
+    # Points that the kind does not have are ignored; any row may stand for them.
+    stencil = (row(x, points[k, 0]), row(x, points[k, 1]), row(x, points[k, 2]), row(x, points[k, 3]))
+    slope, curvature = barrier_slopes(distances[k], dhat)
+    size = stiffness * weights[k]
+    slopes = (size * slope, size * curvature)
+    write_pair_hessian(kinds[k], c, row(vectors, k), distances[k], stencil, slopes, project, out, first)
+
+
+@njit(error_model="numpy")
+def _write_joint_hessian(x, contacts, k, dhat, stiffness, out):
+    """The positive part of the sum of two edges and of their nearest end, contact k + 1, whose energy is taken away.
+
+    Most of both cancels where the closest points are near that end. The positive parts of each would remain, and be
+    many times too stiff.
+    """
+    kinds, points, _, _, _, _ = contacts
+    blocks = np.empty((10, 3, 3))
+    dense = np.zeros((12, 12))
+    for m in range(k, k + 2):
+        _write_hessian(x, contacts, m, dhat, stiffness, False, blocks, 0)
+        b = 0
+        for i in range(point_count(kinds[m])):
+            p = _place(points, k, points[m, i])
+            for j in range(i, point_count(kinds[m])):
+                q = _place(points, k, points[m, j])
+                for u in range(3):
+                    for v in range(3):
+                        dense[3 * p + u, 3 * q + v] += blocks[b, u, v]
+                        if p != q:
+                            dense[3 * q + v, 3 * p + u] += blocks[b, u, v]
+                b += 1
+    values, modes = np.linalg.eigh(dense)
+    b = 0
+    for i in range(4):
+        for j in range(i, 4):
+            for u in range(3):
+                for v in range(3):
+                    total = 0.0
+                    for m in range(12):
+                        if values[m] > 0.0:
+                            total += modes[3 * i + u, m] * values[m] * modes[3 * j + v, m]
+                    out[b, u, v] = total
+            b += 1
+
+
+@njit(error_model="numpy")
+def _place(points, k, point):
+    """Which of the points of contact k a point is."""
+    for i in range(4):
+        if points[k, i] == point:
+            return i
+    return -1

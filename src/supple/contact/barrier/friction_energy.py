@@ -1,0 +1,191 @@
+"""Lagged, smoothed Coulomb friction of contacts.
+
+    E = sum_k f_k F(|u_k|),  u = T sum_i c_i (x_i - o_i),  T = I - n n^T
+
+with the largest forces f_k = mu lambda, the coefficients c and normals n of the contacts at an earlier state, and the
+points o at the beginning of the step. F' rises smoothly from 0 to 1 at the displacement `reach`:
+
+    F(y) = y^2 / e - y^3 / (3 e^2) + e / 3  for y < e, else y
+
+The gradient by u is f p with p = F'(|u|) u / |u|. Where a contact slides, the Hessian is zero along the slip, so that
+Newton's steps overshoot the band in which it sticks by a thousand times its width. Primal-dual steps do not: p is a
+second unknown, w, and the equation
+
+    w / r(|u|) - u = 0,    r(y) = F'(y) / y
+
+is linearized in both. Eliminating the change of w leaves f (r I + r' / (r |u|) w u^T) T, made symmetric, in the place
+of the Hessian. It is positive semi-definite for |w| <= 1, the exact Hessian for w = p, and the majorizer of
+iteratively reweighted least squares for w = 0.
+
+Sources: Li et al., "Incremental Potential Contact" (2020), section 5; Chan, Golub, Mulet, "A Nonlinear Primal-Dual
+Method for Total Variation-Based Image Restoration" (1999), sections 3 and 4.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.barrier.barrier_energy import block_points, block_starts
+from supple.contact.features.pair_geometry import point_count
+from supple.numerics.sparse.couplings import Couplings
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
+
+# Contacts from which a second thread pays.
+_PARALLEL_FROM = 300
+
+
+class Slips(NamedTuple):
+    """Arrays of k contacts with friction; kernels take it as it is.
+
+    Attributes
+    ----------
+    kinds : (k,) int8; points : (k, 4) int32; coefficients : (k, 4), see `Contacts`
+    normals : (k, 3) unit vectors
+    offsets : (k, 3) sum_i c_i o_i, the relative position at which the contact has not slipped [m]
+    forces : (k,) mu lambda [N]
+    """
+
+    kinds: NDArray[np.int8]
+    points: NDArray[np.int32]
+    coefficients: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    forces: NDArray[np.float64]
+
+
+@njit(error_model="numpy")
+def friction_potential(y, e):
+    """F(y) [m]"""
+    return y if y >= e else y * y / e * (1.0 - y / (3.0 * e)) + e / 3.0
+
+
+@njit(error_model="numpy")
+def friction_ratio(y, e):
+    """r(y) = F'(y) / y [1/m]"""
+    return 1.0 / y if y >= e else (2.0 - y / e) / e
+
+
+@njit(error_model="numpy")
+def ratio_slope(y, e):
+    """r'(y) / (r(y) y) [1/m^2], not positive; 0 at y = 0, where it is multiplied by zero."""
+    if y == 0.0:
+        return 0.0
+    return -1.0 / (y * y) if y >= e else -1.0 / (y * (2.0 * e - y))
+
+
+@njit(error_model="numpy")
+def slip_of(x, slips, k):
+    """u [m] of contact k."""
+    kinds, points, coefficients, normals, offsets, _ = slips
+    a = b = c = 0.0
+    for i in range(point_count(kinds[k])):
+        a += coefficients[k, i] * x[points[k, i], 0]
+        b += coefficients[k, i] * x[points[k, i], 1]
+        c += coefficients[k, i] * x[points[k, i], 2]
+    a, b, c = a - offsets[k, 0], b - offsets[k, 1], c - offsets[k, 2]
+    n = (normals[k, 0], normals[k, 1], normals[k, 2])
+    along = a * n[0] + b * n[1] + c * n[2]
+    return (a - along * n[0], b - along * n[1], c - along * n[2])
+
+
+@njit(cache=True, error_model="numpy")
+def friction_energy(x, slips, reach):
+    """E at x (s, 3) [J]."""
+    total = 0.0
+    for k in range(len(slips[0])):
+        u = slip_of(x, slips, k)
+        total += slips[5][k] * friction_potential((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def add_friction_gradient(x, slips, reach, out):
+    """Add the gradient [N] to `out` (s, 3)."""
+    kinds, points, coefficients, _, _, forces = slips
+    for k in range(len(kinds)):
+        u = slip_of(x, slips, k)
+        size = forces[k] * friction_ratio((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
+        for i in range(point_count(kinds[k])):
+            for j in range(3):
+                out[points[k, i], j] += size * coefficients[k, i] * u[j]
+
+
+@njit(cache=True, error_model="numpy")
+def slip_forces(x, slips, reach):
+    """(k, 3) the force of friction on the first side of every contact [N]."""
+    out = np.empty((len(slips[0]), 3))
+    for k in range(len(out)):
+        u = slip_of(x, slips, k)
+        size = -slips[5][k] * friction_ratio((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
+        for j in range(3):
+            out[k, j] = size * u[j]
+    return out
+
+
+def friction_hessian(x: NDArray[np.float64], slips: Slips, reach: float, duals: NDArray[np.float64]) -> Couplings:
+    """The matrix of a primal-dual step at x (s, 3), positive semi-definite [N/m].
+
+    Parameters
+    ----------
+    duals : (k, 3) w, in the contacts' planes, none longer than 1; see the module
+    """
+    start = block_starts(slips.kinds)
+    rows, columns = block_points(slips.kinds, slips.points, start)
+    blocks = np.empty((start[-1], 3, 3))
+    with threads_for(len(slips.kinds), _PARALLEL_FROM):
+        _write_hessians(x, slips, start, reach, duals, blocks)
+    return Couplings(rows, columns, blocks)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _write_hessians(x, slips, start, reach, duals, out):
+    kinds, _, coefficients, normals, _, forces = slips
+    for k in prange(len(kinds)):
+        u = slip_of(x, slips, k)
+        y = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5
+        across = friction_ratio(y, reach)
+        along = 0.5 * ratio_slope(y, reach)
+        count = point_count(kinds[k])
+        b = start[k]
+        for i in range(count):
+            for j in range(i, count):
+                size = forces[k] * coefficients[k, i] * coefficients[k, j]
+                for p in range(3):
+                    for q in range(3):
+                        entry = along * (duals[k, p] * u[q] + u[p] * duals[k, q])
+                        entry -= across * normals[k, p] * normals[k, q]
+                        out[b, p, q] = size * (entry + across if p == q else entry)
+                b += 1
+
+
+@njit(cache=True, error_model="numpy")
+def renew_duals(x, way, slips, reach, duals):
+    """Overwrite the duals (k, 3) by those at the end of a primal-dual step from x along all of `way` (s, 3).
+
+    They are the forces, as shares of the largest ones, that the matrix of the step predicts, cut to the length 1.
+    """
+    kinds, points, coefficients, normals, _, _ = slips
+    for k in range(len(kinds)):
+        u = slip_of(x, slips, k)
+        y = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5
+        across, along = friction_ratio(y, reach), 0.5 * ratio_slope(y, reach)
+        a = b = c = 0.0
+        for i in range(point_count(kinds[k])):
+            a += coefficients[k, i] * way[points[k, i], 0]
+            b += coefficients[k, i] * way[points[k, i], 1]
+            c += coefficients[k, i] * way[points[k, i], 2]
+        high = a * normals[k, 0] + b * normals[k, 1] + c * normals[k, 2]
+        d = (a - high * normals[k, 0], b - high * normals[k, 1], c - high * normals[k, 2])
+        by_slip = along * (u[0] * d[0] + u[1] * d[1] + u[2] * d[2])
+        by_dual = along * (duals[k, 0] * d[0] + duals[k, 1] * d[1] + duals[k, 2] * d[2])
+        length = 0.0
+        for p in range(3):
+            duals[k, p] = across * (u[p] + d[p]) + by_slip * duals[k, p] + by_dual * u[p]
+            length += duals[k, p] * duals[k, p]
+        if length > 1.0:
+            for p in range(3):
+                duals[k, p] /= length**0.5

@@ -1,0 +1,137 @@
+"""The contacts of surfaces at given positions: of vertices first, then of edges."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.features.contacts import Contacts
+from supple.contact.features.edge_contacts import (
+    edge_ends,
+    edge_weights,
+    saddle_weights,
+    write_edge_contacts,
+)
+from supple.contact.features.known_weights import KnownWeights
+from supple.contact.features.vertex_contacts import REACH, write_vertex_contacts
+from supple.contact.features.vertex_features import alternating_sums, grouped, near_features
+from supple.contact.mesh.contact_mesh import ContactMesh
+from supple.runtime.threads import threads_for
+
+# Pairs from which a second thread pays.
+_PARALLEL_FROM = 2000
+
+
+class Found(NamedTuple):
+    """What `ContactSet.of` has found.
+
+    Attributes
+    ----------
+    contacts : those with a weight
+    least : the smallest distance of the pairs, infinite where none is below `REACH` dhat [m]
+    new : what is to be known where the search goes on, in any order
+    planes : codes of the pairs that may count with a plane, for `KnownWeights`
+    """
+
+    contacts: Contacts
+    least: float
+    new: KnownWeights
+    planes: NDArray[np.int64]
+
+
+class ContactSet:
+    """Finds the contacts among given pairs.
+
+    Parameters
+    ----------
+    dhat : [m] contacts are nearer than this
+    """
+
+    def __init__(self, mesh: ContactMesh, dhat: float) -> None:
+        self.dhat = dhat
+        self._mesh = mesh
+        self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors)
+        self._of_sums = (mesh.triangles, mesh.edges, mesh.triangle_edges, *mesh.vertex_triangles, mesh.owner)
+        self._of_edges = (mesh.triangles, mesh.edges, *mesh.edge_triangles)
+
+    def of(
+        self,
+        x: NDArray[np.float64],
+        vertex_triangle: NDArray[np.int32],
+        edge_edge: NDArray[np.int32],
+        known: KnownWeights,
+    ) -> Found:
+        """The contacts at x (s, 3).
+
+        Parameters
+        ----------
+        vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than `REACH` dhat
+        known : the weights that do not depend on x
+        """
+        if not len(vertex_triangle) and not len(edge_edge):
+            return _NOTHING
+        mesh, dhat, reach = self._mesh, self.dhat, REACH * self.dhat
+        triangles, edges = mesh.triangles, mesh.edges
+        with threads_for(len(vertex_triangle) + len(edge_edge), _PARALLEL_FROM):
+            features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
+            areas, edge_squares, edge_keys, edges_grown = edge_weights(
+                x, edge_edge, self._of_edges, mesh.edge_areas, dhat, known
+            )
+            rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
+            codes, signs, counts, shares = alternating_sums(
+                x, vertex_triangle, features, squares, rows, start, self._of_sums, known, reach
+            )
+            starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
+            count = int(starts[-1, 1])
+            crossing, ends = edge_ends(x, edge_edge, areas, edges)
+            saddles = saddle_weights(edge_edge, areas, crossing, ends, edges, len(x))
+            out = _empty(count + 2 * len(crossing))
+            keys, planes, grown = np.empty(count, np.int64), np.empty(count, np.int32), np.empty(count)
+            write_vertex_contacts(
+                x,
+                vertex_triangle,
+                rows,
+                starts,
+                codes,
+                signs,
+                shares,
+                self._of_vertices,
+                mesh.owner,
+                mesh.areas,
+                saddles,
+                dhat,
+                known,
+                out,
+                keys,
+                planes,
+                grown,
+            )
+        write_edge_contacts(x, edge_edge, areas, crossing, ends, edges, count, out)
+        least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
+        new = _new(keys, grown, planes).with_more(_new(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32)))
+        counted = (out.weights != 0.0) & (out.distances < dhat)
+        if not counted.all():
+            out = out.where(counted)
+        return Found(out, float(np.sqrt(least)), new, keys[planes >= 0])
+
+
+def _new(keys: NDArray[np.int64], grown: NDArray[np.float64], planes: NDArray[np.int32]) -> KnownWeights:
+    """Of the pairs that are to be known, those with `grown` zero or more."""
+    chosen = grown >= 0.0
+    return KnownWeights(keys[chosen], grown[chosen], planes[chosen])
+
+
+def _empty(count: int) -> Contacts:
+    return Contacts(
+        np.empty(count, dtype=np.int8),
+        np.empty((count, 4), dtype=np.int32),
+        np.empty((count, 4)),
+        np.empty((count, 3)),
+        np.empty(count),
+        np.empty(count),
+    )
+
+
+_NOTHING = Found(_empty(0), np.inf, KnownWeights.none(), np.zeros(0, dtype=np.int64))

@@ -1,0 +1,215 @@
+"""Contacts of edges that cross each other, where at least one of them protrudes from its surface.
+
+The energy of a pair is that of the distance of the two edges, minus that of the smallest distance of an end from the
+other edge: it is zero where the closest point is an end, because vertices have contacts of their own, and along a ridge
+of several edges the sum with the energy of its vertices is nearly constant.
+
+Where two flat faces lie on each other, no edge protrudes, and none counts. The ridge of a knife has a contact with
+every edge that it crosses; so have two ridges that cross.
+"""
+
+import math
+
+import numpy as np
+
+from supple.contact.features.known_weights import has_grown, known_weight
+from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX
+from supple.contact.features.vertex_contacts import NEARER_SHARE
+from supple.contact.features.vertex_features import nearest_of_edge
+from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit, prange
+
+# Squared sine of the angle between two edges from which they count in full. Parallel edges do not count: their ends do.
+_CROSSING = 1e-3
+
+# Of the smaller area of two edges. In a regular mesh, two edges then stand for as much as a vertex.
+_SHARE = 1.5
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def edge_weights(x, pairs, mesh, areas, dhat, known):
+    """Areas of the contacts of pairs of edges.
+
+    Parameters
+    ----------
+    x : (s, 3) [m]; pairs : (l, 2); mesh : triangles, edges, start and items of edge_triangles (see `ContactMesh`)
+    areas : (e,) a third of each edge's triangles at rest [m^2]
+    known : the weights that do not depend on x, a `KnownWeights`
+
+    Returns
+    -------
+    weights : (l,) [m^2], zero where there is no contact
+    squares : (l,) squared distances, infinite where the edges do not cross, or not below dhat [m^2]
+    keys : (l,) codes of the pairs, for `KnownWeights`
+    grown : (l,) weights that are to be known [m^2], -1 where they do not change
+    """
+    triangles, edges, edge_start, edge_items = mesh
+    weights, squares = np.zeros(len(pairs)), np.full(len(pairs), np.inf)
+    keys, grown = np.empty(len(pairs), np.int64), np.full(len(pairs), -1.0)
+    h = NEARER_SHARE * dhat
+    for k in prange(len(pairs)):
+        e, f = pairs[k, 0], pairs[k, 1]
+        a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
+        s, t, r, crossing = crossing_point(a, b, c, d)
+        square = dot(r, r)
+        if not (crossing > 0.0 and 0.0 < s < 1.0 and 0.0 < t < 1.0 and square < dhat * dhat):
+            continue
+        squares[k] = square
+        one = _height(x, triangles, edges, edge_start, edge_items, e, f, r, -1.0)
+        other = _height(x, triangles, edges, edge_start, edge_items, f, e, r, 1.0)
+        protruding = min(1.0, max(0.0, max(one, other) / h))
+        nearest = min(1.0, max(0.0, 1.0 + min(one, other) / h))
+        angle = min(1.0, crossing / _CROSSING)
+        full = _SHARE * min(areas[e], areas[f])
+        now = full * protruding * nearest * angle * (2.0 - angle)
+        # Below zero: the codes of vertices are not.
+        keys[k] = -1 - np.int64(e) * len(edges) - f
+        before = known_weight(known, keys[k])
+        if has_grown(before, now, full):
+            grown[k] = now
+        weights[k] = now if before < 0.0 else before
+    return weights, squares, keys, grown
+
+
+@njit(error_model="numpy")
+def crossing_point(a, b, c, d):
+    """Where the lines a b and c d are closest to each other.
+
+    Returns
+    -------
+    s, t : the points (1 - s) a + s b and (1 - t) c + t d; r : from the second to the first
+    crossing : squared sine of the angle between the lines; 0 where the others have no meaning
+    """
+    u, v, w = subtract(b, a), subtract(d, c), subtract(c, a)
+    n = cross(u, v)
+    nn, both = dot(n, n), dot(u, u) * dot(v, v)
+    if not nn > 1e-20 * both:
+        return 0.0, 0.0, w, 0.0
+    apart = -dot(w, n) / nn
+    r = (apart * n[0], apart * n[1], apart * n[2])
+    return dot(cross(w, v), n) / nn, dot(cross(w, u), n) / nn, r, nn / both
+
+
+@njit(error_model="numpy")
+def _height(x, triangles, edges, edge_start, edge_items, e, other, r, sign):
+    """How far the surface recedes beside edge e, against the direction sign * r, over the edge's length [m].
+
+    Negative where it comes nearer. Triangles that end at the other edge have no contacts with it, and do not count: in
+    a crease, the surface always comes nearer there. Infinite where there are no others.
+    """
+    length = math.sqrt(dot(r, r))
+    least = np.inf
+    for k in range(edge_start[e], edge_start[e + 1]):
+        t = edge_items[k]
+        if _ends_at(triangles, t, edges[other, 0]) or _ends_at(triangles, t, edges[other, 1]):
+            continue
+        least = min(least, -sign * dot(r, _inward(x, triangles, t, edges[e, 0], edges[e, 1])) / length)
+    along = subtract(row(x, edges[e, 1]), row(x, edges[e, 0]))
+    return least * math.sqrt(dot(along, along))
+
+
+@njit(error_model="numpy")
+def _ends_at(triangles, t, v):
+    return triangles[t, 0] == v or triangles[t, 1] == v or triangles[t, 2] == v
+
+
+@njit(error_model="numpy")
+def _inward(x, triangles, t, a, b):
+    """Unit vector in the plane of triangle t from its edge of the points a and b inwards; zero without area."""
+    o = triangles[t, 0] + triangles[t, 1] + triangles[t, 2] - a - b
+    along, over = subtract(row(x, b), row(x, a)), subtract(row(x, o), row(x, a))
+    m = cross(cross(along, over), along)
+    length = math.sqrt(dot(m, m))
+    if length == 0.0:
+        return (0.0, 0.0, 0.0)
+    return (m[0] / length, m[1] / length, m[2] / length)
+
+
+@njit(cache=True, error_model="numpy")
+def edge_ends(x, pairs, weights, edges):
+    """Of the m pairs with a weight, the nearest end of one edge to the other.
+
+    Returns
+    -------
+    rows : (m,) rows of `pairs`; ends : (m,) 0, 1 for the first edge's ends, 2, 3 for the second's
+    """
+    rows = np.flatnonzero(weights)
+    ends = np.empty(len(rows), dtype=np.int8)
+    for m in range(len(rows)):
+        ids = _ids(edges, pairs[rows[m], 0], pairs[rows[m], 1])
+        least = np.inf
+        for end in range(4):
+            one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])
+            _, r = nearest_of_edge(row(x, ids[end]), row(x, one), row(x, other))
+            if dot(r, r) < least:
+                least, ends[m] = dot(r, r), end
+    return rows, ends
+
+
+@njit(cache=True, error_model="numpy")
+def saddle_weights(pairs, weights, rows, ends, edges, s):
+    """Weights [m^2] that vertices (s,) need because they are ends of several edges that cross the same edge.
+
+    Every pair of edges takes the energy of its nearest end away. Where two edges of a ridge that bends away cross an
+    edge beside their common vertex, that vertex's energy must be counted once more, or nothing is left of the three.
+    """
+    out = np.zeros(s)
+    codes = np.empty(len(rows), dtype=np.int64)
+    for m in range(len(rows)):
+        e, f = pairs[rows[m], 0], pairs[rows[m], 1]
+        vertex, other = (edges[e, ends[m]], f) if ends[m] < 2 else (edges[f, ends[m] - 2], e)
+        codes[m] = np.int64(vertex) * len(edges) + other
+    order = np.argsort(codes, kind="mergesort")
+    begin = 0
+    while begin < len(order):
+        end, total, most = begin, 0.0, 0.0
+        while end < len(order) and codes[order[end]] == codes[order[begin]]:
+            weight = weights[rows[order[end]]]
+            total, most = total + weight, max(most, weight)
+            end += 1
+        vertex = codes[order[begin]] // len(edges)
+        out[vertex] = max(out[vertex], total - most)
+        begin = end
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def write_edge_contacts(x, pairs, weights, rows, ends, edges, first, out):
+    """Write two contacts for each of the pairs of `edge_ends` into the rows of `out`, a `Contacts`, from `first` on."""
+    kinds, points, coefficients, vectors, distances, areas = out
+    for m in range(len(rows)):
+        k, n = rows[m], first + 2 * m
+        ids = _ids(edges, pairs[k, 0], pairs[k, 1])
+        s, t, r, _ = crossing_point(row(x, ids[0]), row(x, ids[1]), row(x, ids[2]), row(x, ids[3]))
+        kinds[n] = EDGE_EDGE
+        points[n, 0], points[n, 1], points[n, 2], points[n, 3] = ids
+        coefficients[n, 0], coefficients[n, 1], coefficients[n, 2], coefficients[n, 3] = 1.0 - s, s, t - 1.0, -t
+        vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
+        distances[n] = math.sqrt(dot(r, r))
+        areas[n] = weights[k]
+        _write_end(x, ids, ends[m], n + 1, kinds, points, coefficients, vectors, distances)
+        areas[n + 1] = -weights[k]
+
+
+@njit(error_model="numpy")
+def _ids(edges, e, f):
+    return edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1]
+
+
+@njit(error_model="numpy")
+def _write_end(x, ids, end, n, kinds, points, coefficients, vectors, distances):
+    """Row n: an end of two edges with the other edge, or with an end of that."""
+    one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])
+    w, r = nearest_of_edge(row(x, ids[end]), row(x, one), row(x, other))
+    points[n, 0], points[n, 3] = ids[end], -1
+    coefficients[n, 0], coefficients[n, 3] = 1.0, 0.0
+    if 0.0 < w < 1.0:
+        kinds[n] = VERTEX_EDGE
+        points[n, 1], points[n, 2] = one, other
+        coefficients[n, 1], coefficients[n, 2] = w - 1.0, -w
+    else:
+        kinds[n] = VERTEX_VERTEX
+        points[n, 1], points[n, 2] = (one if w == 0.0 else other), -1
+        coefficients[n, 1], coefficients[n, 2] = -1.0, 0.0
+    vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
+    distances[n] = math.sqrt(dot(r, r))

@@ -1,0 +1,159 @@
+"""Contacts of vertices with the triangles, edges and vertices around them.
+
+A vertex stands for half of its area: the vertices of the other surface stand for the other half, so that faces that lie
+on each other press on each other with the pressure of the barrier, whatever their meshes.
+
+A vertex that hangs over an edge or a corner, while its own surface comes nearer to that beside it, gets less weight,
+down to none: what is in contact there are vertices of the other surface with the faces of this one, or two edges.
+
+Where a vertex is beside the outline of a face and its own surface lies flat on that face, its distance is that from the
+plane of the face: faces whose outlines are nearly aligned are held at all of their vertices, and nothing pushes along
+them. Its weight fades with the distance from the outline.
+"""
+
+import math
+
+import numpy as np
+
+from supple.contact.features.known_weights import has_grown, known_row, known_weight
+from supple.contact.features.pair_geometry import VERTEX_EDGE, VERTEX_TRIANGLE, VERTEX_VERTEX
+from supple.contact.features.vertex_features import PARTS, beyond, nearest_of_edge, share_between
+from supple.numerics.geometry.closest_point import closest_on_triangle
+from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit, prange
+
+# A vertex counts in full while none of its neighbors is nearer, and not at all where one is, by this share of dhat.
+NEARER_SHARE = 0.25
+
+# A vertex that hangs beyond the outline of a face counts with its plane: in full up to the first of these shares of
+# dhat, not at all from the second on.
+_FULL, _NONE = 0.25, 0.75
+
+# So much farther than dhat are vertices that hang beyond an outline.
+REACH = math.sqrt(1.0 + _NONE**2)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def write_vertex_contacts(
+    x, pairs, rows, starts, codes, signs, shares, mesh, owner, areas, saddles, dhat, known, out, keys, planes, grown
+):
+    """Write the contacts of `alternating_sums` into the first rows of `out`, a `Contacts`.
+
+    Parameters
+    ----------
+    starts : (groups + 1, 2) where each group begins in `rows` and in `out`
+    mesh : triangles, edges, start and items of neighbors (see `ContactMesh`)
+    saddles : (s,) least weights of vertices that `saddle_weights` asks for [m^2]
+    known : the weights that do not depend on x, a `KnownWeights`
+    keys : (m,) codes for `KnownWeights`
+    planes : (m,) triangles whose planes count, -1 for other contacts
+    grown : (m,) weights of the vertices that are to be known [m^2], -1 where they do not change
+    """
+    triangles, edges, near_start, near_items = mesh
+    kinds, points, coefficients, vectors, distances, weights = out
+    height = NEARER_SHARE * dhat
+    for g in prange(len(starts) - 1):
+        v = pairs[rows[starts[g, 0]], 0]
+        first, last = starts[g, 1], starts[g + 1, 1]
+        offset = PARTS * starts[g, 0] - first
+        full = 0.5 * areas[v]
+        best = saddles[v]
+        for k in range(first, last):
+            sign = signs[offset + k]
+            _write_contact(x, v, codes[offset + k], sign == 0, triangles, edges, kinds, points, coefficients, k)
+            for j in range(3):
+                vectors[k, j] = 0.0
+                for i in range(1, 4):
+                    # Differences of points are as small as triangles.
+                    vectors[k, j] += coefficients[k, i] * (x[points[k, i], j] - x[v, j])
+            r = row(vectors, k)
+            distances[k] = math.sqrt(dot(r, r))
+            if sign > 0:
+                side = 1.0
+                if kinds[k] != VERTEX_TRIANGLE:
+                    side = _own_side(x, near_start, near_items, v, points[k, 1], points[k, 2], r, distances[k], height)
+                best = max(best, side * full)
+        beside = last == first + 2 and signs[offset + first + 1] == 0
+        last -= beside
+        # Of the vertex and the owner of the other side: the same for all.
+        key = np.int64(v) * len(x) + owner[points[first, 1]]
+        face, of_plane = known_weight(known, key), known_row(known, beyond(key, len(x)))
+        outside = known.weights[of_plane] if of_plane >= 0 else -1.0
+        for k in range(first, last):
+            keys[k], planes[k], grown[k] = key, -1, -1.0
+        if not beside:
+            # Where the vertex comes over the face, both of its weights are those of the face.
+            before = max(face, 0.0) + max(outside, 0.0) if face >= 0.0 or outside >= 0.0 else -1.0
+            if has_grown(before, best, full):
+                grown[first] = best
+            elif outside > 0.0:
+                grown[first] = before
+            for k in range(first, last):
+                weights[k] = signs[offset + k] * (best if before < 0.0 else before)
+            continue
+        keys[last], planes[last], grown[last] = beyond(key, len(x)), codes[offset + last], -1.0
+        side = math.sqrt(max(0.0, distances[first] ** 2 - distances[last] ** 2))
+        share = shares[g] * (1.0 - share_between(side / dhat, _FULL, _NONE))
+        other = of_plane >= 0 and known.triangles[of_plane] != planes[last]
+        if face >= 0.0 and (other or outside <= 0.0):
+            # The vertex was over the face, or beside another one: its weight stays as a whole.
+            weights[first], weights[last] = (1.0 - share) * face, share * face
+            if share > 0.0 or outside > 0.0:
+                grown[first], grown[last] = weights[first], weights[last]
+            continue
+        now = (1.0 - share) * best
+        weights[first] = now if face < 0.0 else face
+        if has_grown(face, now, full):
+            grown[first] = now
+        now = min(share * full, max(0.0, full - weights[first]))
+        weights[last] = now if outside < 0.0 else outside
+        if has_grown(outside, now, full):
+            grown[last] = now
+
+
+@njit(error_model="numpy")
+def _write_contact(x, v, code, plane, triangles, edges, kinds, points, coefficients, k):
+    """Kind, points and coefficients of contact k: of vertex v with the feature that a code names, or with its plane."""
+    p = row(x, v)
+    points[k, 0], coefficients[k, 0] = v, 1.0
+    for i in range(1, 4):
+        points[k, i], coefficients[k, i] = -1, 0.0
+    if code < len(triangles):
+        kinds[k] = VERTEX_TRIANGLE
+        t = code
+        a, b, c = row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
+        u = _foot(p, a, b, c) if plane else closest_on_triangle(p, a, b, c)
+        for i in range(3):
+            points[k, i + 1], coefficients[k, i + 1] = triangles[t, i], -u[i]
+    elif code < len(triangles) + len(edges):
+        kinds[k] = VERTEX_EDGE
+        e = code - len(triangles)
+        points[k, 1], points[k, 2] = edges[e, 0], edges[e, 1]
+        w, _ = nearest_of_edge(p, row(x, points[k, 1]), row(x, points[k, 2]))
+        coefficients[k, 1], coefficients[k, 2] = w - 1.0, -w
+    else:
+        kinds[k] = VERTEX_VERTEX
+        points[k, 1], coefficients[k, 1] = code - len(triangles) - len(edges), -1.0
+
+
+@njit(error_model="numpy")
+def _foot(p, a, b, c):
+    """Barycentric coordinates of the point of a triangle's plane that is closest to p."""
+    g, h, r = subtract(b, a), subtract(c, a), subtract(p, a)
+    n = cross(g, h)
+    nn = dot(n, n)
+    u, v = dot(cross(r, h), n) / nn, dot(cross(g, r), n) / nn
+    return 1.0 - u - v, u, v
+
+
+@njit(error_model="numpy")
+def _own_side(x, near_start, near_items, v, a, b, r, d, height):
+    """1 where no neighbor of vertex v is nearer to what lies at -r, 0 where one is nearer by `height`.
+
+    The points a and b that lie there do not count: in a crease, they may be neighbors.
+    """
+    nearer = 0.0
+    for k in range(near_start[v], near_start[v + 1]):
+        if near_items[k] != a and near_items[k] != b:
+            nearer = min(nearer, dot(r, subtract(row(x, near_items[k]), row(x, v))) / d)
+    return max(0.0, 1.0 + nearer / height)

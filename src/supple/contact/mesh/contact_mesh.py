@@ -1,0 +1,161 @@
+"""The surfaces that may touch, as one triangle mesh on embedded points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.mesh.obstacle_vertices import ObstacleRange
+from supple.contact.mesh.stitch_filter import StitchFilter, WeldedPoints, stitch_filter
+from supple.mesh.topology import edge_keys
+from supple.model.system import System
+from supple.numerics.adjacency import Adjacency, adjacency
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMesh:
+    """Surface triangles of bodies and obstacles (half-spaces aside), with s points, e edges and f triangles.
+
+    Indices are int32 and name rows of this mesh's own points, edges and triangles.
+
+    Attributes
+    ----------
+    points : where the points are
+    triangles : (f, 3) points; edges : (e, 2) points, the lower first, in lexicographic order
+    triangle_edges : (f, 3) edge k joins the corners k and k + 1
+    edge_triangles, vertex_triangles : the triangles at each edge (one at a boundary, two on a manifold) and each point
+    neighbors : the points that an edge joins to each point
+    owner : (s,) number of the body, or (number of bodies) + number of the obstacle, of each point
+    areas, edge_areas : (s,), (e,) a third of the adjacent triangles' area at rest [m^2]
+    edge_lengths : (e,) at rest [m]
+    body_count : how many of the owners are bodies; names : of all owners
+    collide : (p, p) which owners may touch
+    stitched : pairs that do not collide because they are stitched or welded; None where there are none
+    """
+
+    points: EmbeddedPoints
+    triangles: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    triangle_edges: NDArray[np.int32]
+    edge_triangles: Adjacency
+    vertex_triangles: Adjacency
+    neighbors: Adjacency
+    owner: NDArray[np.int32]
+    areas: NDArray[np.float64]
+    edge_areas: NDArray[np.float64]
+    edge_lengths: NDArray[np.float64]
+    body_count: int
+    names: tuple[str, ...]
+    collide: NDArray[np.bool_]
+    stitched: StitchFilter | None
+    rows: NDArray[np.int32]
+
+
+def contact_mesh(
+    system: System,
+    obstacles: tuple[ObstacleRange, ...],
+    collide: NDArray[np.bool_],
+    start: NDArray[np.float64],
+) -> ContactMesh:
+    """Join the surfaces of a system whose obstacles are vertices (see `with_obstacles`).
+
+    Parameters
+    ----------
+    collide : (p, p) which owners may touch, bodies before obstacles
+    start : (n, 3) where everything is at the start [m]
+    """
+    bodies = len(system.bodies)
+    points, triangles = [system.points], [system.triangles]
+    owner = [np.repeat(np.arange(bodies), [part.points.stop - part.points.start for part in system.bodies])]
+    for part in obstacles:
+        if not part.is_plane:
+            triangles.append(part.triangles + sum(map(len, points)))
+            points.append(EmbeddedPoints.at_vertices(part.vertices))
+            owner.append(np.full(len(part.vertices), bodies + part.index))
+    corners = np.concatenate(triangles)
+    used = np.unique(corners)
+    number = np.full(sum(map(len, points)), -1, dtype=np.int32)
+    number[used] = np.arange(len(used), dtype=np.int32)
+    surface = EmbeddedPoints.joined(points).taken(used)
+    # Obstacles are vertices here; the last entry is for nodes without one.
+    of_vertex = np.append(system.stitching.points_of_nodes(EmbeddedPoints.joined(points)), -1)
+    of_vertex = np.where(of_vertex >= 0, number[of_vertex], -1).astype(np.int32)
+    return mesh_of_triangles(
+        surface,
+        number[corners],
+        np.concatenate(owner)[used].astype(np.int32),
+        surface.positions(system.rest_positions),
+        body_count=bodies,
+        names=tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles),
+        collide=collide,
+        stitches=(of_vertex[system.stitching.nodes()], surface.positions(start)),
+        welded=_welded_points(system, of_vertex),
+        rows=np.where(used < len(system.points), used, -1).astype(np.int32),
+    )
+
+
+def _welded_points(system: System, of_vertex: NDArray[np.int32]) -> WeldedPoints | None:
+    welding = system.welding
+    of_weld = welding.vertices[welding.weld >= 0]
+    if not len(of_weld):
+        return None
+    number = {part.name: k for k, part in enumerate(system.bodies)}
+    joined = np.array([(number[weld.body], number[weld.rigid]) for weld in system.scene.welds], dtype=np.int64)
+    points = of_vertex[of_weld]
+    return WeldedPoints(points[points >= 0], joined)
+
+
+def mesh_of_triangles(
+    points: EmbeddedPoints,
+    triangles: NDArray[np.int32],
+    owner: NDArray[np.int32],
+    rest: NDArray[np.float64],
+    *,
+    body_count: int,
+    names: tuple[str, ...],
+    collide: NDArray[np.bool_],
+    stitches: tuple[NDArray[np.int32], NDArray[np.float64]] | None = None,
+    welded: WeldedPoints | None = None,
+    rows: NDArray[np.int32] | None = None,
+) -> ContactMesh:
+    """The mesh of triangles (f, 3) of points with rest positions (s, 3); for the other arguments see `ContactMesh`.
+
+    Parameters
+    ----------
+    stitches : nodes (k, 4) of stitches, -1 for none, and (s, 3) where the points are at the start; welded : of welds
+    rows : see `ContactMesh`; None where the points belong to no system
+    """
+    s = len(points)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+    owner = np.ascontiguousarray(owner, dtype=np.int32)
+    keys, side = np.unique(edge_keys(triangles, s), return_inverse=True)
+    edges = np.ascontiguousarray(np.column_stack(np.divmod(keys, s)).astype(np.int32))
+    triangle_edges = np.ascontiguousarray(side.reshape(-1, 3).astype(np.int32))
+    each = np.repeat(np.arange(len(triangles)), 3)
+    a, b, c = rest[triangles].transpose(1, 0, 2)
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    thirds = np.repeat(doubled / 6.0, 3)
+    stitched = None
+    if stitches is not None and (len(stitches[0]) or welded is not None):
+        stitched = stitch_filter((triangles, edges, triangle_edges), *stitches, owner, collide, welded)
+    return ContactMesh(
+        points=points,
+        triangles=triangles,
+        edges=edges,
+        triangle_edges=triangle_edges,
+        edge_triangles=adjacency(triangle_edges.ravel(), each, len(edges)),
+        vertex_triangles=adjacency(triangles.ravel(), each, s),
+        neighbors=adjacency(edges.ravel(), edges[:, ::-1].ravel(), s),
+        owner=owner,
+        areas=np.bincount(triangles.ravel(), weights=thirds, minlength=s).astype(np.float64),
+        edge_areas=np.bincount(triangle_edges.ravel(), weights=thirds, minlength=len(edges)).astype(np.float64),
+        edge_lengths=np.linalg.norm(rest[edges[:, 0]] - rest[edges[:, 1]], axis=1),
+        body_count=body_count,
+        names=names,
+        collide=np.ascontiguousarray(collide),
+        stitched=stitched,
+        rows=np.full(s, -1, dtype=np.int32) if rows is None else rows,
+    )

@@ -1,0 +1,70 @@
+"""Distances and nearest places of parts of a triangle mesh: points and triangles, edges and edges."""
+
+import numpy as np
+
+from supple.numerics.geometry.closest_point import between, closest_on_triangle, combine
+from supple.numerics.geometry.closest_segments import closest_on_segments
+from supple.numerics.mat3 import dot, row, subtract
+from supple.runtime.kernel_cache import njit, prange
+
+
+@njit(error_model="numpy", forceinline=True)
+def point_triangle_square(x, v, triangles, t):
+    """The squared distance of point v and triangle t."""
+    p, a, b, c = row(x, v), row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
+    r = subtract(p, combine(closest_on_triangle(p, a, b, c), a, b, c))
+    return dot(r, r)
+
+
+@njit(error_model="numpy", forceinline=True)
+def edge_edge_square(x, edges, e, f):
+    """The squared distance of two edges."""
+    a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
+    s, t = closest_on_segments(a, b, c, d)
+    r = subtract(between(a, b, s), between(c, d, t))
+    return dot(r, r)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def points_nearer(x, triangles, pairs, reach):
+    """Which pairs (k, 2) of points and triangles are nearer than `reach`."""
+    near = np.empty(len(pairs), dtype=np.bool_)
+    for k in prange(len(pairs)):
+        near[k] = point_triangle_square(x, pairs[k, 0], triangles, pairs[k, 1]) < reach * reach
+    return near
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def edges_nearer(x, edges, pairs, reach):
+    """Which pairs (k, 2) of edges are nearer than `reach`."""
+    near = np.empty(len(pairs), dtype=np.bool_)
+    for k in prange(len(pairs)):
+        near[k] = edge_edge_square(x, edges, pairs[k, 0], pairs[k, 1]) < reach * reach
+    return near
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def middles_of_points(x, triangles, pairs):
+    """(k, 3) the middle between each point of pairs (k, 2) and the place on its triangle that is nearest to it."""
+    out = np.empty((len(pairs), 3))
+    for k in prange(len(pairs)):
+        t = pairs[k, 1]
+        p, a, b, c = row(x, pairs[k, 0]), row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
+        q = combine(closest_on_triangle(p, a, b, c), a, b, c)
+        for j in range(3):
+            out[k, j] = 0.5 * (p[j] + q[j])
+    return out
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def middles_of_edges(x, edges, pairs):
+    """(k, 3) the middle between the nearest places on the two edges of each of the pairs (k, 2)."""
+    out = np.empty((len(pairs), 3))
+    for k in prange(len(pairs)):
+        e, f = pairs[k, 0], pairs[k, 1]
+        a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
+        s, t = closest_on_segments(a, b, c, d)
+        p, q = between(a, b, s), between(c, d, t)
+        for j in range(3):
+            out[k, j] = 0.5 * (p[j] + q[j])
+    return out

@@ -1,0 +1,153 @@
+"""Pairs that do not collide because they are stitched to each other.
+
+Excluded are the pairs of `supple.scene.stitches.masks`. Excluded are also pairs with a stitched point that touch at the
+start, between things that are stitched to each other: halves stitched face to face touch everywhere.
+
+Of welds, excluded are the pairs of the rigid body with the welded points and their neighbours that are nearer at the
+start than the longest edge there: welded points stay where they are on the rigid body, and their neighbours near it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from supple.contact.mesh.touching import touching_pairs
+from supple.numerics.adjacency import Adjacency, adjacency
+from supple.scene.stitches.masks import stitched_crossings, stitched_edges, stitched_triangles
+
+# Parts that are nearer than this share of the mean edge at the start touch.
+_TOUCHING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class StitchFilter:
+    """Pairs of parts of a mesh that never collide.
+
+    Attributes
+    ----------
+    triangles_of_point : the triangles that a point does not collide with
+    edges_of_edge : the edges that an edge does not collide with; each pair is in the lists of both
+    crossing : for each triangle the higher ones that may cross it: triangles around a stitched point with its partner,
+        and triangles whose parts touch at the start
+    """
+
+    triangles_of_point: Adjacency
+    edges_of_edge: Adjacency
+    crossing: Adjacency
+
+
+class WeldedPoints(NamedTuple):
+    """Points (w,) of the mesh that are welded, and the pairs (k, 2) of things that welds join."""
+
+    points: NDArray[np.int32]
+    joined: NDArray[np.int64]
+
+
+def stitch_filter(
+    mesh: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]],
+    nodes: NDArray[np.int32],
+    start: NDArray[np.float64],
+    owner: NDArray[np.int32],
+    collide: NDArray[np.bool_],
+    welded: WeldedPoints | None = None,
+) -> StitchFilter:
+    """Of stitches with nodes (k, 4) in the mesh's numbers, -1 for none, and of welds.
+
+    Parameters
+    ----------
+    mesh : triangles (f, 3), edges (e, 2), triangle_edges (f, 3), see `ContactMesh`
+    start : (s, 3) where the points are at the start [m]; owner : (s,) which thing each belongs to
+    collide : (p, p) which owners may touch
+    """
+    triangles, edges, triangle_edges = mesh
+    s, e, f = len(owner), len(edges), len(triangles)
+    points, faces = stitched_triangles(nodes, triangles, s)
+    one, other = stitched_edges(nodes, edges, s)
+    near_triangles, near_edges = _touching(mesh, nodes, start, owner, collide)
+    if welded is not None:
+        more_triangles, more_edges = _welded(mesh, welded, start, owner)
+        near_triangles = np.concatenate([near_triangles, more_triangles])
+        near_edges = np.concatenate([near_edges, more_edges])
+    crossing = stitched_crossings(nodes, triangles, s)
+    crossing = crossing + _crossings((triangles, triangle_edges), near_triangles, near_edges, (s, e))
+    t, u = crossing.nonzero()
+    return StitchFilter(
+        adjacency(np.append(points, near_triangles[:, 0]), np.append(faces, near_triangles[:, 1]), s),
+        adjacency(
+            np.concatenate([one, other, *near_edges.T]),
+            np.concatenate([other, one, *near_edges[:, ::-1].T]),
+            e,
+        ),
+        adjacency(np.minimum(t, u), np.maximum(t, u), f),
+    )
+
+
+def _crossings(
+    sides: tuple[NDArray[np.int32], NDArray[np.int32]],
+    near_triangles: NDArray[np.int32],
+    near_edges: NDArray[np.int32],
+    sizes: tuple[int, int],
+) -> csr_array:
+    """(f, f) non-zero for pairs of triangles to which a pair of a point and a triangle, or of two edges, belongs."""
+    s, e = sizes
+    f = len(sides[0])
+
+    def incidence(rows: NDArray[np.integer], columns: NDArray[np.integer], shape: tuple[int, int]) -> csr_array:
+        return csr_array((np.ones(len(rows), dtype=np.int32), (rows, columns)), shape=shape)
+
+    each = np.repeat(np.arange(f), 3)
+    corners, edges = incidence(each, sides[0].ravel(), (f, s)), incidence(each, sides[1].ravel(), (f, e))
+    near = incidence(near_triangles[:, 1], near_triangles[:, 0], (f, s)) @ corners.T
+    return csr_array(near + edges @ incidence(near_edges[:, 0], near_edges[:, 1], (e, e)) @ edges.T)
+
+
+def _touching(
+    mesh: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]],
+    nodes: NDArray[np.int32],
+    start: NDArray[np.float64],
+    owner: NDArray[np.int32],
+    collide: NDArray[np.bool_],
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Pairs (k, 2) of points with triangles, and of edges with edges, that touch at the start; see the module."""
+    triangles, edges, _ = mesh
+    reach = _TOUCHING * float(np.linalg.norm(start[edges[:, 1]] - start[edges[:, 0]], axis=1).mean())
+    stitched = np.zeros(len(owner), dtype=np.bool_)
+    stitched[nodes[nodes >= 0]] = True
+    joined = np.zeros_like(collide)
+    for k in range(1, nodes.shape[1]):
+        both = (nodes[:, 0] >= 0) & (nodes[:, k] >= 0)
+        one, other = owner[nodes[both, 0]], owner[nodes[both, k]]
+        joined[one, other] = joined[other, one] = True
+    near_triangles, near_edges = touching_pairs(start, triangles, edges, owner, joined & collide, reach)
+    of_triangles = stitched[near_triangles[:, 0]] | stitched[triangles[near_triangles[:, 1]]].any(axis=1)
+    of_edges = stitched[edges[near_edges]].any(axis=(1, 2))
+    return near_triangles[of_triangles], near_edges[of_edges]
+
+
+def _welded(
+    mesh: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]],
+    welded: WeldedPoints,
+    start: NDArray[np.float64],
+    owner: NDArray[np.int32],
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Pairs (k, 2) of points with triangles, and of edges with edges, that welds exclude; see the module."""
+    triangles, edges, _ = mesh
+    is_welded = np.zeros(len(owner), dtype=np.bool_)
+    is_welded[welded.points] = True
+    ring = edges[is_welded[edges].any(axis=1)]
+    near = is_welded.copy()
+    near[ring] = True
+    reach = float(np.linalg.norm(start[ring[:, 1]] - start[ring[:, 0]], axis=1).max(initial=0.0))
+    count = int(max(owner.max(), welded.joined.max())) + 1
+    joined = np.zeros((count, count), dtype=np.bool_)
+    joined[tuple(welded.joined.T)] = joined[tuple(welded.joined[:, ::-1].T)] = True
+    near_triangles, near_edges = touching_pairs(start, triangles, edges, owner, joined, reach)
+    of_triangles = near[near_triangles[:, 0]] | near[triangles[near_triangles[:, 1]]].all(axis=1)
+    whole = np.asarray(near[edges].all(axis=1))
+    of_edges = whole[near_edges[:, 0]] | whole[near_edges[:, 1]]
+    return near_triangles[of_triangles], near_edges[of_edges]

@@ -1,0 +1,103 @@
+"""What a step did to the actuators of a scene, and with which forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.state import SolverDetails
+from supple.model.system import System
+
+
+@dataclass(frozen=True)
+class CavityReading:
+    """A cavity at the end of a frame.
+
+    Attributes
+    ----------
+    pressure : less that outside [Pa]; of `XPBD` the mean over the frame
+    volume : [m^3]; work : on the body over the frame [J]
+    """
+
+    pressure: float
+    volume: float
+    work: float
+
+
+@dataclass(frozen=True)
+class CableReading:
+    """A cable at the end of a frame.
+
+    Attributes
+    ----------
+    tension : of each span, from the first point to the winch [N]; of `XPBD` the mean over the frame
+    length : sum of the spans [m]; work : on the bodies over the frame, friction included [J]
+    """
+
+    tension: tuple[float, ...]
+    length: float
+    work: float
+
+
+def cavity_readings(details: SolverDetails) -> dict[str, CavityReading]:
+    """By name, those of a solver's details."""
+    each = details.cavity_pressure
+    return {name: CavityReading(each[name], details.cavity_volume[name], details.cavity_work[name]) for name in each}
+
+
+def cable_readings(details: SolverDetails) -> dict[str, CableReading]:
+    """By name, those of a solver's details."""
+    found = {}
+    for name, length in details.cable_length.items():
+        tensions = [value for key, value in details.cable_tension.items() if key.rpartition(".")[0] == name]
+        found[name] = CableReading(tuple(tensions), length, details.cable_work[name])
+    return found
+
+
+def start_of(system: System) -> list[list[NDArray[np.float64]]]:
+    """Forces, coordinates and work of all actuators before any step: no force, and no work."""
+    x = system.start_states[-1].positions
+    parts = [each.parts(x) for each in system.actuators]
+    zero = [np.zeros_like(each) for each in parts]
+    return [zero, parts, zero]
+
+
+def actuator_fields(
+    system: System,
+    forces: Sequence[NDArray[np.float64]],
+    parts: Sequence[NDArray[np.float64]],
+    works: Sequence[NDArray[np.float64]],
+) -> Mapping[str, Any]:
+    """The fields of `SolverDetails` for the generalized forces, the coordinates and the work of all actuators.
+
+    Each is an array (p,) for the parts of the coordinate.
+    """
+    names = ("cavity_pressure", "cavity_volume", "cavity_work", "cable_tension", "cable_length", "cable_work")
+    found: dict[str, dict[str, float]] = {name: {} for name in names}
+    for each, Q, s, work in zip(system.actuators, forces, parts, works, strict=True):
+        if each.kind == "cavity":
+            found["cavity_pressure"][each.name] = float(Q[0])
+            found["cavity_volume"][each.name] = float(s[0])
+        else:
+            found["cable_tension"] |= {f"{each.name}.{k}": max(-float(value), 0.0) for k, value in enumerate(Q)}
+            found["cable_length"][each.name] = float(s.sum())
+        found[f"{each.kind}_work"][each.name] = float(work.sum())
+    return found
+
+
+def add_actuator_forces(
+    system: System, details: SolverDetails, x: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """Add the forces of all actuators on the vertices at x (n, 3) [m] to `out` (n, 3) [N]."""
+    cables = cable_readings(details)
+    for each in system.actuators:
+        if each.kind == "cavity":
+            forces = np.array([details.cavity_pressure[each.name]])
+        else:
+            forces = -np.array(cables[each.name].tension)
+        rows = each.coordinate.vertices
+        out[rows] += np.einsum("p,pij->ij", forces, each.coordinate.part_gradients(x[rows]))

@@ -1,0 +1,94 @@
+"""Pressure on triangles of surfaces, and the volume that they sweep, of which it is the derivative.
+
+The force on each corner of a triangle is a third of -p A, with A its area vector along the outward normal. While the
+corners a, b, c move straight by da, db, dc, the triangle sweeps the volume
+
+    W = D . N / 6,    D = da + db + dc,    N = u x v + (u x dv + du x v) / 2 + du x dv / 3,
+
+u = b - a, v = c - a where the motion begins. W is counted along the outward normal. Of a closed surface the sum is
+exactly the change of the volume inside, whatever the way. Of a part of a surface the work of a pressure depends on the
+way, and p W is that of the straight one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.loads.applied import AppliedLoad, LoadPattern
+from supple.numerics.geometry.cross_matrices import cross_matrices
+
+
+@dataclass(frozen=True, eq=False)
+class FollowerPressure(AppliedLoad):
+    """A pressure on `triangles` (t, 3), counter-clockwise from outside of the body; `pressure` : time -> [Pa]."""
+
+    triangles: NDArray[np.int32]
+    pressure: Callable[[float], float]
+
+    work = "pressures"
+
+    @property
+    def pattern(self) -> LoadPattern:
+        return LoadPattern("pressure", self.work, self.triangles, np.ones(len(self.triangles)))
+
+    def value(self, time: float) -> NDArray[np.float64]:
+        return np.asarray(self.pressure(time))
+
+    def renumbered(self, new: NDArray[np.int32]) -> FollowerPressure:
+        return replace(self, triangles=new[self.triangles])
+
+    def acts_on(self) -> NDArray[np.int32]:
+        return np.unique(self.triangles)
+
+    def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
+        thirds = -self.pressure(time) / 3.0 * area_vectors(x, self.triangles)
+        for corner in self.triangles.T:
+            np.add.at(out, corner, thirds)
+
+
+def area_vectors(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(t, 3) areas along the normals [m^2] of triangles (t, 3) of points x (n, 3)."""
+    a, b, c = x[triangles].transpose(1, 0, 2)
+    return 0.5 * np.cross(b - a, c - a)
+
+
+class SweptTriangles:
+    """Triangles (t, 3) on their way from x_n to x (n, 3); see the formulas of this file.
+
+    Attributes
+    ----------
+    triangles : (t, 3); mean : N; sum : D; first, second : G = v / 2 + dv / 3 and u / 2 + du / 3, each (t, 3)
+    """
+
+    def __init__(self, start: NDArray[np.float64], x: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
+        self.triangles = triangles
+        a, b, c = start[triangles].transpose(1, 0, 2)
+        da, db, dc = (x - start)[triangles].transpose(1, 0, 2)
+        u, v, du, dv = b - a, c - a, db - da, dc - da
+        self.sum = da + db + dc
+        self.mean = np.cross(u, v) + 0.5 * (np.cross(u, dv) + np.cross(du, v)) + np.cross(du, dv) / 3.0
+        self.first, self.second = 0.5 * v + dv / 3.0, 0.5 * u + du / 3.0
+
+    def volume(self) -> float:
+        """W [m^3]"""
+        return float(np.einsum("ti,ti->", self.sum, self.mean)) / 6.0
+
+    def add_gradient(self, factor: float, out: NDArray[np.float64]) -> None:
+        """Add `factor` times the gradient of W by x to `out` (n, 3)."""
+        b, c = np.cross(self.first, self.sum), np.cross(self.sum, self.second)
+        for corner, turn in zip(self.triangles.T, (-b - c, b, c), strict=True):
+            np.add.at(out, corner, factor / 6.0 * (self.mean + turn))
+
+    def hessian(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+        """Rows, columns (3 t,) and blocks (3 t, 3, 3) of the second derivative of W, each pair of corners once.
+
+        A corner has none with itself: W is linear in it.
+        """
+        i, j, k = self.triangles.T
+        B, C, turn = -cross_matrices(self.first), cross_matrices(self.second), -cross_matrices(self.sum) / 3.0
+        blocks = np.concatenate([2.0 * B + C + turn, C - B + turn, -B - 2.0 * C + turn]) / 6.0
+        return np.concatenate([i, j, k]), np.concatenate([j, k, i]), blocks

@@ -1,0 +1,155 @@
+"""The check of joints: they hold, their coordinates and rates stay in their limits, their motors in their force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from supple.results.check.frame_check import FrameCheck
+from supple.results.check.snapshot import Scene, Snapshot
+from supple.results.recording.actions.joints import RecordedJoint
+
+# Largest violations, as a share of the joint's size: of `Implicit`, and of solvers that correct positions step by step.
+_IMPLICIT, _OTHERS = 1e-6, 1e-3
+_TURN = 2.0 * np.pi
+
+
+class Joints(FrameCheck):
+    """How far each joint is from holding, from the places of its two sides alone.
+
+    Lengths are divided by the diameter of gyration of the smaller body. Angles, in radians, count as they are.
+    """
+
+    name = "joints"
+    good = "hold within {worst} of the size of what they join"
+    bad = "a joint is off by {worst} of the size of what it joins"
+
+    def begin(self) -> None:
+        recording = self.scene.recording
+        if not recording.joints:
+            self.why_not = "the scene has no joint"
+        of_solver = _IMPLICIT if (recording.solver or "").startswith("Implicit") else _OTHERS
+        given = self.settings.max_joint_error
+        self._most = of_solver if given is None else given
+        self._last: dict[str, tuple[float, float]] = {}
+        self._frames = [_Frame.of(self.scene, joint) for joint in recording.joints]
+        kept = {field.name: field.keys or () for field in recording.details.fields}
+        self._recorded = {
+            name: {key: values[:, k] for k, key in enumerate(kept[name])}
+            for name in ("joint_coordinates", "motor_forces")
+            if kept.get(name) and (values := recording.frame_values(f"details/{name}")) is not None
+        }
+
+    def see(self, at: Snapshot) -> None:
+        for joint, frame in zip(self.scene.recording.joints, self._frames, strict=True):
+            recorded = self._of_report("joint_coordinates", joint.name, at.number)
+            error, coordinate, strain = frame.error(at, recorded)
+            where = joint.name
+            before, last = self._last.get(joint.name, (at.time, coordinate))
+            self._last[joint.name] = at.time, coordinate
+            if np.isfinite(joint.max_velocity):
+                too_far = (abs(coordinate - last) - joint.max_velocity * (at.time - before)) / frame.unit
+                error, where = (too_far, f"{joint.name}, its rate") if too_far > error else (error, where)
+            differs = 0.0 if recorded is None else abs(coordinate - recorded) / frame.unit
+            # Where a body is not quite rigid, an angle depends on the material that it is taken from.
+            if differs > max(error, self._most, strain):
+                error, where = differs, f"{joint.name}, its recorded coordinate"
+            effort = self._of_report("motor_forces", joint.name, at.number)
+            beyond = effort is not None and not abs(effort) <= joint.max_force * (1.0 + 1e-9)
+            where = f"{joint.name}, its motor exceeds its largest effort" if beyond else where
+            self.tally.see(at, error, beyond or not error <= self._most, where)
+
+    def _of_report(self, series: str, name: str, number: int) -> float | None:
+        """What the solver reported of a joint in a frame, where it did."""
+        values = self._recorded.get(series, {}).get(name)
+        return None if values is None or np.isnan(values[number]) else float(values[number])
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """A joint's point and axes in the coordinates of its two sides.
+
+    Attributes
+    ----------
+    points : (2, 3); axes : (2, 3, 3) rows, the axis first, right-handed and perpendicular
+    size : diameter of gyration of the smaller body [m]; unit : of the coordinate, `size` or one radian
+    """
+
+    scene: Scene
+    joint: RecordedJoint
+    points: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    size: float
+    unit: float
+
+    @classmethod
+    def of(cls, scene: Scene, joint: RecordedJoint) -> _Frame:
+        R, t = joint.placed[:, :, :3], joint.placed[:, :, 3]
+        e = joint.axis / np.linalg.norm(joint.axis)
+        across = np.linalg.svd(e[None])[2][1]
+        axes = np.array([e, across, np.cross(e, across)])
+        bodies, sizes = scene.recording.bodies, []
+        for side in joint.sides:
+            if side is not None and side < len(bodies):
+                control = scene.recording.rest_positions[bodies[side].vertices]
+                sizes.append(2.0 * np.linalg.norm(control - control.mean(axis=0)) / np.sqrt(len(control)))
+        size = float(min(sizes))
+        points = np.einsum("sji,sj->si", R, joint.point - t)
+        return cls(scene, joint, points, (axes @ R).astype(np.float64), size, size if joint.kind == "slider" else 1.0)
+
+    def error(self, at: Snapshot, near: float | None) -> tuple[float, float, float]:
+        """The error, the coordinate, and the larger |F^T F - 1| of the two sides.
+
+        Of an angle, the coordinate is the one nearest to `near`, or to the middle of the limits.
+        """
+        kind = self.joint.kind
+        (F, p), (G, q) = (self._side(at, k) for k in (0, 1))
+        gap = p - q
+        first, second = self.axes[0] @ F.T, self.axes[1] @ G.T
+        turned = np.linalg.norm(first - second, axis=1)
+        coordinate = 0.0
+        if kind == "slider":
+            coordinate, *across = (second @ gap).tolist()
+            gap = np.array(across)
+        errors = [float(np.linalg.norm(gap)) / self.size]
+        if kind == "hinge":
+            errors.append(float(turned[0]))
+            angle = float(np.arctan2(first[1] @ second[2], first[1] @ second[1]))
+            ends = [end for end in self.joint.limits if np.isfinite(end)]
+            middle = sum(ends) / len(ends) if near is None and ends else near or 0.0
+            coordinate = angle + _TURN * round((middle - angle) / _TURN)
+        elif kind == "ball":
+            coordinate = float(np.arccos(np.clip(first[0] @ second[0], -1.0, 1.0)))
+            errors.append(self._twisted_beyond(second @ first.T))
+        else:
+            errors.append(float(turned.max()))
+        low, high = self.joint.limits
+        errors.append(max(low - coordinate, coordinate - high, 0.0) / self.unit)
+        strain = max(float(np.linalg.norm(side.T @ side - np.eye(3))) for side in (F, G))
+        return max(errors), coordinate, strain
+
+    def _twisted_beyond(self, R: NDArray[np.float64]) -> float:
+        """How far the twist of the rotation R (3, 3), in the joint's axes, is beyond its limits [rad]."""
+        low, high = self.joint.twist_limits
+        if not np.isfinite([low, high]).any():
+            return 0.0
+        about, _, _, w = Rotation.from_matrix(R).as_quat()
+        twist = 2.0 * np.arctan2(about, w)
+        twist -= _TURN * np.round(twist / _TURN)
+        return float(max(low - twist, twist - high, 0.0))
+
+    def _side(self, at: Snapshot, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The linear part (3, 3) of the motion of a side from its own coordinates, and where the joint's point is."""
+        side, bodies = self.joint.sides[k], self.scene.recording.bodies
+        if side is None:
+            return np.eye(3), self.points[k]
+        if side >= len(bodies):
+            pose = at.poses[side - len(bodies)]
+            return pose[:, :3], pose[:, :3] @ self.points[k] + pose[:, 3]
+        rows = bodies[side].vertices
+        rest = self.scene.recording.rest_positions[rows]
+        affine = np.linalg.solve(np.column_stack([rest, np.ones(4)]), at.positions[rows]).astype(np.float64)
+        return affine[:3].T, self.points[k] @ affine[:3] + affine[3]

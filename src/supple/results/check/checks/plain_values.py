@@ -1,0 +1,142 @@
+"""Checks of plain recorded values: finite numbers, the order of frames, the status of steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.state import Status
+from supple.results.check.frame_check import FrameCheck
+from supple.results.check.snapshot import Snapshot
+from supple.results.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
+
+# Arrays that all frames share.
+CONSTANTS = ("rest_positions", "rest_volumes", "masses", "gravity")
+# These series use NaN for "not known".
+_MAY_BE_UNKNOWN = ("min_distance", "largest_stitch_stretch")
+_SAME_TIME = 1e-9
+_MOVING = 1e-9
+
+# How far the displacement of a body in a step may differ from that of its velocities, as a share of its speed times the
+# step. In unchanged recordings it was less than 0.1.
+_LARGEST_DEVIATION = 0.75
+
+
+class Finite(FrameCheck):
+    """Every number of the file, those of the reports included."""
+
+    name = "finite"
+    sees_all = True
+    needs_frames = False
+    unit = "numbers"
+    good = "all numbers are finite"
+    bad = "not finite: {worst}"
+
+    def begin(self) -> None:
+        recording = self.scene.recording
+        for what in CONSTANTS:
+            count = _bad_count(getattr(recording, what))
+            if count:
+                self.tally.see(None, count, True, what.replace("_", " "))
+        names = [name for name in (*REPORT_NUMBERS, *REPORT_VECTORS) if name not in _MAY_BE_UNKNOWN]
+        self._series = {name: recording.series(name) for name in names}
+
+    def see(self, at: Snapshot) -> None:
+        found = [(count, where) for count, where in self._bad(at) if count]
+        self.tally.see(at, sum(count for count, _ in found), bool(found), found[0][1] if found else "")
+
+    def _bad(self, at: Snapshot) -> Iterator[tuple[int, str]]:
+        for what, values in (("position", at.positions), ("velocity", at.velocities)):
+            count = _bad_count(values)
+            row = int(np.argmin(np.isfinite(values).all(axis=1)))
+            yield count, f"{what} of {self.scene.name('vertex', row)}" if count else ""
+        count = _bad_count(at.det_F)
+        yield count, f"det F of {self.scene.name('tet', int(np.argmin(np.isfinite(at.det_F))))}" if count else ""
+        yield _bad_count(at.poses), "pose of an obstacle"
+        for name, series in self._series.items():
+            yield _bad_count(series[at.number]), f"recorded {name}"
+
+
+def _bad_count(values: NDArray[np.float64]) -> int:
+    return int(np.count_nonzero(~np.isfinite(values)))
+
+
+class Sequence(FrameCheck):
+    """Times and numbers of all frames; repetitions among the checked frames."""
+
+    name = "sequence"
+    needs_frames = False
+    good = "frames follow each other"
+    bad = "frames do not follow each other"
+
+    def begin(self) -> None:
+        self._last: Snapshot | None = None
+        recording = self.scene.recording
+        # XPBD may push a body out of another one and stop it within the same frame.
+        self._implicit = (recording.solver or "").startswith("Implicit")
+        indices = np.array([frame.index for frame in recording])
+        for k in range(1, len(recording)):
+            at = recording[k]
+            step = at.time - float(recording.times[k - 1])
+            rounding = 4.0 * np.finfo(np.float64).eps * abs(at.time)
+            # A step that failed ends where the solver got to, at the latest with its length; `Converged` names it.
+            failed = not recording.statuses[k].can_go_on
+            if failed and 0.0 <= step <= recording.dt * (1.0 + _SAME_TIME) + rounding:
+                step = recording.dt
+            if not step > 0.0:
+                self.tally.see(at, step, True, f"time {at.time:.9g} s does not come after the one before")
+            elif indices[k] - indices[k - 1] != 1:
+                self.tally.see(at, step, True, f"number {indices[k]} does not follow {indices[k - 1]}")
+            elif abs(step - recording.dt) > _SAME_TIME * recording.dt + rounding:
+                self.tally.see(at, step, True, f"a step of {step:.9g} s, not of {recording.dt:.9g} s")
+
+    def see(self, at: Snapshot) -> None:
+        before, self._last = self._last, at
+        recording = self.scene.recording
+        if before is None:
+            return
+        if not np.array_equal(before.positions, at.positions):
+            converged = recording.statuses[at.number] is Status.CONVERGED
+            if self._implicit and converged and at.number == before.number + 1:
+                self._follow(before, at)
+            return
+        slowest = min(float(np.abs(frame.velocities).max(initial=0.0)) for frame in (before, at))
+        if slowest * recording.dt > _MOVING * self.scene.size and recording.statuses[at.number].can_go_on:
+            self.tally.see(at, slowest, True, f"repeats frame {before.number} although it moves")
+
+    def _follow(self, before: Snapshot, at: Snapshot) -> None:
+        """Whether the displacements of bodies agree with their velocities before and after the step."""
+        recording = self.scene.recording
+        step = at.time - before.time
+        fall = float(np.linalg.norm(recording.gravity)) * abs(step)
+        for body in recording.bodies:
+            rows, share = body.vertices, recording.masses[body.vertices]
+            share = share / share.sum()
+            speeds = [float(np.sqrt(share @ (frame.velocities[rows] ** 2).sum(axis=1))) for frame in (before, at)]
+            first, last = (share @ frame.velocities[rows] for frame in (before, at))
+            mean = share @ (at.positions[rows] - before.positions[rows]) / step
+            # The mean velocity of a step is between those before and after it; a static solver leaves none after it.
+            change = last - first
+            along = np.clip((mean - first) @ change / max(float(change @ change), 1e-300), 0.0, 1.0)
+            off = float(np.linalg.norm(mean - first - along * change))
+            rounding = _MOVING * self.scene.size / abs(step)
+            if speeds[1] > 0.0 and off > _LARGEST_DEVIATION * (max(speeds) + fall) + rounding:
+                where = f"{body.name} is {off * abs(step):.3g} m from where its velocities lead"
+                self.tally.see(at, off, True, where)
+
+
+class Converged(FrameCheck):
+    """The recorded status of every step."""
+
+    name = "status"
+    needs_frames = False
+    good = "every step converged"
+    bad = "a step did not converge"
+
+    def begin(self) -> None:
+        recording = self.scene.recording
+        for frame, status in zip(recording, recording.statuses, strict=True):
+            if status is not Status.CONVERGED:
+                self.tally.see(frame, 1.0, True, str(status))

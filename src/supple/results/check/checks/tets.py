@@ -1,0 +1,104 @@
+"""Checks of the tetrahedra: at rest, in every frame, and of the volumes of the bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.results.check.elastic_energy import growth_of
+from supple.results.check.frame_check import FrameCheck
+from supple.results.check.geometry import quadratic_tets
+from supple.results.check.geometry.orientation import volume_signs
+from supple.results.check.snapshot import Snapshot, edge_vectors
+
+NEARLY_INCOMPRESSIBLE = 0.45
+GENEROUS_VOLUME_CHANGE = 0.5
+_SAME_VOLUME = 1e-9
+
+
+class RestShape(FrameCheck):
+    """Tets, volumes and masses that no frame changes."""
+
+    name = "rest shape"
+    needs_frames = False
+    unit = "m^3"
+    lowest = True
+    good = "smallest tet at rest {worst}"
+    bad = "not a rest shape: {worst}"
+
+    def begin(self) -> None:
+        recording = self.scene.recording
+        D = edge_vectors(recording.rest_positions, recording.tets)
+        volumes = np.einsum("ij,ij->i", D[:, :, 0], np.cross(D[:, :, 1], D[:, :, 2])) / 6.0
+        flat = volume_signs(recording.rest_positions, recording.tets) <= 0
+        if recording.quadratic is not None:
+            rows = recording.quadratic[0]
+            volumes[rows] = quadratic_tets.volumes(self.scene.quadratic_at_rest)
+            flat[rows] |= ~quadratic_tets.are_positive(self.scene.quadratic_at_rest)
+        bad = np.flatnonzero(flat)
+        row = int(bad[0]) if len(bad) else int(np.argmin(volumes))
+        self.tally.see(None, volumes[row], len(bad) > 0, self.scene.name("tet", row))
+        sizes = np.abs(D).max(axis=(1, 2)) ** 3
+        wrong = np.flatnonzero(~(np.abs(recording.rest_volumes - volumes) <= _SAME_VOLUME * sizes))
+        if len(wrong):
+            row = int(wrong[0])
+            text = f"{self.scene.name('tet', row)} has a recorded volume of {recording.rest_volumes[row]:.6g} m^3"
+            self.tally.see(None, volumes[row], True, text)
+        light = np.flatnonzero(~(recording.masses > 0.0))
+        if len(light):
+            row = int(light[0])
+            text = f"{self.scene.name('vertex', row)} has a mass of {recording.masses[row]:.6g} kg"
+            self.tally.see(None, volumes.min(), True, text)
+
+
+class Inversion(FrameCheck):
+    """The sign of every tet's determinant, exact or everywhere in a quadratic one; the smallest det F is reported."""
+
+    name = "inversion"
+    lowest = True
+    good = "smallest det F {worst}"
+    bad = "inverted or flat, det F {worst}"
+
+    def see(self, at: Snapshot) -> None:
+        bad = np.flatnonzero(at.signs <= 0)
+        J = np.where(np.isfinite(at.least_J), at.least_J, np.inf)
+        row = int(bad[np.argmin(J[bad])]) if len(bad) else int(np.argmin(J))
+        self.tally.see(at, float(J[row]), len(bad) > 0, lambda: self.scene.name("tet", row))
+
+
+class Volume(FrameCheck):
+    """The change of each body's volume from that of its stress-free shape."""
+
+    name = "volume"
+    good = "largest change {worst} of a body's volume"
+    bad = "changes by {worst} of a body's volume"
+
+    def begin(self) -> None:
+        bodies = self.scene.recording.bodies
+        self._limits = [self._limit(k) for k in range(len(bodies))]
+        self._rest = [float(self.scene.recording.rest_volumes[body.tets].sum()) for body in bodies]
+
+    def _limit(self, number: int) -> float:
+        if self.settings.max_volume_change is not None:
+            return self.settings.max_volume_change
+        recording = self.scene.recording
+        physics, tets = recording.physics, recording.bodies[number].tets
+        if physics is None:
+            return np.inf
+        known = physics.kind[tets] < len(ELASTIC_MATERIALS)
+        if not known.all():
+            return np.inf
+        laws = np.array([law is StableNeoHookean for law in ELASTIC_MATERIALS])[physics.kind[tets]]
+        mu = physics.mu[tets]
+        # The lam of the stable Neo-Hookean density is lam + mu of Hooke's law.
+        hooke = physics.lam[tets] - np.where(laws, mu, 0.0)
+        poisson = hooke / (2.0 * (hooke + mu))
+        return GENEROUS_VOLUME_CHANGE if (poisson >= NEARLY_INCOMPRESSIBLE - 1e-9).all() else np.inf
+
+    def see(self, at: Snapshot) -> None:
+        for k, body in enumerate(self.scene.recording.bodies):
+            volumes = self.scene.recording.rest_volumes[body.tets]
+            rest = float(volumes @ growth_of(at.active, len(at.J))[1][body.tets]) if at.active else self._rest[k]
+            change = abs(float(volumes @ at.J[body.tets]) / rest - 1.0)
+            self.tally.see(at, change, not change <= self._limits[k], body.name)

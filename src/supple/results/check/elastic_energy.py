@@ -1,0 +1,175 @@
+"""The elastic energy of a frame, from the recorded laws: the check's own sum over tets, edges and volumes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from supple.materials.elastic_tets.active import GROWTH, ActiveTets
+from supple.materials.isotropic import densities, rest_lame_parameters
+from supple.materials.kinds import needs_positive_volume
+from supple.materials.patches.domains import partition, volume_share
+from supple.materials.per_tet import BY_LAW, NO_REGION, LawTets, TetMaterial
+from supple.materials.tet_energies import element_energies
+from supple.results.check.geometry.quadratic_tets import at_quadrature_points
+from supple.results.recording.physics import RecordedPhysics
+from supple.results.recording.reader import Recording
+from supple.runtime.threads import threads_for
+
+_TETS_PER_THREAD = 5_000
+_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+
+
+def elastic_energy(
+    recording: Recording,
+    x: NDArray[np.float64],
+    J: NDArray[np.float64],
+    rest_inverse: NDArray[np.float64],
+    internal: NDArray[np.float64],
+    active: Sequence[ActiveTets] = (),
+) -> float | None:
+    """[J], zero at rest; None where the recording does not contain the law of a body.
+
+    Parameters
+    ----------
+    x : (n, 3) positions [m]; J : (m,) determinants of F; rest_inverse : (m, 3, 3) Dm^-1 [1/m]
+    internal : (k, 11) internal variables of the frame, see `State`; active : growths of the frame
+    """
+    physics = recording.physics
+    if physics is None:
+        return None
+    grown, ratios = growth_of(active, len(J))
+    rest_inverse, J, all_volumes = rest_inverse @ grown, J / ratios, recording.rest_volumes * ratios
+    total = _flowing(recording, physics, x, rest_inverse, internal, (grown, ratios))
+    for k, body in enumerate(recording.bodies):
+        if not physics.knows_law(k, body.tets):
+            return None
+        tets = np.ascontiguousarray(recording.tets[body.tets])
+        volumes = all_volumes[body.tets]
+        pair = physics.compliances[k]
+        nodes = recording.nodes_of(body)
+        if nodes.shape[1] == 10:
+            F, parts = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
+            F, parts = F @ grown[body.tets, None], parts * ratios[body.tets, None]
+            laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
+            of_points = np.empty(parts.size)
+            densities(F.reshape(-1, 3, 3), *(np.repeat(law, parts.shape[1]) for law in laws), of_points)
+            of_points = np.where(laws[0][:, None] == BY_LAW, 0.0, of_points.reshape(parts.shape))
+            for part in (_of_body(each, body.tets) for each in physics.laws if each.flow is None):
+                for point in range(parts.shape[1]):
+                    of_points[part.rows, point] += part.law.densities(F[part.rows, point], part.parameters)
+            total += float((of_points * parts).sum())
+            continue
+        if pair is None:
+            out = np.empty(len(tets))
+            laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
+            with threads_for(len(tets), _TETS_PER_THREAD):
+                element_energies(x, tets, rest_inverse[body.tets], volumes, *laws, out)
+            own = [_of_body(part, body.tets) for part in physics.laws if part.flow is None]
+            out[laws[0] == BY_LAW] = 0.0
+            F = _gradients(x, tets, rest_inverse[body.tets])
+            for part in own:
+                out[part.rows] += volumes[part.rows] * part.law.densities(F[part.rows], part.parameters)
+            region = physics.region[body.tets]
+            total += float(out[region == NO_REGION].sum())
+            for number in np.unique(region[region != NO_REGION]):
+                of = region == number
+                arrays = tets[of], volumes[of], F[of], J[body.tets][of], [law[of] for law in laws]
+                total += _averaged(*arrays, next((part for part in own if of[part.rows].any()), None))
+            continue
+        if pair[0] > 0.0:
+            edges = np.unique(np.sort(tets[:, _EDGES].reshape(-1, 2), axis=1), axis=0)
+            ends, rest = x[edges], recording.rest_positions[edges]
+            stretch = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) - np.linalg.norm(rest[:, 0] - rest[:, 1], axis=1)
+            total += 0.5 * float(stretch @ stretch) / pair[0]
+        if pair[1] > 0.0:
+            change = (J[body.tets] - 1.0) * volumes
+            total += 0.5 * float(change @ change) / pair[1]
+    return total
+
+
+def growth_of(active: Sequence[ActiveTets], m: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m, 3, 3) the inverses of all growths together, and (m,) their determinants."""
+    F_g = np.tile(np.eye(3), (m, 1, 1))
+    for each in active:
+        if each.kind == GROWTH:
+            d = each.directions
+            stretched = np.einsum("ki,kj->kij", d, d) if len(d) else np.eye(3)
+            F_g[each.rows] = F_g[each.rows] @ (np.eye(3) + (each.value - 1.0) * stretched)
+    return np.asarray(np.linalg.inv(F_g), dtype=np.float64), np.asarray(np.linalg.det(F_g), dtype=np.float64)
+
+
+def _gradients(x, tets, rest_inverse):
+    """(m, 3, 3) F of tets."""
+    x_of = x[tets]
+    return np.einsum("eki,ekj->eij", x_of[:, 1:] - x_of[:, :1], rest_inverse)
+
+
+def _flowing(recording: Recording, physics: RecordedPhysics, x, rest_inverse, internal, growth) -> float:
+    """The energy of what is left of F after growth and flow, F F_g^-1 F_i^-1; rest_inverse is that after growth."""
+    total, begin = 0.0, 0
+    grown, ratios = growth
+    F = _gradients(x, recording.tets, rest_inverse)[:, None]
+    parts = (recording.rest_volumes * ratios)[:, None]
+    for part in physics.laws:
+        if part.flow is None:
+            continue
+        of, volumes = F[part.rows], parts[part.rows]
+        if part.points > 1 and recording.quadratic is not None:
+            rows, all_nodes = recording.quadratic
+            nodes = all_nodes[np.searchsorted(rows, part.rows)]
+            of, volumes = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
+            of, volumes = of @ grown[part.rows, None], volumes * ratios[part.rows, None]
+        inverse = internal[begin : begin + volumes.size, :9].reshape(*volumes.shape, 3, 3)
+        for point in range(part.points):
+            psi = part.law.densities(of[:, point] @ inverse[:, point], part.parameters)
+            total += float(volumes[:, point] @ psi)
+        begin += volumes.size
+    return total
+
+
+def _of_body(part: LawTets, tets: slice) -> LawTets:
+    """The tets of a law that are a body's, with numbers in the body."""
+    inside = (part.rows >= tets.start) & (part.rows < tets.stop)
+    return part.of(part.rows[inside] - tets.start, part.parameters[inside])
+
+
+def _averaged(tets, volumes, F, J, laws, by_law: LawTets | None) -> float:
+    """The energy of one region's tets, averaged over edges and stars (see `materials.patches`)."""
+    kind, mu, lam = laws
+    mu_L, lam_L = rest_lame_parameters(TetMaterial(mu, mu, kind, mu, lam, kind))
+    rest = volume_share(mu_L, lam_L)
+    ends = np.sort(tets[:, _EDGES], axis=2).reshape(-1, 2)
+    _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    shares = sparse.coo_array((np.repeat(volumes / 6.0, 6), (edge.ravel(), np.repeat(np.arange(len(tets)), 6)))).tocsr()
+    around = shares.sum(axis=1)
+    means = (shares @ np.column_stack([F.reshape(-1, 9), mu, lam - rest])) / around[:, None]
+    F_mean = means[:, :9].reshape(-1, 3, 3).copy()
+    out = np.empty(len(means))
+    if by_law is None:
+        densities(F_mean, kind[first // 6], means[:, 9].copy(), means[:, 10].copy(), out)
+    else:
+        p = by_law.parameters.copy()
+        p[:, by_law.law.bulk] -= rest
+        out = by_law.law.densities(F_mean, (shares @ p) / around[:, None])
+    total = float(out @ around)
+    star = partition(tets, np.zeros(len(tets), dtype=np.int32), edge.reshape(-1, 6).astype(np.int32))
+    _, first = np.unique(star, return_index=True)
+    around = np.bincount(star, weights=volumes)
+    J_mean = np.bincount(star, weights=volumes * J) / around
+    factor = np.bincount(star, weights=volumes * rest) / around
+    logarithmic = needs_positive_volume(kind)[first]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        change = np.where(logarithmic, np.log(J_mean), J_mean - 1.0)
+    return total + 0.5 * float((around * factor) @ change**2)
+
+
+def stiffness_scale(recording: Recording) -> float:
+    """An energy [J] that round-off of the elastic energy is measured by: of strains of a few percent everywhere."""
+    physics = recording.physics
+    if physics is None:
+        return 0.0
+    return 1e-3 * float((np.abs(physics.mu) + np.abs(physics.lam)) @ recording.rest_volumes)

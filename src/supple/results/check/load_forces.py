@@ -1,0 +1,67 @@
+"""The forces of loads on vertices, computed anew from a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
+from supple.results.recording.actions.loads import RecordedLoad
+
+
+def load_forces(
+    loads: Mapping[str, RecordedLoad], values: Mapping[str, NDArray[np.float64] | float], x: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """By the name of their work, (n, 3) at positions x (n, 3) [N]; NaN where a value is missing."""
+    out: dict[str, NDArray[np.float64]] = {}
+    for name, load in loads.items():
+        total = out.setdefault(load.work, np.zeros_like(x))
+        _add_forces(load, np.asarray(values.get(name, np.nan)), x, total)
+    return out
+
+
+def _add_forces(
+    load: RecordedLoad, value: NDArray[np.float64], x: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    if load.kind == "pressure":
+        a, b, c = (x[corner] for corner in load.vertices.T)
+        on_corner = -value / 6.0 * np.cross(b - a, c - a)
+        for corner in load.vertices.T:
+            for k in range(3):
+                out[:, k] += np.bincount(corner, on_corner[:, k], len(x))
+        return
+    force = value
+    if load.kind == "spring":
+        r = load.weights @ x[load.vertices] + np.asarray(load.offset)
+        length = float(np.linalg.norm(r))
+        force = -load.stiffness * (length - value) * (r / length if length > 0.0 else np.zeros(3))
+    np.add.at(out, load.vertices, load.weights[:, None] * force)
+
+
+def add_muscle_forces(
+    active: Sequence[ActiveTets],
+    tets: NDArray[np.int32],
+    F: NDArray[np.float64],
+    shapes: tuple[NDArray[np.float64], NDArray[np.float64]],
+    out: NDArray[np.float64],
+) -> None:
+    """Add the forces of all muscles to `out` (n, 3) [N]: those of the stress a S f(s) (F d / s) d^T, s = |F d|.
+
+    Parameters
+    ----------
+    tets : (m, 4); F : (m, 3, 3); shapes : Dm^-1 (m, 3, 3) [1/m] and volumes (m,) [m^3] at rest
+    """
+    for each in active:
+        if each.kind != MUSCLE:
+            continue
+        d, Dm_inv = each.directions, shapes[0][each.rows]
+        ways = np.einsum("mij,mj->mi", F[each.rows], d)
+        s = np.linalg.norm(ways, axis=1)
+        pull = each.value * each.strength * shapes[1][each.rows] * np.interp(s, each.curve[:, 0], each.curve[:, 1])
+        along = ways * (pull / np.where(s > 0.0, s, np.inf))[:, None]
+        # b . d of the shape gradients b: rows of Dm^-1, and minus their sum.
+        inner = np.einsum("mki,mi->mk", Dm_inv, d)
+        for corner, c in enumerate([-inner.sum(axis=1), *inner.T]):
+            np.add.at(out, tets[each.rows, corner], -c[:, None] * along)

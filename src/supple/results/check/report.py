@@ -1,0 +1,106 @@
+"""The results of a check of a recording."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from supple.runtime.replacing import whole_file
+
+
+class Verdict(StrEnum):
+    """How a check ended. Compares equal to its name as text."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    SKIPPED = "skipped"
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """One check.
+
+    Attributes
+    ----------
+    name : of the check; verdict : pass, fail or skipped
+    message : what was found, or why the check was skipped
+    worst : the number closest to failing, or furthest beyond, in the unit below; None where there is none
+    unit : of that number, "" for a ratio
+    frame, time : of that number, frames counted from 0, [s]; None where it belongs to no frame
+    where : the body, and its tet, triangle or vertex
+    failed_frames : number of checked frames in which the check failed; first_failure : the first of them, or None
+    """
+
+    name: str
+    verdict: Verdict
+    message: str
+    worst: float | None = None
+    unit: str = ""
+    frame: int | None = None
+    time: float | None = None
+    where: str = ""
+    failed_frames: int = 0
+    first_failure: int | None = None
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """All checks of one recording.
+
+    Attributes
+    ----------
+    path : of the recording; frames : how many it has; frames_checked : number of frames that were checked
+    results : one for each check, in order
+    """
+
+    path: Path
+    frames: int
+    frames_checked: int
+    results: tuple[CheckResult, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing failed."""
+        return not self.failures
+
+    @property
+    def failures(self) -> tuple[CheckResult, ...]:
+        """The checks that failed."""
+        return tuple(result for result in self.results if result.verdict is Verdict.FAIL)
+
+    def __getitem__(self, name: str) -> CheckResult:
+        """The result of the check of that name."""
+        for result in self.results:
+            if result.name == name:
+                return result
+        raise KeyError(name)
+
+    def __str__(self) -> str:
+        lines = [f"{self.path}: {self.frames_checked} of {self.frames} frames checked"]
+        lines += [f"{result.verdict:>7}  {result.name}: {result.message}" for result in self.results]
+        return "\n".join(lines)
+
+    def to_json(self) -> str:
+        """The report as JSON; numbers that are not finite are written as text."""
+        content = asdict(self) | {"path": str(self.path), "ok": self.ok}
+        for result in content["results"]:
+            for key in ("worst", "time"):
+                value = result[key]
+                if value is not None and not math.isfinite(value):
+                    result[key] = str(value)
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+    def save(self, path: str | Path) -> Path:
+        """Write the report as JSON, completely or not at all.
+
+        Raises
+        ------
+        OutputError : where the file cannot be written.
+        """
+        path = Path(path)
+        with whole_file(path) as fresh:
+            fresh.write_text(self.to_json(), encoding="utf-8", newline="\n")
+        return path

@@ -1,0 +1,225 @@
+"""One frame of a recording as the checks use it: read once, and measured once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
+from supple.results.check.actuator_works import ActuatorState, actuator_states
+from supple.results.check.elastic_energy import elastic_energy
+from supple.results.check.geometry import quadratic_tets
+from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
+from supple.results.check.geometry.orientation import volume_signs
+from supple.results.check.geometry.surface_pairs import meeting_pairs
+from supple.results.check.load_forces import add_muscle_forces, load_forces
+from supple.results.check.seams import seam_keys
+from supple.results.check.stitch_energy import stitch_energy
+from supple.results.check.surfaces import Surfaces
+from supple.results.recording.frame import RecordedFrame
+from supple.results.recording.reader import Recording
+
+_MOST_PAIRS = 1000
+
+
+class Scene:
+    """The data that all frames of a recording share. Seams are among the surfaces' ignored pairs."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.recording = recording
+        self.surfaces = Surfaces(recording)
+        self.surfaces.ignored = np.union1d(self.surfaces.ignored, seam_keys(recording, self.surfaces))
+
+    @cached_property
+    def rest_inverse(self) -> NDArray[np.float64]:
+        """(m, 3, 3) Dm^-1 [1/m]; NaN where a tet is flat at rest."""
+        return _inverses(edge_vectors(self.recording.rest_positions, self.recording.tets))
+
+    @cached_property
+    def quadratic_at_rest(self) -> NDArray[np.float64]:
+        """(k, 10, 3) nodes of the quadratic tets at rest [m]."""
+        quadratic = self.recording.quadratic
+        return np.zeros((0, 10, 3)) if quadratic is None else self.recording.rest_positions[quadratic[1]]
+
+    @cached_property
+    def size(self) -> float:
+        """Longest extent of the largest body at rest [m]."""
+        rest = self.recording.rest_positions
+        return max(float(np.ptp(body.points(rest), axis=0).max()) for body in self.recording.bodies)
+
+    def name(self, kind: Literal["vertex", "tet"], row: int) -> str:
+        """A vertex or tet as messages call it: its number within its body; of a skin, within that."""
+        for body, first in self.surfaces.skins if kind == "vertex" else ():
+            if body.skin is not None and first <= row < first + len(body.skin.corners):
+                return f"vertex {row - first} of {body.name}"
+        for body in self.recording.bodies:
+            rows = body.vertices if kind == "vertex" else body.tets
+            if rows.start <= row < rows.stop:
+                return f"{kind} {row - rows.start} of {body.name}"
+        return f"{kind} {row}"
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One frame.
+
+    Attributes
+    ----------
+    scene : of the frame; number, time : of the frame, [s]
+    positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
+    internal : (k, 11) internal variables of materials that flow, see `State`; active : growths and muscles
+    load_values : vectors and numbers of the recorded loads, by name
+    pressures, tensions : of cavities [Pa], and of spans of cables [N], by name
+    """
+
+    scene: Scene
+    number: int
+    time: float
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    det_F: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    internal: NDArray[np.float64]
+    active: tuple[ActiveTets, ...] = ()
+    load_values: Mapping[str, NDArray[np.float64] | float] = field(default_factory=dict)
+    pressures: Mapping[str, float] = field(default_factory=dict)
+    tensions: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
+        x, v = frame.state.positions, frame.state.velocities
+        details = frame.report.details
+        return cls(
+            scene,
+            frame.number,
+            frame.time,
+            np.ascontiguousarray(x),
+            v,
+            frame.det_F,
+            frame.obstacle_poses,
+            frame.state.internal,
+            frame.active,
+            {**details.load_vectors, **details.load_values},
+            details.cavity_pressure,
+            details.cable_tension,
+        )
+
+    @cached_property
+    def finite(self) -> bool:
+        """Whether positions, velocities and poses are finite."""
+        return all(bool(np.isfinite(values).all()) for values in (self.positions, self.velocities, self.poses))
+
+    @cached_property
+    def signs(self) -> NDArray[np.int8]:
+        """(m,) exact sign of every tet's determinant; of a quadratic one, 1 where it is positive everywhere in it."""
+        signs = volume_signs(self.positions, self.scene.recording.tets)
+        if self.scene.recording.quadratic is not None:
+            rows, nodes = self.scene.recording.quadratic
+            signs[rows] = np.where(quadratic_tets.are_positive(self.positions[nodes]), 1, -1)
+        return signs
+
+    @cached_property
+    def F(self) -> NDArray[np.float64]:
+        """(m, 3, 3) deformation gradients."""
+        return edge_vectors(self.positions, self.scene.recording.tets) @ self.scene.rest_inverse
+
+    @cached_property
+    def J(self) -> NDArray[np.float64]:
+        """(m,) their determinants, computed here; of quadratic tets, the ratios of their volumes."""
+        a, b, c = self.F[:, :, 0], self.F[:, :, 1], self.F[:, :, 2]
+        J = np.einsum("ij,ij->i", a, np.cross(b, c))
+        if self.scene.recording.quadratic is not None:
+            rows, nodes = self.scene.recording.quadratic
+            J[rows] = quadratic_tets.volumes(self.positions[nodes]) / self.scene.recording.rest_volumes[rows]
+        return J
+
+    @cached_property
+    def least_J(self) -> NDArray[np.float64]:
+        """(m,) as `J`; in quadratic tets the smallest of those at nodes and quadrature points."""
+        if self.scene.recording.quadratic is None:
+            return self.J
+        rows, nodes = self.scene.recording.quadratic
+        least = self.J.copy()
+        least[rows] = quadratic_tets.smallest_ratios(self.positions[nodes], self.scene.quadratic_at_rest)
+        return least
+
+    @cached_property
+    def bounded_J(self) -> NDArray[np.float64]:
+        """(m,) as `J`; in quadratic tets, what bounds it below everywhere in them where they are straight at rest."""
+        if self.scene.recording.quadratic is None:
+            return self.J
+        rows, nodes = self.scene.recording.quadratic
+        least = self.J.copy()
+        least[rows] = quadratic_tets.lowest_coefficients(self.positions[nodes], self.scene.quadratic_at_rest)
+        return least
+
+    @cached_property
+    def elastic_energy(self) -> float | None:
+        """[J], zero at rest; None where the recording does not contain the law of a body."""
+        recording, inverse = self.scene.recording, self.scene.rest_inverse
+        return elastic_energy(recording, self.positions, self.J, inverse, self.internal, self.active)
+
+    @cached_property
+    def stitch_energy(self) -> float | None:
+        """[J], zero at rest; None where the recording does not contain the laws of its stitches."""
+        return stitch_energy(self.scene.recording, self.positions, self.poses)
+
+    @cached_property
+    def load_forces(self) -> dict[str, NDArray[np.float64]]:
+        """(n, 3) forces of recorded loads and actuators on the vertices [N], by the name of their work."""
+        recording = self.scene.recording
+        found = load_forces(recording.loads, self.load_values, self.positions)
+        if any(each.kind == MUSCLE for each in self.active):
+            shapes = self.scene.rest_inverse, recording.rest_volumes
+            out = found.setdefault("muscles", np.zeros_like(self.positions))
+            add_muscle_forces(self.active, recording.tets, self.F, shapes, out)
+        for each in self.actuators:
+            out = found.setdefault(each.work, np.zeros_like(self.positions))
+            np.add.at(out, each.vertices, each.force * each.gradient)
+        return found
+
+    @cached_property
+    def actuators(self) -> list[ActuatorState]:
+        """Cavities, and spans of cables."""
+        recording = self.scene.recording
+        values = self.pressures, self.tensions
+        return actuator_states(recording.cavities, recording.cables, *values, self.positions)
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """All points of all surfaces; see `Surfaces.place`."""
+        return self.scene.surfaces.place(self.positions, self.poses)
+
+    @cached_property
+    def tree(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
+        """The boxes around the triangles, and the tree over them: the last arguments of `meeting_pairs`."""
+        low, high = triangle_boxes(self.points, self.scene.surfaces.triangles)
+        return (low, high, *build_tree(low, high))
+
+    @cached_property
+    def meeting(self) -> tuple[int, NDArray[np.int64]]:
+        """How many pairs of triangles meet, and the first ones (k, 2) of them, at most a thousand."""
+        surfaces = self.scene.surfaces
+        out = np.zeros((_MOST_PAIRS, 2), dtype=np.int64)
+        count = meeting_pairs(
+            self.points, surfaces.triangles, surfaces.owners, surfaces.allowed, surfaces.ignored, *self.tree, out
+        )
+        return count, out[: min(count, _MOST_PAIRS)]
+
+
+def edge_vectors(x: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(m, 3, 3) whose columns are x1 - x0, x2 - x0, x3 - x0."""
+    corners = x[tets]
+    return np.ascontiguousarray((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))
+
+
+def _inverses(D: NDArray[np.float64]) -> NDArray[np.float64]:
+    a, b, c = D[:, :, 0], D[:, :, 1], D[:, :, 2]
+    rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return rows / np.einsum("ij,ij->i", a, rows[:, 0])[:, None, None]

@@ -1,0 +1,166 @@
+"""A checkpoint: everything that a run needs to go on with the bits of an uninterrupted one, in one file.
+
+The file is a line that names the format, the SHA-256 of all that follows in hexadecimal digits, a line of JSON, and the
+bytes of all arrays. It is written under a temporary name, brought to the disk, and renamed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import OutputError
+from supple.materials.flows.internal import COLUMNS
+from supple.model.state import State
+from supple.results.checkpoint.memories import MEMORIES
+from supple.results.checkpoint.values import decoded, described, encoded, restored
+from supple.runtime.replacing import whole_file
+
+_FORMAT = b"supple checkpoint 1\n"
+_FAMILY = b"supple checkpoint "
+_DIGEST_LENGTH = 65  # hexadecimal digits, and a newline
+
+
+@dataclass(frozen=True)
+class RunFacts:
+    """What a run is.
+
+    Attributes
+    ----------
+    first_index : of the frame that it began with; steps : number of frames after it
+    dt : time from frame to frame [s]
+    scene : see `scene_hash`; span : begin and duration that it was computed with [s]
+    solver : its description
+    """
+
+    first_index: int
+    steps: int
+    dt: float
+    scene: str
+    span: tuple[float, float]
+    solver: str
+
+    @property
+    def last_index(self) -> int:
+        """Of the frame that the run ends with."""
+        return self.first_index + self.steps
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """A run after one of its frames.
+
+    Attributes
+    ----------
+    run : the whole run; index : of the frame
+    state : with the solver's memory
+    start_states, anchors : see `rebuilt_system`
+    versions : of the programs that computed the frame, by name
+    """
+
+    run: RunFacts
+    index: int
+    state: State
+    start_states: tuple[State, ...]
+    anchors: tuple[NDArray[np.float64], ...]
+    versions: dict[str, str]
+
+
+def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint; what is there is replaced in one moment.
+
+    Raises
+    ------
+    OutputError : where the system refuses, or the solver's memory is of a class that is not registered.
+    """
+    tree, arrays = encoded(checkpoint, _classes())
+    header = json.dumps({"content": tree, "arrays": described(arrays)}, separators=(",", ":")).encode() + b"\n"
+    parts = [header, *(np.ascontiguousarray(array).tobytes() for array in arrays)]
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part)
+    with whole_file(path) as fresh, fresh.open("wb") as file:
+        file.write(_FORMAT + digest.hexdigest().encode() + b"\n")
+        for part in parts:
+            file.write(part)
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Read a checkpoint. Every bit of it is checked before it is used.
+
+    Raises
+    ------
+    OutputError : where the file is missing, of another kind or version, or damaged; the text starts with the path.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if not data.startswith(_FORMAT):
+        if data.startswith(_FAMILY):
+            raise OutputError(f"{path}: was written by a newer Supple; update this one")
+        raise OutputError(f"{path}: is no checkpoint; give one that a run folder of Supple holds")
+    content = data[len(_FORMAT) + _DIGEST_LENGTH :]
+    written = data[len(_FORMAT) : len(_FORMAT) + _DIGEST_LENGTH]
+    if written != hashlib.sha256(content).hexdigest().encode() + b"\n":
+        raise _damaged(path, "its checksum is wrong")
+    try:
+        line, _, rest = content.partition(b"\n")
+        header = json.loads(line)
+        checkpoint = decoded(header["content"], restored(header["arrays"], memoryview(rest)), _classes())
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError) as error:
+        raise _damaged(path, f"its content is not what this version writes ({error})") from None
+    if not isinstance(checkpoint, Checkpoint) or not _is_consistent(checkpoint):
+        raise _damaged(path, "its content is contradictory")
+    return checkpoint
+
+
+def _classes() -> dict[str, type]:
+    return {kind.__name__: kind for kind in (Checkpoint, RunFacts, State, *MEMORIES)}
+
+
+def _damaged(path: Path, what: str) -> OutputError:
+    return OutputError(f"{path}: is damaged: {what}; delete it, so that an earlier checkpoint is used")
+
+
+def _is_consistent(checkpoint: Checkpoint) -> bool:
+    run = checkpoint.run
+    return (
+        isinstance(run, RunFacts)
+        and all(type(number) is int for number in (checkpoint.index, run.first_index, run.steps))
+        and run.first_index <= checkpoint.index <= run.last_index
+        and len(run.span) == 2
+        and all(type(number) is float for number in (run.dt, *run.span))
+        and all(isinstance(text, str) for text in (run.scene, run.solver, *checkpoint.versions.values()))
+        and len(checkpoint.start_states) > 0
+        and all(_is_a_state(state, checkpoint.state) for state in (checkpoint.state, *checkpoint.start_states))
+        and all(isinstance(anchors, np.ndarray) for anchors in checkpoint.anchors)
+    )
+
+
+def _is_a_state(state: object, like: State) -> bool:
+    return (
+        isinstance(state, State)
+        and isinstance(state.time, float)
+        and isinstance(state.inputs, dict)
+        and isinstance(state.hinge_angles, dict)
+        and all(isinstance(angle, float) for angle in state.hinge_angles.values())
+        and isinstance(state.internal, np.ndarray)
+        and state.internal.dtype == np.float64
+        and state.internal.ndim == 2
+        and state.internal.shape[1] == COLUMNS
+        and bool(np.isfinite(state.internal).all())
+        and all(
+            isinstance(rows, np.ndarray)
+            and rows.dtype == np.float64
+            and rows.ndim == 2
+            and rows.shape == (len(like.positions), 3)
+            and bool(np.isfinite(rows).all())
+            for rows in (state.positions, state.velocities)
+        )
+    )

@@ -1,0 +1,98 @@
+"""Recordings in the formats of other programs: one module for each format, and the table of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from supple.errors import OutputError
+from supple.results.drawing import opened
+from supple.results.recording.reader import Recording
+from supple.results.recording.recorder import SUFFIXES as RECORDING_SUFFIXES
+from supple.runtime.replacing import refuse_to_replace
+
+Writer = Callable[[Recording, Path], None]
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format.
+
+    Attributes
+    ----------
+    home : the module in this package, and its function that writes the format
+    suffixes : that a file of this format may have; none where the format is a folder
+    """
+
+    home: str
+    suffixes: tuple[str, ...] = ()
+
+    def writer(self) -> Writer:
+        module, _, name = self.home.partition(":")
+        return getattr(import_module(f"supple.results.{module}"), name)
+
+
+FORMATS = {
+    "glb": Format("export.glb:write_glb", (".glb",)),  # glTF 2.0 with morph targets
+    "obj": Format("export.obj:write_obj_folder"),  # one Wavefront OBJ for each frame
+    "pvd": Format("export.pvd:write_pvd"),  # a ParaView collection and one VTU for each frame
+    "vtu": Format("export.pvd:write_last_vtu", (".vtu",)),  # the last frame as a VTK unstructured grid
+    "vtkhdf": Format("export.vtkhdf:write_vtkhdf", RECORDING_SUFFIXES),  # a recording again, compressed and repaired
+    "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
+    "gif": Format("export.video:write_video", (".gif",)),  # (extra: video)
+    "mp4": Format("export.video:write_video", (".mp4",)),  # (extra: video)
+    "csv": Format("export.table:write_csv", (".csv",)),  # the reports of all frames
+    "parquet": Format("export.table:write_parquet", (".parquet",)),  # the same
+    "html": Format("page:write_page", (".html", ".htm")),  # plays the recording in a browser
+}
+
+
+def export(recording: Recording | str | Path, to: str, output: str | Path | None = None) -> Path:
+    """Write a recording in another format; the path of what was written.
+
+    Parameters
+    ----------
+    recording : an open recording, or its path.
+    to : "glb", "obj", "pvd", "vtu", "vtkhdf", "usd", "gif", "mp4", "csv", "parquet" or "html"; see `FORMATS`.
+    output : file, with a suffix of the format, or folder; beside the recording, under its name, where it is not given.
+        What is there is replaced.
+
+    Raises
+    ------
+    OutputError : where the recording cannot be read, the format is unknown, needs something that is not installed or
+        does not agree with the output's suffix, or the output cannot be written. No incomplete file is left.
+    """
+    name = to.lower().lstrip(".")
+    if name not in FORMATS:
+        raise OutputError(f"export: there is no format {to!r}; take one of {', '.join(FORMATS)}")
+    if output is not None:
+        _require_suffix(name, Path(output))
+    with opened(recording) as source:
+        path = Path(output) if output is not None else source.path.with_name(source.path.stem + _ending(name))
+        refuse_to_replace(source.path, path)
+        FORMATS[name].writer()(source, path)
+    return path
+
+
+def _ending(name: str) -> str:
+    """What follows the stem of the recording in the name of the output."""
+    if not FORMATS[name].suffixes:
+        return f"_{name}"
+    return (".small" if name == "vtkhdf" else "") + FORMATS[name].suffixes[0]
+
+
+def _require_suffix(name: str, output: Path) -> None:
+    """Raise `OutputError` where the name of the output belongs to another format."""
+    chosen, suffix = FORMATS[name], output.suffix.lower()
+    if chosen.suffixes and suffix not in chosen.suffixes:
+        raise OutputError(
+            f"{output}: a file in format {name} must end in {' or '.join(chosen.suffixes)}; name it "
+            f"{output.stem}{chosen.suffixes[0]}, or choose another format"
+        )
+    known = {f".{name}", *(ending for other in FORMATS.values() for ending in other.suffixes)}
+    if not chosen.suffixes and suffix in known:
+        raise OutputError(
+            f"{output}: format {name} is a folder of files; name it {output.stem}, or choose another format"
+        )

@@ -1,0 +1,190 @@
+"""Binary glTF 2.0: one mesh for each body, a morph target for each frame, and their weights animated. Rigid bodies and
+obstacles have animated nodes.
+
+Source: Khronos, "glTF 2.0 Specification", sections 3.7.2.2 (morph targets) and 3.11 (animations). glTF is y up, in
+metres, as in Supple.
+"""
+
+from __future__ import annotations
+
+import logging
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.results.drawing import (
+    ObstaclePicture,
+    Picture,
+    evenly,
+    obstacle_pictures,
+    pictures,
+    vertex_normals,
+    view_of,
+)
+from supple.results.recording.frame import RecordedFrame
+from supple.results.recording.reader import Recording
+from supple.runtime.replacing import whole_file
+
+logger = logging.getLogger(__name__)
+
+# The size of the weights grows with the square of this number, and importers are slow with many targets.
+_MOST_FRAMES = 300
+_FLOAT, _UNSIGNED = 5126, 5125
+_VERTICES, _INDICES = 34962, 34963
+
+
+def write_glb(recording: Recording, output: Path) -> None:
+    """Write bodies (their skins, where they have one) and obstacles; at most 300 frames, evenly spaced."""
+    frames = evenly(recording, _MOST_FRAMES)
+    if len(frames) < len(recording):
+        logger.warning("%s: holds %d of %d frames, evenly spaced", output, len(frames), len(recording))
+    glb = _Glb(frames)
+    for picture in pictures(recording):
+        if picture.body.rigid:
+            glb.add_rigid_body(picture, picture.rest(recording))
+        else:
+            glb.add_body(picture)
+    for obstacle in obstacle_pictures(recording.obstacles, view_of(recording)):
+        glb.add_obstacle(obstacle)
+    with whole_file(output) as fresh:
+        fresh.write_bytes(glb.to_bytes())
+
+
+class _Glb:
+    """A glTF document and its one buffer, to which meshes are added."""
+
+    def __init__(self, frames: list[RecordedFrame]) -> None:
+        import pygltflib
+
+        self.kinds = pygltflib
+        self.frames = frames
+        self.blob = bytearray()
+        self.roots: list[int] = []
+        self.document = pygltflib.GLTF2(
+            asset=pygltflib.Asset(version="2.0", generator="Supple"),
+            scene=0,
+            scenes=[pygltflib.Scene()],
+            animations=[],
+        )
+        times = np.array([frame.time for frame in frames])
+        self.times = self._accessor((times - times[0])[:, None], "SCALAR", bounds=True)
+        self.animation = pygltflib.Animation(name="recording", channels=[], samplers=[])
+
+    def add_body(self, picture: Picture) -> None:
+        """Add a mesh whose base shape is frame 0, and whose k-th morph target gives frame k."""
+        x0 = picture.at(self.frames[0])
+        n0 = vertex_normals(x0, picture.triangles)
+        targets = []
+        for frame in self.frames[1:]:
+            x = picture.at(frame)
+            n = vertex_normals(x, picture.triangles)
+            targets.append({"POSITION": self._vectors(x - x0, bounds=True), "NORMAL": self._vectors(n - n0)})
+        node = self._mesh_node(picture.name, x0, n0, picture.triangles, self._material(picture.color, 1.0), targets)
+        if targets:
+            self._animate(node, "weights", self._weights)
+
+    def add_rigid_body(self, picture: Picture, x: NDArray[np.float64]) -> None:
+        """Add a mesh of its surface x (k, 3) at rest, whose poses are animated."""
+        material = self._material(picture.color, 1.0)
+        poses = np.stack([picture.pose(frame) for frame in self.frames])
+        node = self._mesh_node(picture.name, x, vertex_normals(x, picture.triangles), picture.triangles, material, [])
+        self._place(node, poses)
+
+    def add_obstacle(self, obstacle: ObstaclePicture) -> None:
+        """Add a rigid mesh; its poses are animated where it moves."""
+        # Triangles share no corners, so that edges stay sharp.
+        x = obstacle.vertices[obstacle.triangles.ravel()]
+        triangles = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
+        material = self._material(obstacle.color, obstacle.opacity)
+        node = self._mesh_node(obstacle.name, x, vertex_normals(x, triangles), triangles, material, [])
+        self._place(node, np.stack([frame.obstacle_poses[obstacle.number] for frame in self.frames]))
+
+    def to_bytes(self) -> bytes:
+        """The whole file."""
+        self.document.scenes[0].nodes = self.roots
+        if self.animation.channels:
+            self.document.animations = [self.animation]
+        self.document.buffers = [self.kinds.Buffer(byteLength=len(self.blob))]
+        self.document.set_binary_blob(bytes(self.blob))
+        return b"".join(self.document.save_to_bytes())
+
+    @cached_property
+    def _weights(self) -> int:
+        """Target k has weight 1 in frame k and 0 in all others; the first frame is the mesh itself."""
+        k = len(self.frames)
+        return self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
+
+    def _mesh_node(
+        self, name: str, x: NDArray, normals: NDArray, triangles: NDArray, material: int, targets: list[dict[str, int]]
+    ) -> int:
+        kinds, document = self.kinds, self.document
+        primitive = kinds.Primitive(
+            attributes=kinds.Attributes(POSITION=self._vectors(x, bounds=True), NORMAL=self._vectors(normals)),
+            indices=self._append(triangles.astype("<u4").reshape(-1, 1), _UNSIGNED, "SCALAR", {}, _INDICES),
+            material=material,
+            targets=targets or None,
+        )
+        weights = [0.0] * len(targets)
+        document.meshes.append(kinds.Mesh(name=name, primitives=[primitive], weights=weights or None))
+        document.nodes.append(kinds.Node(name=name, mesh=len(document.meshes) - 1))
+        self.roots.append(len(document.nodes) - 1)
+        return len(document.nodes) - 1
+
+    def _place(self, node: int, poses: NDArray[np.float64]) -> None:
+        """Place a node by the first of its poses (frames, 3, 4), and animate it where they change."""
+        rotations = _quaternions(poses[:, :, :3])
+        made = self.document.nodes[node]
+        made.translation, made.rotation = poses[0, :, 3].tolist(), rotations[0].tolist()
+        if np.any(poses != poses[0]):
+            self._animate(node, "translation", self._vectors(poses[:, :, 3]))
+            self._animate(node, "rotation", self._accessor(rotations, "VEC4"))
+
+    def _animate(self, node: int, path: str, values: int) -> None:
+        kinds, animation = self.kinds, self.animation
+        animation.samplers.append(kinds.AnimationSampler(input=self.times, output=values, interpolation="LINEAR"))
+        target = kinds.AnimationChannelTarget(node=node, path=path)
+        animation.channels.append(kinds.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
+
+    def _material(self, color: tuple[int, int, int], opacity: float) -> int:
+        kinds = self.kinds
+        linear = ((np.array(color) / 255.0 + 0.055) / 1.055) ** 2.4  # sRGB; all our colors are above its linear part
+        surface = kinds.PbrMetallicRoughness(
+            baseColorFactor=[*linear.tolist(), opacity], metallicFactor=0.0, roughnessFactor=0.45
+        )
+        transparent = opacity < 1.0
+        mode = kinds.BLEND if transparent else kinds.OPAQUE
+        made = kinds.Material(pbrMetallicRoughness=surface, doubleSided=transparent, alphaMode=mode, alphaCutoff=None)
+        self.document.materials.append(made)
+        return len(self.document.materials) - 1
+
+    def _vectors(self, values: NDArray, *, bounds: bool = False) -> int:
+        return self._accessor(values, "VEC3", bounds=bounds, target=_VERTICES)
+
+    def _accessor(self, values: NDArray, kind: str, *, bounds: bool = False, target: int | None = None) -> int:
+        data = np.ascontiguousarray(np.nan_to_num(values), dtype="<f4")
+        limits: dict[str, Any] = {"min": data.min(axis=0).tolist(), "max": data.max(axis=0).tolist()} if bounds else {}
+        return self._append(data, _FLOAT, kind, limits, target)
+
+    def _append(self, data: NDArray, component: int, kind: str, limits: dict[str, Any], target: int | None) -> int:
+        kinds, document = self.kinds, self.document
+        view = kinds.BufferView(buffer=0, byteOffset=len(self.blob), byteLength=data.nbytes, target=target)
+        self.blob += data.tobytes()
+        document.bufferViews.append(view)
+        accessor = kinds.Accessor(
+            bufferView=len(document.bufferViews) - 1, componentType=component, count=len(data), type=kind, **limits
+        )
+        document.accessors.append(accessor)
+        return len(document.accessors) - 1
+
+
+def _quaternions(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 4) as (x, y, z, w) of rotations (k, 3, 3), each with the sign that is nearer to the one before it."""
+    from scipy.spatial.transform import Rotation
+
+    q = Rotation.from_matrix(R).as_quat()
+    signs = np.cumprod(np.where(np.einsum("ij,ij->i", q[1:], q[:-1]) < 0.0, -1.0, 1.0))
+    q[1:] *= signs[:, None]
+    return q

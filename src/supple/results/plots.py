@@ -1,0 +1,172 @@
+"""One picture of all measurements of a recording over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.results.drawing import body_color, opened
+from supple.results.recording.reader import Recording
+from supple.runtime.figures import MOST_ENTRIES, legend_below, paper_figure, spans_decades
+
+STITCH_LINE = "#c77700"
+_MAPPINGS = {
+    "cavity_pressure": "pressure in cavities [Pa]",
+    "cavity_volume": "volume of cavities [m³]",
+    "cable_tension": "tension of spans [N]",
+    "cable_length": "length of cables [m]",
+}
+_AXES = (("x", "#d1495b"), ("y", "#3a7d44"), ("z", "#30638e"))
+
+
+def plot_recording(recording: Recording | str | Path, output: str | Path) -> Path:
+    """Draw what a recording has measured over time to a PNG (or PDF, SVG) file.
+
+    Energies, works, momenta, volumes, the smallest J, the time of each step; cavities, cables and sensors where there
+    are some.
+
+    Parameters
+    ----------
+    recording : an open recording, or its path; output : the picture, replaced where it exists.
+
+    Raises
+    ------
+    OutputError : where the recording cannot be read, or the picture cannot be written.
+    """
+    output = Path(output)
+    with opened(recording) as source:
+        more = _panels(source)
+        rows = 3 + (len(more) + 1) // 2
+        with paper_figure(output, 9.0, 2.7 * rows) as figure:
+            axes = [figure.add_subplot(rows, 2, k + 1) for k in range(6)]
+            _draw(source, axes)
+            for k, draw in enumerate(more):
+                axis = figure.add_subplot(rows, 2, 7 + k)
+                draw(axis, source)
+                axes.append(axis)
+            for axis in axes:
+                if not axis.get_xlabel():
+                    axis.set_xlabel("time [s]")
+                    axis.set_xlim(*_whole_time(source))
+                legend_below(axis)
+            figure.suptitle(_title(source), fontsize=12.0)
+    return output
+
+
+def _title(recording: Recording) -> str:
+    names = ", ".join(body.name for body in recording.bodies[:MOST_ENTRIES])
+    rest = len(recording.bodies) - MOST_ENTRIES
+    return f"{names}{f', … and {rest} more' if rest > 0 else ''} ({len(recording)} frames)"
+
+
+def _whole_time(recording: Recording) -> tuple[float, float]:
+    first, last = recording.times[0], recording.times[-1]
+    return first, last if last > first else first + 1.0
+
+
+def _draw(recording: Recording, axes: Sequence[Any]) -> None:
+    t = recording.times
+    energy, volume, linear, angular, worst, wall = axes
+    names = ("kinetic", "elastic", "potential", "stitch")[: 4 if len(recording.stitches) else 3]
+    parts = {name: recording.series(f"{name}_energy") for name in names}
+    for name, values in parts.items():
+        energy.plot(t, values, label=name)
+    energy.plot(t, sum(parts.values()), color="0.2", linewidth=1.0, linestyle="--", label="sum")
+    energy.set_ylabel("energy [J]")
+    _momentum(linear, t, recording.series("linear_momentum"), "linear momentum\n[kg m/s]")
+    _momentum(angular, t, recording.series("angular_momentum"), "angular momentum\nabout the center [kg m²/s]")
+    ratios = volume_ratios(recording)
+    for i, body in enumerate(recording.bodies):
+        volume.plot(t, ratios[:, i], color=tuple(np.array(body_color(i)) / 255.0), label=body.name)
+    volume.set_ylabel("volume / rest volume")
+    worst.plot(t, recording.series("min_det_F"), color="#7a3e9d")
+    worst.axhline(0.0, color="0.2", linewidth=0.8)
+    worst.set_ylabel("smallest J = det F")
+    stretch = recording.series("largest_stitch_stretch")
+    if np.isfinite(stretch).any():
+        right = worst.twinx()
+        right.plot(t, stretch, color=STITCH_LINE)
+        right.set_ylabel("largest stretch of a stitch", color=STITCH_LINE)
+        right.spines["top"].set_visible(False)
+    ms = 1e3 * recording.series("wall_seconds")
+    wall.plot(t[1:], ms[1:], color="0.3")
+    # The first step often compiles or loads the kernels; on a linear axis, the other steps would then not be visible.
+    if spans_decades(ms[1:]):
+        wall.set_yscale("log")
+    else:
+        wall.set_ylim(bottom=0.0)
+    wall.set_ylabel("time of a step [ms]")
+    stopped = [i for i, status in enumerate(recording.statuses) if status != "converged"]
+    if stopped:
+        wall.plot(t[stopped], ms[stopped], "x", color="#d1495b", label="not converged")
+
+
+def _panels(recording: Recording) -> list[Callable[[Any, Recording], None]]:
+    """What is drawn beside the measurements that every recording has."""
+    mappings = {field.name for field in recording.details.fields if field.keys}
+    panels: list[Callable[[Any, Recording], None]] = [_works] if "work" in mappings else []
+    for name, label in _MAPPINGS.items():
+        if name in mappings:
+            panels.append(partial(_mapping, name=name, label=label))
+    panels += [_sensors] if recording.sensors else []
+    return [*panels, _strokes] if any(not sensor.is_grid for sensor in recording.sensors) else panels
+
+
+def _works(axis, recording: Recording) -> None:
+    residual = np.cumsum(recording.frame_values("details/energy_residual"))
+    axis.plot(recording.times, residual, color="0.2", linewidth=1.0, linestyle="--", label="residual")
+    names = next(field.keys for field in recording.details.fields if field.name == "work") or ()
+    sums = np.cumsum(recording.frame_values("details/work"), axis=0)
+    for name, values in zip(names, sums.T, strict=True):
+        if values.any():
+            axis.plot(recording.times, values, label=name)
+    axis.set_ylabel("work since the start [J]")
+
+
+def _mapping(axis, recording: Recording, name: str, label: str) -> None:
+    keys = next(field.keys for field in recording.details.fields if field.name == name) or ()
+    for key, values in zip(keys, recording.frame_values(f"details/{name}").T, strict=True):
+        axis.plot(recording.times, values, label=key)
+    axis.set_ylabel(label)
+
+
+def _sensors(axis, recording: Recording) -> None:
+    for sensor in recording.sensors:
+        values = recording.frame_values(f"sensors/{sensor.number}")
+        normal = values[..., 0].sum(axis=(1, 2)) if sensor.is_grid else values[:, 3]
+        axis.plot(recording.times, normal, label=sensor.name)
+    axis.set_ylabel("normal force on sensors [N]")
+
+
+def _strokes(axis, recording: Recording) -> None:
+    """The normal force on each force sensor against the way of its center of pressure since it was first pushed."""
+    for sensor in recording.sensors:
+        if not sensor.is_grid:
+            values = recording.frame_values(f"sensors/{sensor.number}")
+            pushed = values[values[:, 3] > 0.0]
+            way = np.linalg.norm(pushed[:, 4:] - pushed[:1, 4:], axis=1)
+            axis.plot(way, pushed[:, 3], marker=".", label=sensor.name)
+    axis.set_xlabel("displacement of the center of pressure [m]")
+    axis.set_ylabel("normal force [N]")
+
+
+def _momentum(axis, t: NDArray[np.float64], values: NDArray[np.float64], label: str) -> None:
+    for k, (name, color) in enumerate(_AXES):
+        axis.plot(t, values[:, k], color=color, label=name)
+    axis.set_ylabel(label)
+
+
+def volume_ratios(recording: Recording) -> NDArray[np.float64]:
+    """Volume of each body over its volume at rest, (frames, bodies): the mean of J, weighted by rest volume."""
+    ratios = np.empty((len(recording), len(recording.bodies)))
+    for k, frame in enumerate(recording):
+        J = frame.det_F
+        for i, body in enumerate(recording.bodies):
+            V = recording.rest_volumes[body.tets]
+            ratios[k, i] = (J[body.tets] @ V) / V.sum()
+    return ratios

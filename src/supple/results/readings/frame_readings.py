@@ -1,0 +1,68 @@
+"""What is computed from a frame of a simulation when it is read: strains and stresses, and forces."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.pin_reactions import balanced_reactions
+from supple.model.state import ContactPoints, State
+from supple.model.system import System
+from supple.results.readings.by_body import ByBody
+from supple.results.readings.contact_readings import contact_forces, contact_pressures
+from supple.results.readings.sensor_readings import Reading, sensor_readings
+from supple.results.readings.tet_readings import TetReadings
+
+
+class FrameReadings(TetReadings):
+    """Fields on tets (`TetReadings`), contact on surfaces, sensors, and reactions of pins."""
+
+    state: State
+    system: System
+    report: Any
+
+    @cached_property
+    def contacts(self) -> ContactPoints | None:
+        """All contacts, one by one, where they are known."""
+        return None
+
+    @cached_property
+    def contact_force(self) -> ByBody:
+        """Force of all contacts on each vertex, friction included: by body name, (n, 3) [N].
+
+        Of a body that touches with its skin, those on the skin's vertices.
+        """
+        return self._by_vertex(contact_forces(self.contacts, len(self.system.points)))
+
+    @cached_property
+    def contact_pressure(self) -> ByBody:
+        """Normal force of contacts per area at each vertex: by body name, (n,) [Pa]; 0 where nothing touches."""
+        x = self.system.points.positions(self._x)
+        return self._by_vertex(contact_pressures(self.contacts, x, self.system.triangles))
+
+    @cached_property
+    def reactions(self) -> dict[str, NDArray[np.float64]]:
+        """The force of each pin on its body by the pin's label, (3,) [N].
+
+        Of `Implicit` the exact ones, `report.details.reaction_forces`; of `XPBD` those of `balanced_reactions`.
+        """
+        exact = getattr(self.report.details, "reaction_forces", None)
+        if exact is not None:
+            return dict(exact)
+        rigid = {part.name for part in self.system.rigid_bodies}
+        for pin in self.system.pins:
+            if pin.pin.body not in rigid:
+                self.first_piola[pin.pin.body]  # raises where it is not defined
+        P = self.first_piola.values_of_all
+        return balanced_reactions(self.system, self._x, self.state.time, P, self.contacts, self.report.details)
+
+    @cached_property
+    def sensors(self) -> dict[str, Reading]:
+        """By name, what the scene's sensors feel: `ForceReading` or `TaxelReading`."""
+        return sensor_readings(self.system, self._x, self.contacts)
+
+    def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:
+        return ByBody(values, {part.name: part.points for part in self.system.bodies}, {})

@@ -1,0 +1,167 @@
+"""What sensors feel: the contact forces on parts of surfaces.
+
+The contact force of a vertex acts on those of its triangles that it pushes, in proportion to their areas projected
+along the normal force (`contact_pressures` divides by these areas). Where it pushes none of them, as the mean over a
+frame in which the body turned far may, it acts on all, in proportion to their areas. Each corner of each triangle so
+has a part of the force. The parts of all triangles add up to the whole force, and a part of a surface has those of its
+triangles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.state import ContactPoints
+from supple.model.system import System
+from supple.scene.sensors import ForceSensor, Sensor, Taxels
+
+
+@dataclass(frozen=True, eq=False)
+class ForceReading:
+    """What a `ForceSensor` feels.
+
+    Attributes
+    ----------
+    force : (3,) of all contacts, friction included [N]
+    normal : how hard they push along the inward normals of the triangles [N]
+    center : (3,) the mean place of this push [m]; NaN where nothing touches
+    """
+
+    force: NDArray[np.float64]
+    normal: float
+    center: NDArray[np.float64]
+
+    def numbers(self) -> NDArray[np.float64]:
+        """(7,) all of it, as recordings keep it."""
+        return np.concatenate([self.force, [self.normal], self.center])
+
+    @staticmethod
+    def of_numbers(numbers: NDArray[np.float64]) -> ForceReading:
+        return ForceReading(numbers[:3], float(numbers[3]), numbers[4:])
+
+
+@dataclass(frozen=True, eq=False)
+class TaxelReading:
+    """What `Taxels` feel.
+
+    Attributes
+    ----------
+    normal : (rows, columns) how hard each cell is pushed along the inward normal of the surface [N]
+    shear : (rows, columns, 2) the force along the surface, in the present direction of the grid's first side and across
+        it, towards the second side [N]
+    """
+
+    normal: NDArray[np.float64]
+    shear: NDArray[np.float64]
+
+    def numbers(self) -> NDArray[np.float64]:
+        """(rows, columns, 3) all of it, as recordings keep it."""
+        return np.concatenate([self.normal[:, :, None], self.shear], axis=2)
+
+    @staticmethod
+    def of_numbers(numbers: NDArray[np.float64]) -> TaxelReading:
+        return TaxelReading(numbers[:, :, 0], numbers[:, :, 1:])
+
+
+Reading = ForceReading | TaxelReading
+
+
+def numbers_shape(sensor: Sensor) -> tuple[int, ...]:
+    """The shape of `numbers` of a sensor's readings."""
+    return (*sensor.cells, 3) if isinstance(sensor, Taxels) else (7,)
+
+
+class Touched(NamedTuple):
+    """Triangles (t, 3) and the parts of the contact force at their corners, (t, 3, 3) [N]; normals : (t, 3) now."""
+
+    triangles: NDArray[np.int32]
+    forces: NDArray[np.float64]
+    normals: NDArray[np.float64]
+
+
+def sensor_readings(system: System, x: NDArray[np.float64], contacts: ContactPoints | None) -> dict[str, Reading]:
+    """By name, what the scene's sensors feel where the vertices are at x (n, 3) [m]."""
+    sensors = system.scene.sensors
+    if not sensors:
+        return {}
+    x, rest = system.points.positions(x), system.points.positions(system.rest_positions)
+    touched = _touched(system.triangles, x, contacts)
+    found: dict[str, Reading] = {}
+    for sensor in sensors:
+        part = next(each for each in system.bodies if each.name == sensor.body)
+        rows = part.triangles.start + sensor.triangles(system.scene.bodies)
+        own = Touched(touched.triangles[rows], touched.forces[rows], touched.normals[rows])
+        if isinstance(sensor, Taxels):
+            found[sensor.name] = _taxels(sensor, own, x, rest)
+        elif isinstance(sensor, ForceSensor):
+            found[sensor.name] = _force(own, x)
+    return found
+
+
+def _touched(triangles: NDArray[np.int32], x: NDArray[np.float64], contacts: ContactPoints | None) -> Touched:
+    a, b, c = x[triangles].transpose(1, 0, 2)
+    areas = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(areas, axis=1)[:, None]
+    normals = areas / np.where(lengths > 0.0, lengths, 1.0)
+    if contacts is None or not len(contacts):
+        return Touched(triangles, np.zeros((len(triangles), 3, 3)), normals)
+    pushes = contacts.on_vertices(contacts.forces, len(x))
+    total = contacts.on_vertices(contacts.forces + contacts.friction, len(x))
+    facing = np.maximum(-np.einsum("ti,tci->tc", areas, pushes[triangles]), 0.0)
+    pushed = np.bincount(triangles.ravel(), facing.ravel(), len(x)) > 0.0
+    facing = np.where(pushed[triangles], facing, lengths)
+    sums = np.bincount(triangles.ravel(), facing.ravel(), len(x))
+    shares = facing / np.where(sums > 0.0, sums, 1.0)[triangles]
+    return Touched(triangles, shares[:, :, None] * total[triangles], normals)
+
+
+def _force(touched: Touched, x: NDArray[np.float64]) -> ForceReading:
+    pushes = -np.einsum("ti,tci->tc", touched.normals, touched.forces)
+    normal = float(pushes.sum())
+    center = np.full(3, np.nan)
+    if normal > 0.0:
+        center = np.einsum("tc,tci->i", pushes, x[touched.triangles]) / normal
+    return ForceReading(touched.forces.sum(axis=(0, 1)), normal, center)
+
+
+def _taxels(sensor: Taxels, touched: Touched, x: NDArray[np.float64], rest: NDArray[np.float64]) -> TaxelReading:
+    first, second = np.asarray(sensor.first), np.asarray(sensor.second)
+    corners = rest[touched.triangles]
+    # The center of the third of a triangle that belongs to a corner (bounded by the medians).
+    places = (15.0 * corners + 7.0 * corners.sum(axis=1, keepdims=True)) / 36.0
+    # Coordinates in the grid, projected along its normal.
+    axes = np.linalg.pinv(np.column_stack([first, second]))
+    counts = np.array(sensor.cells)
+    cell = np.floor((places - np.asarray(sensor.corner)) @ axes.T * counts).astype(np.int64)
+    inside = ((cell >= 0) & (cell < counts)).all(axis=2)
+    number = np.ravel_multi_index(tuple(np.where(inside, cell[:, :, k], 0) for k in (0, 1)), sensor.cells)
+    along, across = _directions(touched, x, corners, first, second)
+    values = []
+    for direction in (-touched.normals, along, across):
+        parts = np.where(inside, np.einsum("ti,tci->tc", direction, touched.forces), 0.0)
+        sums = np.bincount(number.ravel(), parts.ravel(), int(counts.prod()))
+        values.append(sums.reshape(sensor.cells))
+    return TaxelReading(values[0], np.stack(values[1:], axis=2))
+
+
+def _directions(
+    touched: Touched,
+    x: NDArray[np.float64],
+    corners: NDArray[np.float64],
+    first: NDArray[np.float64],
+    second: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(t, 3) each: where the grid's first side points now in every triangle, and the direction across it."""
+    sides = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+    now = x[touched.triangles]
+    moved = np.stack([now[:, 1] - now[:, 0], now[:, 2] - now[:, 0]], axis=2)
+    along = np.einsum("tij,tj->ti", moved, np.linalg.pinv(sides) @ first)
+    lengths = np.linalg.norm(along, axis=1)[:, None]
+    along = along / np.where(lengths > 0.0, lengths, 1.0)
+    at_rest = np.cross(sides[:, :, 0], sides[:, :, 1])
+    side = np.sign(np.einsum("ti,i->t", np.cross(at_rest, first), second))
+    return along, side[:, None] * np.cross(touched.normals, along)

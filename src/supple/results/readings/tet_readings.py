@@ -1,0 +1,131 @@
+"""Strains, stresses and energies of a frame, of a simulation or of a recording, computed when they are read."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.elastic_tets.stress import (
+    cauchy_of_tets,
+    energy_densities,
+    first_piolas,
+    mean_deformation_gradients,
+    volume_ratios,
+    von_mises,
+)
+from supple.materials.flows.internal import DISSIPATED, FLOW, checked
+from supple.materials.laws.hencky import HENCKY
+from supple.materials.per_tet import LawTets
+from supple.numerics.svd3 import principal_stretches
+from supple.results.readings.by_body import BodyRows, TetField
+from supple.runtime.displayed import DisplayedFrame
+
+_OF_RIGID = "is rigid: it has no strain and no stress of its own"
+_NO_LAW = "has no known elastic law, so it has no {}; give it an elastic material such as StableNeoHookean"
+_RIGID = "has rigid edges or volumes, whose forces do not follow from positions; give both a compliance above 0"
+
+
+class TetReadings(DisplayedFrame, ABC):
+    """Fields on tets, by body name: `frame.stress["bear"]` is (m, 3, 3), `frame.stress.at_vertices["bear"]` (n, 3, 3).
+
+    Stresses are those of the elastic forces, without the viscous ones of `damping`. A value is not finite where a tet
+    is flat, or where its energy is infinite. Those of a quadratic tet are means over it.
+    """
+
+    @property
+    @abstractmethod
+    def _x(self) -> NDArray[np.float64]: ...
+
+    @cached_property
+    @abstractmethod
+    def _laws(self) -> TetLaws: ...
+
+    @property
+    @abstractmethod
+    def _bodies(self) -> Sequence[BodyRows]: ...
+
+    @property
+    @abstractmethod
+    def _internal(self) -> NDArray[np.float64]: ...
+
+    @cached_property
+    def det_F(self) -> NDArray[np.float64]:
+        """(m,) J of every tet, in the order of the bodies; of a quadratic one, the ratio of its volumes."""
+        return volume_ratios(self._laws, self._x, self._F)
+
+    @cached_property
+    def first_piola(self) -> TetField:
+        """First Piola stress P (m, 3, 3) [Pa]: force per area at rest, P n for the normal n at rest.
+
+        The nodal forces -V P Dm^-T of all tets add up to the elastic forces, with any material.
+        """
+        return self._field(first_piolas(self._laws, self._x, self._F, self._internal), "stress")
+
+    @cached_property
+    def stress(self) -> TetField:
+        """Cauchy stress P F^T / J (m, 3, 3) [Pa]: force per area as it is, symmetric."""
+        P = self.first_piola.values_of_all
+        with np.errstate(all="ignore"):
+            return self._field(cauchy_of_tets(self._laws, self._x, P, self._F, self._internal), "stress")
+
+    @cached_property
+    def von_mises(self) -> TetField:
+        """Von Mises stress (m,) [Pa]: sqrt(3/2 s : s) with the deviator s of the Cauchy stress."""
+        return self._field(von_mises(self.stress.values_of_all), "stress")
+
+    @cached_property
+    def principal_stretches(self) -> TetField:
+        """(m, 3) singular values of F [-], descending; the last one is negative where the tet is inverted."""
+        return TetField(principal_stretches(self._F), self._bodies, self._refused_of_rigid, self._to_vertices)
+
+    @cached_property
+    def energy_density(self) -> TetField:
+        """Strain energy per rest volume (m,) [J/m^3], zero at rest. Rigid edges and volumes have none."""
+        refused = {name: _NO_LAW.format("energy") for name in self._names_where(~self._laws.known)}
+        refused |= self._refused_of_rigid
+        return TetField(
+            energy_densities(self._laws, self._x, self._F, self._internal), self._bodies, refused, self._to_vertices
+        )
+
+    @cached_property
+    def plastic_strain(self) -> TetField:
+        """Accumulated plastic strain (m,) [-] of `J2Plastic`; zero where a tet has none."""
+        return self._of_flow(FLOW, lambda tets: tets.law is HENCKY)
+
+    @cached_property
+    def dissipated_energy(self) -> TetField:
+        """Energy per rest volume (m,) [J/m^3] that viscous and plastic flow has dissipated since the start."""
+        return self._of_flow(DISSIPATED, lambda tets: True)
+
+    def _of_flow(self, column: int, chosen: Callable[[LawTets], bool]) -> TetField:
+        material, out = self._laws.material, np.zeros(len(self._laws.tets))
+        internal = checked(material, self._internal)
+        for tets, rows in material.flowing_laws:
+            if chosen(tets):
+                out[tets.rows] += self._laws.means(tets, internal[rows, column])
+        return TetField(out, self._bodies, self._refused_of_rigid, self._to_vertices)
+
+    @cached_property
+    def _F(self) -> NDArray[np.float64]:
+        return mean_deformation_gradients(self._laws, self._x)
+
+    def _field(self, values: NDArray[np.float64], what: str) -> TetField:
+        refused = dict.fromkeys(self._names_where(~self._laws.stressed), _RIGID)
+        refused |= {name: _NO_LAW.format(what) for name in self._names_where(~self._laws.known)}
+        refused |= self._refused_of_rigid
+        return TetField(values, self._bodies, refused, self._to_vertices)
+
+    @property
+    def _refused_of_rigid(self) -> dict[str, str]:
+        return {body.name: _OF_RIGID for body in self._bodies if body.rigid}
+
+    def _names_where(self, chosen: NDArray[np.bool_]) -> list[str]:
+        return [body.name for body in self._bodies if chosen[body.tets].any()]
+
+    def _to_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._laws.vertex_means(values, len(self._x))

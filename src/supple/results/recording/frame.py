@@ -1,0 +1,165 @@
+"""One frame of a recording, read when it is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import OutputError
+from supple.materials.elastic_tets.active import ActiveTets
+from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.flows.internal import NEVER_FLOWED
+from supple.model.state import State
+from supple.results.frame import Report
+from supple.results.readings.by_body import ByBody
+from supple.results.readings.fields import checked_fields
+from supple.results.readings.sensor_readings import ForceReading, Reading, TaxelReading
+from supple.results.readings.tet_readings import TetReadings
+from supple.results.recording.contents import RecordedContents
+from supple.results.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series
+from supple.results.recording.scene import RecordedBody
+from supple.scene.rigid.pose import Pose, pose_of
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordedFrame(TetReadings):
+    """One frame, read when it is asked for. Names are those of `supple.Frame`; see also `TetReadings`.
+
+    `simulate(..., start=recording[-1])` continues from a frame, with either solver.
+    """
+
+    recording: RecordedContents
+    number: int
+
+    @property
+    def index(self) -> int:
+        """Number of steps since the start."""
+        return int(self.recording._values("supple/frames/index")[self.number])
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return float(self.recording.times[self.number])
+
+    @cached_property
+    def state(self) -> State:
+        """All vertices, in the order of the bodies."""
+        internal = self._rows(INTERNAL) if self.recording.internal_rows else NEVER_FLOWED
+        vertices = self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities")
+        joints = {joint.name for joint in self.recording.joints if joint.kind == "hinge"}
+        known = self.report.joints.items()
+        angles = {name: one.coordinate for name, one in known if name in joints and one.coordinate is not None}
+        return State(self.time, *vertices, internal=internal, hinge_angles=angles)
+
+    @cached_property
+    def positions(self) -> dict[str, NDArray[np.float64]]:
+        """By body name, (n, 3) [m]; of a rigid body, of its surface's vertices."""
+        return {body.name: body.points(self.state.positions) for body in self.recording.bodies}
+
+    @cached_property
+    def velocities(self) -> dict[str, NDArray[np.float64]]:
+        """By body name, (n, 3) [m/s]."""
+        return {body.name: body.points(self.state.velocities) for body in self.recording.bodies}
+
+    @cached_property
+    def det_F(self) -> NDArray[np.float64]:
+        """(m,) J of every tet, in the order of the bodies."""
+        return self._rows("VTKHDF/CellData/det_F")
+
+    @property
+    def _x(self) -> NDArray[np.float64]:
+        return self.state.positions
+
+    @cached_property
+    def _laws(self) -> TetLaws:
+        return replace(self.recording.laws, active=self.active) if self.active else self.recording.laws
+
+    @cached_property
+    def active(self) -> tuple[ActiveTets, ...]:
+        """Growths and muscles with their values in this frame."""
+        physics, values = self.recording.physics, self.report.details.active.values()
+        return () if physics is None else tuple(map(ActiveTets.at, physics.active, values))
+
+    @property
+    def _internal(self) -> NDArray[np.float64]:
+        return self.state.internal
+
+    @property
+    def _bodies(self) -> tuple[RecordedBody, ...]:
+        return self.recording.bodies
+
+    @cached_property
+    def poses(self) -> dict[str, Pose]:
+        """Of the rigid bodies, by name."""
+        values = self.recording.rest_positions, self.state.positions, self.state.velocities
+        rigid = [body for body in self.recording.bodies if body.rigid]
+        return {body.name: pose_of(*(rows[body.vertices] for rows in values)) for body in rigid}
+
+    @cached_property
+    def obstacle_poses(self) -> NDArray[np.float64]:
+        """(obstacles, 3, 4) rotation and translation of each obstacle from its place at time 0 to this frame."""
+        return self._rows("supple/frames/poses")
+
+    @property
+    def contact_force(self) -> ByBody:
+        """By body name, (n, 3) [N], in single precision; an error where the field was not recorded."""
+        return self.field("contact_force")
+
+    @property
+    def contact_pressure(self) -> ByBody:
+        """By body name, (n,) [Pa], in single precision; an error where the field was not recorded."""
+        return self.field("contact_pressure")
+
+    def field(self, name: str) -> ByBody:
+        """A recorded field by body name, in single precision; NaN where a body has no such values.
+
+        Raises
+        ------
+        OutputError : where there is no such field, or it was not recorded.
+        """
+        checked_fields([name])
+        for field in self.recording.fields:
+            if field.name == name:
+                path = field_series(field, 0, 0).path
+                values = self._rows(path).reshape(-1, *field.shape).astype(np.float64)
+                rows = {body.name: body.tets if field.at == "tets" else body.vertices for body in self._bodies}
+                rigid = [body.name for body in self._bodies if body.rigid]
+                return ByBody(values, rows, dict.fromkeys(rigid, "is rigid: a recording has no fields of its surface"))
+        raise OutputError(f"{self.recording.path}: {name} was not recorded; record it with Recorder(fields=[{name!r}])")
+
+    @cached_property
+    def sensors(self) -> dict[str, Reading]:
+        """By name, what the sensors felt."""
+        found: dict[str, Reading] = {}
+        for sensor in self.recording.sensors:
+            numbers = self.recording._values(sensor.series.path)[self.number]
+            found[sensor.name] = (TaxelReading if sensor.is_grid else ForceReading).of_numbers(numbers)
+        return found
+
+    @cached_property
+    def report(self) -> Report:
+        """How the step ended, and what was measured on its state.
+
+        `details` contains the fields that a recording keeps (see `SolverDetails`); `message` is cut after 512 bytes.
+        Both are empty in recordings of version 0.1.
+        """
+        values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
+        vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}
+        distance, stretch = values.pop("min_distance"), values.pop("largest_stitch_stretch")
+        return Report(
+            **values,
+            **vectors,
+            status=self.recording.statuses[self.number],
+            iterations=int(self.recording._values("supple/frames/iterations")[self.number]),
+            min_distance=None if np.isnan(distance) else distance,
+            largest_stitch_stretch=None if np.isnan(stretch) else stretch,
+            message=self.recording._messages(self.number, self.number + 1)[0],
+            details=self.recording.details.of_frame(self.number, self.recording._values),
+        )
+
+    def _rows(self, path: str) -> NDArray[Any]:
+        return self.recording._frame_rows(path, self.number)

@@ -1,0 +1,78 @@
+"""Kernels over `prange` that run on several threads where this is possible, and otherwise on the calling thread."""
+
+from __future__ import annotations
+
+import os
+import threading
+from functools import update_wrapper
+from types import FunctionType
+from typing import Any
+
+import numba
+from numba.core.dispatcher import Dispatcher
+from numba.np.ufunc.parallel import threading_layer
+
+from supple.runtime.threads import is_alone
+
+
+class ParallelKernel:
+    """Two compiled forms of one loop, with the same bits. A call takes the one that is right at that moment.
+
+    The parallel form is not used
+
+    - where one thread is allowed: a call into the threads costs some microseconds even then;
+    - while another Python thread uses it: the layer `workqueue` of Numba ends the process that does so;
+    - after a fork of a process that used GNU OpenMP: the layer `omp` ends the process.
+
+    Parameters
+    ----------
+    function : in Python; serial, parallel : its two forms, each with a name of its own in the cache
+
+    Source: Numba's manual, "The Threading Layers", on safety.
+    """
+
+    def __init__(self, function: FunctionType, serial: Any, parallel: Any) -> None:
+        self.py_func, self.serial, self.parallel = function, serial, parallel
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        if is_alone() or not _threads.allowed() or not _threads.lock.acquire(blocking=False):
+            return self.serial(*arguments)
+        try:
+            return self.parallel(*arguments)
+        finally:
+            _threads.lock.release()
+
+    @property
+    def targetoptions(self) -> dict[str, Any]:
+        """The compiler options of the parallel form."""
+        return self.parallel.targetoptions
+
+    @property
+    def forms(self) -> tuple[Dispatcher, ...]:
+        """The compiled functions; none where NUMBA_DISABLE_JIT is set."""
+        return tuple(form for form in (self.serial, self.parallel) if isinstance(form, Dispatcher))
+
+
+class _Threads:
+    """Whether Numba's threads may be used by the present call."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self._lost = False
+
+    def allowed(self) -> bool:
+        return not self._lost and numba.get_num_threads() > 1
+
+    def after_fork(self) -> None:
+        """The parent's threads do not exist in the child, and its lock may have been held by one of them."""
+        self.lock = threading.Lock()
+        try:
+            self._lost = threading_layer() == "omp"
+        except ValueError:  # the parent had not used any
+            self._lost = False
+
+
+_threads = _Threads()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_threads.after_fork)

@@ -1,0 +1,74 @@
+"""Contacts of surfaces at a point of the search for a minimum, and how far a step may go before anything touches."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.features.contact_set import ContactSet, Found
+from supple.contact.features.contacts import Contacts
+from supple.contact.features.known_weights import KnownWeights
+from supple.contact.features.vertex_contacts import REACH
+from supple.contact.intersections import intersects
+from supple.contact.largest_step import Limit, largest_step_in_pieces
+from supple.contact.mesh.contact_mesh import ContactMesh
+from supple.contact.search.finder import CandidateFinder
+
+
+class Collisions:
+    """Contacts between the triangles of a mesh; those at the latest positions are kept.
+
+    Parameters
+    ----------
+    dhat : [m] contacts are pairs that are nearer than this.
+    """
+
+    def __init__(self, mesh: ContactMesh, dhat: float) -> None:
+        self.mesh = mesh
+        self.dhat = dhat
+        self._finder = CandidateFinder(mesh, REACH * dhat)
+        self._set = ContactSet(mesh, dhat)
+        self._x: NDArray[np.float64] | None = None
+        self._points = np.zeros((0, 3))
+        self._found: Found | None = None
+        self._known = KnownWeights.none()
+
+    def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The mesh's points (s, 3) at x (n, 3), which must not change afterwards."""
+        if x is not self._x:
+            self._x, self._points, self._found = x, self.mesh.points.positions(x), None
+        return self._points
+
+    def at(self, x: NDArray[np.float64]) -> Contacts:
+        """All contacts at x (n, 3)."""
+        return self._at(x).contacts
+
+    def smallest_distance(self, x: NDArray[np.float64]) -> float:
+        """Between surfaces [m]; infinite where nothing is near."""
+        return self._at(x).least
+
+    def forget_weights(self) -> None:
+        """From now on, contacts have the weights that belong to where they are."""
+        self._known, self._found = KnownWeights.none(), None
+
+    def keep_weights(self, x: NDArray[np.float64]) -> None:
+        """Contacts at x (n, 3) keep their weights wherever they go (see `KnownWeights`)."""
+        found = self._at(x)
+        known = self._known.with_more(found.new).with_planes(found.planes)
+        if known is not self._known:
+            self._known, self._found = known, None
+
+    def _at(self, x: NDArray[np.float64]) -> Found:
+        points = self.points(x)
+        if self._found is None:
+            candidates = self._finder.at(points)
+            self._found = self._set.of(points, candidates.vertex_triangle, candidates.edge_edge, self._known)
+        return self._found
+
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> Limit:
+        """How far along `direction` (n, 3), at most 1, nothing touches, and the pair that allows no more."""
+        return largest_step_in_pieces(self._finder, self.points(x), self.mesh.points.positions(direction))
+
+    def intersect(self, x: NDArray[np.float64]) -> bool:
+        """Whether any two triangles that may not cross do so at x."""
+        return intersects(self.mesh, self.points(x))

@@ -1,0 +1,65 @@
+"""Lagged, smoothed Coulomb friction, between triangles and with half-spaces.
+
+Normal forces, directions and points of contact are those of a given state; the force on the relative displacement u in
+the tangent plane since the step began is mu lambda f1(|u|), which rises smoothly from zero to mu lambda at the
+displacement eps_v h: below it friction is static.
+
+Source: Li et al., "Incremental Potential Contact" (2020), section 5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.barrier.friction_energy import (
+    Slips,
+    add_friction_gradient,
+    friction_energy,
+    friction_hessian,
+    renew_duals,
+)
+from supple.contact.mesh.embedded_couplings import vertex_couplings
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.solvers.implicit.energies.potential import ContactPotential, HessianBlocks, Projection
+
+
+@dataclass(frozen=True, eq=False)
+class Friction(ContactPotential):
+    """Of contacts between points.
+
+    Attributes
+    ----------
+    points : that `slips` refers to; reach : eps_v h [m], the displacement below which friction is static
+    duals : (k, 3) the state of a minimization, see `friction_energy`; zero at first: the step is that of the majorizer
+    """
+
+    points: EmbeddedPoints
+    slips: Slips
+    reach: float
+    duals: NDArray[np.float64] = field(init=False)
+    projection = Projection.UNNEEDED
+    work = "friction"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "duals", np.zeros((len(self.slips.forces), 3)))
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return friction_energy(self.points.positions(x), self.slips, self.reach)
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        points = self.points.positions(x)
+        forces = np.zeros_like(points)
+        add_friction_gradient(points, self.slips, self.reach, forces)
+        self.points.add_forces(forces, out)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """The matrix of a primal-dual step, positive semi-definite without projection."""
+        between = friction_hessian(self.points.positions(x), self.slips, self.reach, self.duals)
+        out.couplings.append(vertex_couplings(self.points, between))
+
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        positions = self.points.positions
+        renew_duals(positions(x), positions(direction), self.slips, self.reach, self.duals)

@@ -1,0 +1,223 @@
+"""Elastic energy of all tets: sum V psi(F)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SolverError
+from supple.materials.elastic_tets.laws import of_points
+from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS, QuadraticTets
+from supple.materials.flows.internal import rows_of_points
+from supple.materials.material import Hyperelastic
+from supple.materials.patches.energy import tet_shares
+from supple.materials.per_tet import BY_LAW, NO_REGION, TetMaterial
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.tet_energies import element_energies, element_models
+from supple.model.system import System
+from supple.numerics.sparse.block_csr import incidences
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
+from supple.solvers.implicit.energies.law_elasticity import LawElasticity, LawElements
+from supple.solvers.implicit.energies.patch_elasticity import PatchElasticity
+from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
+from supple.solvers.implicit.energies.quadratic.gathering import Gathering
+from supple.solvers.implicit.energies.quadratic.term import OfQuadraticTets, VirtualTets
+
+# Fewer tets than this are processed by one thread: a pass of 1 ms is too short to share.
+SERIAL_TETS = 2_000
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticElasticity(OfQuadraticTets):
+    """The energy of the quadratic tets `rows` (k,), at their quadrature points.
+
+    Attributes
+    ----------
+    internal : the rows of the internal variables of all tets that belong to these points
+    """
+
+    rows: NDArray[np.int64]
+    at_points: Elasticity
+    internal: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, tets: QuadraticTets, material: TetMaterial, vertices: int) -> QuadraticElasticity:
+        """With the material (m,) of all tets; `vertices` : their number."""
+        virtual = VirtualTets(tets.quadrature, Gathering.of(tets.nodes, vertices))
+        own = of_points(material, tets.rows, QUADRATURE_POINTS)
+        each = np.arange(4 * virtual.count + 1, dtype=np.int32)
+        system = virtual.system()
+        at_points = Elasticity(system, own, each, each[:-1], laws=_law_elasticity(system, own, own.region == NO_REGION))
+        return cls(at_points, virtual, tets.rows, at_points, rows_of_points(material))
+
+    def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) of each element [J]."""
+        return self.at_points.energies(self.virtual.corners(x)).reshape(len(self.rows), -1).sum(axis=1)
+
+    def in_step(self, internal: NDArray[np.float64], h: float) -> QuadraticElasticity:
+        """As of `Elasticity`, with the internal variables of all tets."""
+        if not len(self.internal):
+            return self
+        stepping = self.at_points.in_step(internal[self.internal], h)
+        return replace(self, inner=stepping, at_points=stepping)
+
+    def flowed(self, x: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        """The rows `internal` at the end of a step, from the internal variables of all tets."""
+        return self.at_points.flowed(self.virtual.corners(x), internal[self.internal], h)
+
+
+@dataclass(frozen=True, eq=False)
+class Elasticity(JointlyEvaluated):
+    """The hyperelastic energy of every tet with its own material.
+
+    Attributes
+    ----------
+    material : one row per tet
+    start, incidence : for every vertex the (tet, node) pairs that name it, coded 4 tet + node
+    patches : the energy of the tets that are averaged over patches, or None
+    laws : the energies of tets that are given by laws, or None
+    quadratic : the energy of the quadratic tets, or None
+    with_linked : whether rigid bodies with joints and welds have the energy that keeps them rigid
+    """
+
+    system: System
+    material: TetMaterial
+    start: NDArray[np.int32]
+    incidence: NDArray[np.int32]
+    patches: PatchElasticity | None = None
+    laws: LawElasticity | None = None
+    quadratic: QuadraticElasticity | None = None
+    with_linked: bool = True
+    label = "elasticity"
+    projection = Projection.RELEASED_FIRST
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        parts = [part.value(x) for part in (self.patches, self.laws, self.quadratic) if part is not None]
+        return float(self._own_energies(x).sum()) + sum(parts)
+
+    def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m,) of each tet [J]; those of patches are divided among their tets."""
+        energies = self._own_energies(x)
+        if self.patches is not None:
+            energies[self.patches.patches.rows] += tet_shares(self.patches.patches, x)
+        if self.laws is not None:
+            for rows, values in self.laws.energies(x):
+                energies[rows] += values
+        if self.quadratic is not None:
+            energies[self.quadratic.rows] += self.quadratic.energies(x)
+        return energies
+
+    def _own_energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        s = self.system
+        energies = np.empty(len(s.tets))
+        with threads_for(len(s.tets), SERIAL_TETS):
+            element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, energies)
+        return energies
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        s = self.system
+        energies = np.empty(len(s.tets))
+        gradients = np.empty((len(s.tets), 4, 3))
+        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters
+        with threads_for(len(s.tets), SERIAL_TETS):
+            if hessian is None:
+                element_models(*tets, False, project, energies, gradients, _NO_HESSIANS)
+            else:
+                hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
+            gather_gradients(self.start, self.incidence, gradients, gradient)
+        parts = [part for part in (self.patches, self.laws, self.quadratic) if part is not None]
+        return float(energies.sum()) + sum(part.add_model(x, gradient, hessian, project) for part in parts)
+
+    def in_step(self, internal: NDArray[np.float64], h: float) -> Elasticity:
+        """The energy of a step of h [s] from these internal variables (k, 11), at whose end its forces act."""
+        laws = None if self.laws is None else self.laws.in_step(internal, h)
+        quadratic = None if self.quadratic is None else self.quadratic.in_step(internal, h)
+        return replace(self, laws=laws, quadratic=quadratic)
+
+    def flowed(self, x: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        """(k, 11) the internal variables at the end of a step of h [s] to x (n, 3)."""
+        after = internal if self.laws is None else self.laws.flowed(x, internal, h)
+        if self.quadratic is not None and len(self.quadratic.internal):
+            after = after.copy()
+            after[self.quadratic.internal] = self.quadratic.flowed(x, internal, h)
+        return after
+
+    @cached_property
+    def own(self) -> NDArray[np.bool_]:
+        """(m,) which tets have an energy of their own F: not those of patches or laws, nor the quadratic ones."""
+        own = (self.material.region == NO_REGION) & (self.material.kind != BY_LAW)
+        if self.quadratic is not None:
+            own[self.quadratic.rows] = False
+        for part in () if self.with_linked else self.system.linked_bodies:
+            own[part.tets] = False
+        return own
+
+    @cached_property
+    def _parameters(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+        """Kind, mu and lam (m,) of each tet's own energy: zero where patches, laws or quadratic tets have it."""
+        material = self.material
+        own = self.own
+        if own.all():
+            return material.kind, material.mu, material.lam
+        zero = np.int32(StableNeoHookean.kind())  # with mu = lam = 0, an energy that is zero for every F
+        return np.where(own, material.kind, zero), np.where(own, material.mu, 0.0), np.where(own, material.lam, 0.0)
+
+
+_NO_HESSIANS = np.zeros((0, 12, 12))
+
+
+def elasticity_of(system: System, with_linked: bool = True) -> Elasticity:
+    """The elastic energy of a system, with or without that of its rigid bodies with joints and welds.
+
+    Raises
+    ------
+    SolverError : where a body's material has no elastic energy; the text names the body.
+    """
+    for part in system.bodies:
+        if not isinstance(part.body.material, Hyperelastic):
+            raise SolverError(
+                f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
+                "give it an elastic one such as StableNeoHookean"
+            )
+    start, incidence = incidences(system.tets, len(system.rest_positions))
+    patches = None if system.laws.patches is None else PatchElasticity.of(system.laws.patches)
+    material, quadratic = system.laws.material, None
+    own = material.region == NO_REGION
+    if system.quadratic is not None:
+        quadratic = QuadraticElasticity.of(system.quadratic, material, len(system.rest_positions))
+        own[system.quadratic.rows] = False
+    laws = _law_elasticity(system, material, own)
+    return Elasticity(system, material, start, incidence, patches, laws, quadratic, with_linked)
+
+
+def _law_elasticity(system: System, material: TetMaterial, own: NDArray[np.bool_]) -> LawElasticity | None:
+    """The laws of all tets of a material; of elastic ones, those of the tets (m,) that have an energy of their own."""
+    arrays = system.tets, system.rest_shape_inverse, system.rest_volumes
+    elastic = [LawElements.of(part.selected(own), *arrays) for part in material.elastic_laws]
+    flowing = [
+        (LawElements.of(part, *arrays), part.flow, rows)
+        for part, rows in material.flowing_laws
+        if part.flow is not None and part.points == 1 and len(part.rows)
+    ]
+    elements = tuple(each for each in elastic if len(each.rows))
+    return LawElasticity(elements, tuple(flowing)) if elements or flowing else None
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def gather_gradients(start, incidence, gradients, out):
+    """Add every tet's gradient (m, 4, 3) to its nodes' rows of out (n, 3), in the order of the tets."""
+    for i in prange(len(start) - 1):
+        a, b, c = out[i, 0], out[i, 1], out[i, 2]
+        for p in range(start[i], start[i + 1]):
+            e = incidence[p] >> 2
+            k = incidence[p] & 3
+            a += gradients[e, k, 0]
+            b += gradients[e, k, 1]
+            c += gradients[e, k, 2]
+        out[i, 0], out[i, 1], out[i, 2] = a, b, c

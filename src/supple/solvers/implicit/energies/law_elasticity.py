@@ -1,0 +1,113 @@
+"""Elastic energy of tets whose materials are laws with parameters of their own; see `materials.laws`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.flows.internal import inverse_flow
+from supple.materials.laws.elements import element_forces, element_stiffness
+from supple.materials.per_tet import Flow, Law, LawTets
+from supple.numerics.deformation import deformation_gradients
+from supple.runtime.threads import threads_for
+from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
+
+_SERIAL_TETS = 2_000
+
+
+@dataclass(frozen=True, eq=False)
+class LawElements:
+    """The tets of one law.
+
+    Attributes
+    ----------
+    rows : (k,) which of the system's tets these are; tets : (k, 4); volumes : (k,) [m^3]
+    B : (k, 3, 3) with F = Ds B [1/m]
+    parameters : (k, q) of the law
+    """
+
+    law: Law
+    rows: NDArray[np.int64]
+    tets: NDArray[np.int32]
+    B: NDArray[np.float64]
+    volumes: NDArray[np.float64]
+    parameters: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls,
+        part: LawTets,
+        tets: NDArray[np.int32],
+        Dm_inv: NDArray[np.float64],
+        volumes: NDArray[np.float64],
+    ) -> LawElements:
+        """Those of `part`, from the arrays of all tets of a system."""
+        rows = part.rows
+        chosen = np.ascontiguousarray(tets[rows]), np.ascontiguousarray(Dm_inv[rows]), volumes[rows]
+        return cls(part.law, rows, *chosen, part.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class LawElasticity(JointlyEvaluated):
+    """The sum of V psi(F) over all tets of all laws.
+
+    Attributes
+    ----------
+    elements : of laws that do not flow, and in a step of those that do
+    flowing : of laws that flow, with the flow and the rows of its internal variables
+    """
+
+    elements: tuple[LawElements, ...]
+    flowing: tuple[tuple[LawElements, Flow, slice], ...] = ()
+    label = "elasticity"
+    projection = Projection.RELEASED_FIRST
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return float(sum(energies.sum() for _, energies in self.energies(x)))
+
+    def energies(self, x: NDArray[np.float64]) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+        """Of each law the numbers of its tets, and their energies [J]."""
+        found = []
+        for each in self.elements:
+            F = deformation_gradients(x, each.tets, each.B)
+            found.append((each.rows, each.volumes * each.law.densities(F, each.parameters)))
+        return found
+
+    def in_step(self, internal: NDArray[np.float64], h: float) -> LawElasticity:
+        """The energy of a step of h [s] from these internal variables: flow makes F_e = Ds B F_i^-1 the trial one."""
+        stepping = []
+        for each, flow, rows in self.flowing:
+            p = flow.step_parameters(each.parameters, internal[rows], h)
+            B = np.ascontiguousarray(each.B @ inverse_flow(internal[rows]))
+            stepping.append(replace(each, law=flow.step_law, B=B, parameters=np.ascontiguousarray(p)))
+        return replace(self, elements=(*self.elements, *stepping), flowing=())
+
+    def flowed(self, x: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        """The internal variables at the end of a step of h [s] to x (n, 3)."""
+        after = internal.copy()
+        for each, flow, rows in self.flowing:
+            F = deformation_gradients(x, each.tets, np.ascontiguousarray(each.B @ inverse_flow(internal[rows])))
+            after[rows] = flow.advanced(F, each.parameters, internal[rows], h)
+        return after
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        total = 0.0
+        for each in self.elements:
+            F = deformation_gradients(x, each.tets, each.B)
+            psi, P, H = each.law.models(F, each.parameters, hessian is not None, project)
+            total += float((each.volumes * psi).sum())
+            forces = np.empty((len(psi), 4, 3))
+            with threads_for(len(psi), _SERIAL_TETS):
+                element_forces(P, each.B, each.volumes, forces)
+                if hessian is not None:
+                    blocks = np.empty((len(psi), 12, 12))
+                    element_stiffness(H, each.B, each.volumes, blocks)
+                    hessian.tets[each.rows] += blocks
+            for k in range(3):
+                weights = forces[:, :, k].ravel()
+                gradient[:, k] += np.bincount(each.tets.ravel(), weights=weights, minlength=len(gradient))
+        return total

@@ -1,0 +1,55 @@
+"""Pressure that follows a surface, as a potential: p W, with the volume W that the surface sweeps in the step.
+
+Of a closed surface W is the change of its volume, so that the forces are exact everywhere and derive from a potential.
+Of a part of a surface they have none. The gradient of p W is then the exact force where the step begins, and follows
+the surface within the step up to an error of first order in its length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.loads.pressure import FollowerPressure, SweptTriangles
+from supple.model.system import System
+from supple.numerics.sparse.couplings import Couplings
+from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+
+
+@dataclass(frozen=True, eq=False)
+class PressurePotential(Potential):
+    """One pressure in one step.
+
+    Parameters
+    ----------
+    triangles : (t, 3); pressure : p [Pa]; start : (n, 3) where the step begins [m]
+    """
+
+    triangles: NDArray[np.int32]
+    pressure: float
+    start: NDArray[np.float64]
+    projection = Projection.RELEASED_FIRST
+    work = "pressures"
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return self.pressure * self._swept(x).volume()
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        self._swept(x).add_gradient(self.pressure, out)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """With `project`, zero: the linear model. The true one has no diagonal, so that it is never definite."""
+        if not project:
+            rows, columns, blocks = self._swept(x).hessian()
+            out.loads.append(Couplings(rows, columns, self.pressure * blocks))
+
+    def _swept(self, x: NDArray[np.float64]) -> SweptTriangles:
+        return SweptTriangles(self.start, x, self.triangles)
+
+
+def pressures_at(system: System, x: NDArray[np.float64], time: float) -> list[PressurePotential]:
+    """The pressures at `time` [s] of a step that begins at x (n, 3)."""
+    loads = (load for load in system.loads if isinstance(load, FollowerPressure))
+    return [PressurePotential(load.triangles, load.pressure(time), x) for load in loads]

@@ -1,0 +1,51 @@
+"""Springs between points of bodies: k / 2 (l - l0)^2, l = |r|, r = sum c_i x_i + offset."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.loads.springs import PointSpring
+from supple.model.system import System
+from supple.numerics.sparse.couplings import Couplings
+from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+
+
+@dataclass(frozen=True, eq=False)
+class SpringPotential(Potential):
+    """The springs with their rest lengths at `time` [s]."""
+
+    springs: tuple[PointSpring, ...]
+    time: float
+    projection = Projection.RELEASED_FIRST
+    work = "springs"
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return sum(spring.energy(x, self.time) for spring in self.springs)
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        pull = np.zeros_like(out)
+        for spring in self.springs:
+            spring.add_forces(x, self.time, pull)
+        out -= pull
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """By r: k n n^T + k (1 - l0 / l) (I - n n^T); with `project`, the second term only where it is positive."""
+        for spring in self.springs:
+            length, n = spring.length(x)
+            across = 1.0 - spring.rest_length(self.time) / length if length > 0.0 else 0.0
+            if project:
+                across = max(across, 0.0)
+            along = np.outer(n, n)
+            by_r = spring.stiffness * (along + across * (np.eye(3) - along))
+            c, (i, j) = spring.coefficients, np.triu_indices(len(spring.vertices))
+            blocks = (c[i] * c[j])[:, None, None] * by_r
+            out.loads.append(Couplings(spring.vertices[i], spring.vertices[j], blocks))
+
+
+def springs_at(system: System, time: float) -> list[SpringPotential]:
+    """The scene's springs at `time` [s]; no term where there are none."""
+    springs = tuple(load for load in system.loads if isinstance(load, PointSpring))
+    return [SpringPotential(springs, time)] if springs else []

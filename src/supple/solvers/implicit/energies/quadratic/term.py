@@ -1,0 +1,122 @@
+"""Energies of tets, summed over points in quadratic tets.
+
+Energies of tets are functions of F. Each point of an element becomes a virtual tet whose corners are zero and the
+columns of F, and whose rest shape is the unit tet, so that its own deformation gradient is F. Any potential of tets
+acts on the virtual tets as on others. Their corners are linear in the positions of the element's ten nodes, y = W x;
+so the gradient is W^T g, and the Hessian W^T H W.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.quadratic import PointsInTets
+from supple.numerics.sparse.couplings import Couplings
+from supple.runtime.threads import threads_for
+from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Potential, Projection
+from supple.solvers.implicit.energies.quadratic.gathering import Gathering
+from supple.solvers.implicit.energies.quadratic.kernels import (
+    add_by_vertex,
+    element_blocks,
+    element_forces,
+    place_virtual_tets,
+    sum_pairs,
+)
+
+# Fewer elements than this are processed by one thread.
+SERIAL_ELEMENTS = 300
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualTets:
+    """The virtual tets of points in quadratic tets, and how they add up."""
+
+    points: PointsInTets
+    gathering: Gathering
+
+    @property
+    def count(self) -> int:
+        return self.points.volumes.size
+
+    def system(self) -> Any:
+        """The virtual tets under the names of a system's tets."""
+        unit = np.ascontiguousarray(np.broadcast_to(np.eye(3), (self.count, 3, 3)))
+        tets = np.arange(4 * self.count, dtype=np.int32).reshape(-1, 4)
+        return SimpleNamespace(tets=tets, rest_shape_inverse=unit, rest_volumes=self.points.volumes.ravel())
+
+    def corners(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(4 m, 3) corners of the virtual tets for positions, or velocities, x (n, 3)."""
+        with self._threads():
+            out = np.empty((self.count, 4, 3))
+            place_virtual_tets(self.points.deformation_gradients(x).reshape(-1, 3, 3), out)
+        return out.reshape(-1, 3)
+
+    def add_forces(self, forces: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Add W^T f, of forces (4 m, 3) on the corners, to `out` (n, 3)."""
+        with self._threads():
+            of_nodes = np.empty((len(self.points.nodes), 10, 3))
+            element_forces(self.points.gradients, forces.reshape(-1, 4, 3), of_nodes)
+            add_by_vertex(self.gathering.start, self.gathering.entries, of_nodes.reshape(-1, 3), out)
+
+    def couplings(self, hessians: NDArray[np.float64]) -> Couplings:
+        """W^T H W of matrices (m, 12, 12) of the virtual tets."""
+        pairs = self.gathering
+        sums = np.empty((len(pairs.rows), 3, 3))
+        with self._threads():
+            blocks = np.empty((len(self.points.nodes), 10, 10, 3, 3))
+            element_blocks(self.points.gradients, hessians, blocks)
+            sum_pairs(pairs.pair_start, pairs.pair_entries, blocks.reshape(-1, 3, 3), sums)
+        return Couplings(pairs.rows, pairs.columns, sums)
+
+    def _threads(self):
+        return threads_for(len(self.points.nodes), SERIAL_ELEMENTS)
+
+
+@dataclass(frozen=True, eq=False)
+class OfQuadraticTets(JointlyEvaluated):
+    """A potential of tets, acting on the virtual tets of quadratic ones.
+
+    Parameters
+    ----------
+    inner : made for `virtual.system()`; it may add nothing but matrices of tets to a Hessian.
+    """
+
+    inner: Potential
+    virtual: VirtualTets
+
+    @property
+    def label(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The label of the inner potential."""
+        return self.inner.label
+
+    @property
+    def work(self) -> str | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """That of the inner potential."""
+        return self.inner.work
+
+    @property
+    def projection(self) -> Projection:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """That of the inner potential."""
+        return self.inner.projection
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return self.inner.value(self.virtual.corners(x))
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        y, m = self.virtual.corners(x), self.virtual.count
+        forces = np.zeros_like(y)
+        blocks = None
+        if hessian is not None:
+            blocks = HessianBlocks(np.empty((m, 12, 12)), np.zeros((0, 3, 3)), m, blank=True)
+        energy = self.inner.add_model(y, forces, blocks, project)
+        self.virtual.add_forces(forces, gradient)
+        if hessian is not None and blocks is not None and not blocks.blank:
+            hessian.patches.append(self.virtual.couplings(blocks.tets))
+        return energy

@@ -1,0 +1,146 @@
+"""Prevents the inversion of tets: which bodies are guarded, how far a step may go, and the check after it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SolverError
+from supple.materials.kinds import without_inversion
+from supple.materials.per_tet import TetMaterial
+from supple.materials.tet_energies import deformation_gradient
+from supple.model.system import System
+from supple.numerics.mat3 import det
+from supple.numerics.noninverting_step import KEEP, noninverting_step, volume_signs
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import threads_for
+from supple.solvers.implicit.energies.elasticity import SERIAL_TETS
+from supple.solvers.implicit.energies.quadratic.bernstein_barrier import BernsteinBarrier
+from supple.solvers.implicit.quadratic_guard import QuadraticGuard, are_positive
+
+
+@dataclass(eq=False)
+class InversionGuard:
+    """The step filter on all tets of every body that has no inverted one. Other bodies may recover first.
+
+    J of a quadratic tet is bounded everywhere in it.
+
+    A body is guarded as a whole. A guard on its positive tets alone would lock it: to untangle, some of them have to
+    pass through zero volume.
+
+    Attributes
+    ----------
+    guarded : (m,) bool; keep : share of its volume that a tet keeps at least in one step, in (0, 1)
+    complete : whether all tets are guarded; quadratic : how the quadratic ones are, or None
+    """
+
+    system: System
+    guarded: NDArray[np.bool_]
+    keep: float = KEEP
+    complete: bool = False
+    quadratic: QuadraticGuard | None = None
+
+    @classmethod
+    def at(cls, system: System, x: NDArray[np.float64], keep: float = KEEP) -> InversionGuard:
+        """Guard the bodies that have no flat or inverted tet at x."""
+        guard = cls(system, np.zeros(len(system.tets), dtype=np.bool_), keep)
+        if system.quadratic is not None:
+            guard.quadratic = QuadraticGuard.at(system.quadratic, x)
+        guard.widen(x)
+        return guard
+
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
+        """The largest step along `direction`, at most 1, and the tet that limits it (-1 where none does)."""
+        with threads_for(len(self.system.tets), SERIAL_TETS):
+            step, tet = noninverting_step(x, direction, self.system.tets, self._linear, self.keep)
+        if self.quadratic is None:
+            return float(step), int(tet)
+        own, which = self.quadratic.largest_step(x, direction, self.guarded[self.quadratic.tets.rows], self.keep)
+        return (own, which) if own < step else (float(step), int(tet))
+
+    @property
+    def _linear(self) -> NDArray[np.bool_]:
+        """(m,) the guarded linear tets."""
+        if self.quadratic is None:
+            return self.guarded
+        linear = self.guarded.copy()
+        linear[self.quadratic.tets.rows] = False
+        return linear
+
+    def name(self, tet: int) -> str:
+        """Of a tet, by its number in its body."""
+        for part in self.system.bodies:
+            if part.tets.start <= tet < part.tets.stop:
+                return f"tet {tet - part.tets.start} of body {part.name!r}"
+        return f"tet {tet}"
+
+    def allows(self, x: NDArray[np.float64]) -> bool:
+        """Whether every guarded tet has a positive volume at x, a quadratic one everywhere in it."""
+        with threads_for(len(self.system.tets), SERIAL_TETS):
+            kept = bool(keeps_volume(x, self.system.tets, self.system.rest_shape_inverse, self._linear))
+        if self.quadratic is None or not kept:
+            return kept
+        return self.quadratic.allows(x, self.guarded[self.quadratic.tets.rows])
+
+    def quadratic_barrier(self, onset: float) -> BernsteinBarrier | None:
+        """The barrier below J = `onset` of the guarded quadratic tets; None where there is none."""
+        if self.quadratic is None:
+            return None
+        tets, material = self.quadratic.tets, self.system.laws.material
+        chosen = np.flatnonzero(self.guarded[tets.rows] & self.quadratic.by_coefficients)
+        if len(chosen) == 0:
+            return None
+        rows = tets.rows[chosen]
+        stiffness = onset * (material.mu[rows] + np.abs(material.lam[rows])) * self.system.rest_volumes[rows] / 20.0
+        return BernsteinBarrier(tets.nodes[chosen], tets.rest_coefficients[chosen], stiffness, onset)
+
+    def widen(self, x: NDArray[np.float64]) -> None:
+        """From now on, also guard the bodies that have no flat or inverted tet at x."""
+        if self.complete:
+            return
+        positive = _are_positive(self.system, x)
+        for part in self.system.bodies:
+            if positive[part.tets].all():
+                self.guarded[part.tets] = True
+        self.complete = bool(self.guarded.all())
+
+
+def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64]) -> None:
+    """Check that no tet whose material has no energy at J <= 0 is flat or inverted at x.
+
+    Raises
+    ------
+    SolverError : where one is; the text names the body and its tets.
+    """
+    bad = without_inversion(material) & ~_are_positive(system, x)
+    if not bad.any():
+        return
+    for part in system.bodies:
+        tets = np.flatnonzero(bad[part.tets])
+        if len(tets):
+            names = ", ".join(str(e) for e in tets[:10]) + (", ..." if len(tets) > 10 else "")
+            raise SolverError(
+                f"body {part.name!r}: {len(tets)} of {part.tets.stop - part.tets.start} tets are flat or inverted at "
+                f"the start (tets {names}), where {type(part.body.material).__name__} has no finite energy; start "
+                "un-inverted, or use StableNeoHookean, which recovers"
+            )
+
+
+def _are_positive(system: System, x: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(m,) whether J is positive everywhere in a tet."""
+    positive = volume_signs(x, system.tets) > 0.0
+    if system.quadratic is not None:
+        positive[system.quadratic.rows] = are_positive(system.quadratic, x)
+    return positive
+
+
+@njit(parallel=True, cache=True, error_model="numpy")
+def keeps_volume(x, tets, Dm_inv, guarded):
+    """Whether J = det(Ds Dm^-1) > 0 in every guarded tet, in rounded numbers: a step is taken only where this holds."""
+    bad = 0
+    for e in prange(len(tets)):
+        if guarded[e] and not det(deformation_gradient(x, tets, Dm_inv, e)) > 0.0:
+            bad += 1
+    return bad == 0

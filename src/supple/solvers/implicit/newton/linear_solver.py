@@ -1,0 +1,217 @@
+"""Newton's linear systems in the free vertices: assembled in place, solved by preconditioned CG or directly."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.system import System
+from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, build_pattern
+from supple.numerics.sparse.block_sum import JointPattern
+from supple.numerics.sparse.couplings import Couplings
+from supple.numerics.sparse.pcg import CGResult, conjugate_gradients
+from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
+from supple.runtime.thread_tuning import ThreadTuner
+from supple.runtime.threads import one_thread
+from supple.solvers.implicit.energies.potential import HessianBlocks
+from supple.solvers.implicit.newton.direct_solver import solve_directly
+from supple.solvers.implicit.newton.reduction import Reduction
+
+logger = logging.getLogger(__name__)
+
+# Where CG has not converged after this many iterations, a factorization is likely faster: usual systems take 10 to 60,
+# thin bodies of nearly incompressible material more than 500 (docs/implicit.md).
+_STALLED = 400
+
+# After this many systems the slower number of threads is tried again (see `ThreadTuner`). The work of a system is
+# counted in iterations of CG; its assembly is worth about ten.
+_REST = 40
+_ASSEMBLY = 10
+
+# The coarse level of the preconditioner is renewed where CG takes so many times its first number of iterations, and so
+# many more: a renewal costs about as much as the iterations that it saves.
+_AGED_RATIO = 1.5
+_AGED_EXTRA = 4
+
+
+@dataclass(frozen=True)
+class LinearReport:
+    """The method of a solve, its CG iterations, and the residual's preconditioned norm at the start."""
+
+    method: str
+    iterations: int
+    first_norm: float
+
+
+@dataclass(eq=False)
+class LinearSolver:
+    """The matrix of the free vertices and its preconditioner; its coarse level is reused from iteration to iteration.
+
+    Attributes
+    ----------
+    kind : "auto" (CG, and a factorization where CG stalls), "pcg" or "direct"
+    order : which vertex each row belongs to; row_of : (n,) row of each vertex, -1 where it is pinned
+    matrix : the sparse part; low_rank : (k, rows, 3) vectors g, of which g g^T is added to it
+    age, fresh_iterations : the number of runs of CG on the present coarse level (-1: none), and the iterations of the
+        first one
+    """
+
+    kind: str
+    order: RowOrder
+    row_of: NDArray[np.int32]
+    pattern: BlockPattern
+    elements_only: TwoLevel
+    elements: NDArray[np.float64]
+    matrix: NDArray[np.float64] = field(init=False)
+    preconditioner: TwoLevel = field(init=False)
+    joint: JointPattern | None = None
+    reduction: Reduction | None = None
+    low_rank: NDArray[np.float64] = field(init=False)
+    age: int = -1
+    fresh_iterations: int = 0
+    pace: ThreadTuner = field(init=False)
+    parallel: bool = True
+    spent: float = 0.0
+
+    @classmethod
+    def of(cls, system: System, kind: str) -> LinearSolver:
+        """Build the pattern and the groups of a system's free vertices."""
+        free = np.ones(len(system.rest_positions), dtype=bool)
+        free[system.pinned_vertices] = False
+        free[system.welding.vertices] = False
+        order = order_rows(system.rest_positions, system.components, system.elements, free)
+        rows = np.full(len(free) + 1, -1, dtype=np.int32)  # the last one for nodes without a vertex, number -1
+        rows[order.vertices] = np.arange(len(order.vertices), dtype=np.int32)
+        pattern = build_pattern(rows[system.elements], len(order.vertices))
+        preconditioner = two_level(pattern, system.rest_positions[order.vertices], order.group_start)
+        elements = np.zeros((pattern.blocks, 3, 3))
+        return cls(kind, order, rows[:-1], pattern, preconditioner, elements, reduction=Reduction.of(system))
+
+    def __post_init__(self) -> None:
+        self.matrix, self.preconditioner = self.elements, self.elements_only
+        self.low_rank = np.zeros((0, len(self.order.vertices), 3))
+        choice = numba.get_num_threads() > 1 and self.pattern.blocks >= SERIAL_BLOCKS
+        self.pace = ThreadTuner(choice, choice, _REST)
+
+    def begin_step(self) -> None:
+        """Discard what earlier steps have left, so that a step depends on its state alone."""
+        self.age, self.joint = -1, None
+
+    def assemble(self, hessian: HessianBlocks) -> None:
+        """Assemble the matrix of a new Hessian, and update the preconditioner."""
+        began = perf_counter()
+        self.parallel = self.pace.choose()
+        with one_thread(not self.parallel):
+            diagonal = hessian.vertices[self.order.vertices]
+            reduction = self.reduction
+            if couplings := (hessian.beyond_elements if reduction is None else reduction.couplings(hessian)):
+                self._assemble_joint(hessian.elements, diagonal, Couplings.joined(couplings))
+            else:
+                if self.joint is not None:
+                    self.joint, self.age = None, -1
+                self.matrix, self.preconditioner = self.elements, self.elements_only
+                self.pattern.assemble(hessian.elements, diagonal, self.elements)
+            count = len(self.order.vertices)
+            self.low_rank = np.zeros((len(hessian.low_rank), count, 3))
+            for k, part in enumerate(hessian.low_rank):
+                self.low_rank[k] = part.in_rows(self.row_of, count)
+            if self.kind != "direct":
+                self.preconditioner.update(self.matrix, coarse=self.age < 0)
+        self.spent = perf_counter() - began
+
+    def _assemble_joint(
+        self, elements: NDArray[np.float64], diagonal: NDArray[np.float64], couplings: Couplings
+    ) -> None:
+        """Assemble with couplings of vertices that no element joins, on a new pattern where one has no block yet."""
+        places = self.joint.places(couplings) if self.joint is not None else None
+        if self.joint is None or places is None:
+            self.joint = JointPattern.of(self.pattern, couplings, self.row_of)
+            places = self.joint.places(couplings)
+            assert places is not None
+            before = self.preconditioner.first
+            self.preconditioner = self.elements_only.on(self.joint.pattern)
+            if not np.array_equal(before, self.preconditioner.first):
+                self.age = -1
+            self.matrix = np.empty((self.joint.pattern.blocks, 3, 3))
+        self.joint.assemble(elements, diagonal, couplings.blocks, places, self.matrix)
+
+    def solve(
+        self, force: NDArray[np.float64], tolerance: float, convex: bool = True
+    ) -> tuple[NDArray[np.float64] | None, LinearReport]:
+        """Solve H p = force.
+
+        Parameters
+        ----------
+        force : (n, 3), of which the free rows are read; tolerance : relative, for CG
+        convex : whether the Hessian is known to be positive semi-definite. Where that is not known, every method checks
+            it: CG the curvature along its directions, the factorization the signs of all eigenvalues
+
+        Returns
+        -------
+        p : (n, 3), zero where pinned, and welded vertices with their rigid bodies; None where the system could not be
+            solved, or was found to be indefinite
+        """
+        began = perf_counter()
+        with one_thread(not self.parallel):
+            p, report = self._solve(force, tolerance, convex)
+        if p is not None and self.reduction is not None:
+            self.reduction.welding.follow(p)
+        seconds = self.spent + perf_counter() - began
+        self.pace.note(self.parallel, seconds / (_ASSEMBLY + report.iterations))
+        return p, report
+
+    def _solve(
+        self, force: NDArray[np.float64], tolerance: float, convex: bool
+    ) -> tuple[NDArray[np.float64] | None, LinearReport]:
+        b = force[self.order.vertices]
+        x = np.zeros_like(b)
+        p = np.zeros_like(force)
+        if len(b) == 0 or not b.any():
+            return p, LinearReport("none", 0, 0.0)
+        first_norm = 0.0
+        iterations = 0
+        if self.kind != "direct":
+            most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
+            result = self._conjugate_gradients(b, x, tolerance, most)
+            if result.indefinite and not convex:
+                return None, LinearReport("pcg", result.iterations, result.first_norm)
+            if not result.converged and self.age > 0:
+                # The coarse level belongs to an older matrix.
+                iterations += result.iterations
+                self.preconditioner.update(self.matrix)
+                self.age = -1
+                result = self._conjugate_gradients(b, x, tolerance, most)
+            iterations += result.iterations
+            first_norm = result.first_norm
+            self._age_by(result.iterations)
+            if result.converged or (self.kind == "pcg" and np.isfinite(x).all() and x.any()):
+                p[self.order.vertices] = x
+                return p, LinearReport("pcg", iterations, first_norm)
+            if self.kind == "pcg":
+                return None, LinearReport("pcg", iterations, first_norm)
+            logger.debug("CG stalled after %d iterations; factorizing", iterations)
+        pattern = self.preconditioner.pattern
+        solution = solve_directly(pattern, self.matrix, b, not convex, self.low_rank)
+        if solution is None:
+            return None, LinearReport("direct", iterations, first_norm)
+        p[self.order.vertices] = solution
+        return p, LinearReport("direct", iterations, first_norm)
+
+    def _conjugate_gradients(
+        self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int
+    ) -> CGResult:
+        return conjugate_gradients(self.preconditioner, b, x, tolerance, most, self.low_rank)
+
+    def _age_by(self, iterations: int) -> None:
+        """After a run of CG: keep the coarse level unless it has become too old."""
+        if self.age < 0:
+            self.fresh_iterations = iterations
+            self.age = 0
+        self.age += 1
+        if iterations > _AGED_RATIO * self.fresh_iterations + _AGED_EXTRA:
+            self.age = -1

@@ -1,0 +1,172 @@
+"""Projected Newton: minimizes the objective of a step from a state without inverted tets to one without.
+
+Three parts: the direction (`direction`), the step along it (`line_search`), and the end (`convergence`).
+
+Source: Li, Jiang, Luo, "Physics-Based Simulation", chapter "Optimization Framework".
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.state import Status
+from supple.runtime.interruption import interruption_point
+from supple.solvers.implicit.newton.convergence import Convergence
+from supple.solvers.implicit.newton.direction import DirectionFinder, Tools
+from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
+from supple.solvers.implicit.newton.line_search import Jumps, extended, search
+from supple.solvers.implicit.newton.objective import Model, Objective
+from supple.solvers.implicit.newton.trace import NewtonRow
+from supple.solvers.implicit.step_limits import StepLimits
+
+logger = logging.getLogger(__name__)
+
+# Directions that shrink by less than this factor converge linearly: Newton's method with the true Hessian is faster.
+_LINEAR_RATE = 0.2
+
+# Those that shrink by less than this one crawl, and their steps may be made longer.
+_CRAWL = 0.5
+
+# Forces are nearly balanced where their sum is below this share of contact's. Larger ones leave errors in friction that
+# a block shows that just sticks on its slope.
+_NEARLY = 3e-3
+
+
+# After so many steps in a row that change the energy by less than this share of its terms, and with balanced forces, no
+# minimum below can be told from round-off: what is left are steps to and fro across the kinks of frictionless contact.
+_SETTLED = 6
+_NOTHING = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """The function to minimize, and the conditions at its minimum.
+
+    Attributes
+    ----------
+    objective : the sum of potentials
+    scale : s of its inertia term [s^2], or None
+    convergence : when the minimum is reached
+    max_iterations : of Newton
+    longest : largest component [m] that a direction may have where there is no inertia
+    outdated : whether the objective is due for a change at positions (n, 3) where forces are nearly balanced
+    """
+
+    objective: Objective
+    scale: float | None
+    convergence: Convergence
+    max_iterations: int
+    longest: float
+    outdated: Callable[[NDArray[np.float64]], bool] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """The end of a minimization, and its status; `rows` describe every iteration."""
+
+    status: Status
+    end: Model
+    message: str = ""
+    rows: list[NewtonRow] = field(default_factory=list)
+
+
+def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools: Tools) -> Outcome:
+    """Minimize over the free vertices from x, whose guarded tets all have positive volume."""
+    objective, convergence, hessian = problem.objective, problem.convergence, tools.hessian
+    directions = DirectionFinder(objective, tools, problem.scale, convergence.step, problem.longest)
+    policy, jumps = directions.policy, Jumps()
+    here = objective.model(x, hessian, policy.now)
+    rows: list[NewtonRow] = []
+    if not np.isfinite(here.energy):
+        return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
+    last_length = 0.0
+    settled = 0
+    for iteration in range(problem.max_iterations):
+        interruption_point()
+        found = directions.find(here)
+        if found is None:
+            return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
+        last = convergence.is_short(found.length)
+        rate = found.length / last_length if last_length > 0.0 else 0.0
+        vector = found.vector
+        largest, _, reason = limits.largest_step(here.positions, vector)
+        end, step, cuts = search(objective, here, vector, found.slope, largest, limits, jumps)
+        # True Hessians need no longer steps, and bodies with inverted tets recover in small ones.
+        projected = found.projected is not ProjectedTerms.NONE and limits.guard.complete
+        if step == 1.0 and rate > _CRAWL and not last and projected:
+            end, step = extended(objective, here, vector, found.slope, end, limits)
+        # Where the step is shorter, the duals of the whole direction are those that the next matrix needs, too.
+        objective.renew(here.positions, vector)
+        policy.note(rate > _LINEAR_RATE and largest == 1.0, found.touching)
+        before = here.energy
+        if step > 0.0:
+            # A last step most often needs no Hessian at its end.
+            here = objective.model(end, None if last else hessian, policy.now)
+        row = NewtonRow(
+            iteration=iteration,
+            energy=here.energy,
+            force=found.force,
+            direction=found.length,
+            linear_solver=found.linear.method,
+            linear_iterations=found.linear.iterations,
+            linear_tolerance=found.tolerance,
+            filter=largest,
+            step=step,
+            cuts=cuts,
+            limit="; ".join(([reason] if reason else []) + (["energy"] if cuts else [])),
+            projected=found.projected is ProjectedTerms.ALL,
+        )
+        rows.append(row)
+        settled = settled + 1 if step > 0.0 and abs(before - here.energy) <= _NOTHING * here.size else 0
+        logger.debug("%s", row)
+        limits.widen(here.positions)
+        if last:
+            if step == 0.0 or _is_converged(problem, found.length, here, tools, found.touching):
+                return Outcome(Status.CONVERGED, here, "", rows)
+            here = objective.model(here.positions, hessian, policy.now)
+        elif found.touching and (
+            (settled >= _SETTLED and _is_balanced(problem, here, tools))
+            or (step >= 1.0 and _is_outdated(problem, here, tools))
+        ):
+            return Outcome(Status.CONVERGED, here, "", rows)
+        if step == 0.0:
+            text = (
+                f"no step along Newton's direction ({found.length:.2e} m) lowers the energy, in iteration {iteration}"
+            )
+            return Outcome(Status.LINE_SEARCH_FAILED, here, text, rows)
+        last_length = found.length
+    text = (
+        f"Newton's method took {problem.max_iterations} iterations; its last step was {rows[-1].direction:.2e} m, "
+        f"the tolerance is {convergence.step:.2e} m"
+    )
+    return Outcome(Status.ITERATION_LIMIT, here, text, rows)
+
+
+def _is_outdated(problem: Problem, here: Model, tools: Tools) -> bool:
+    """Whether the objective is due for a change before its minimum is reached: what is left would be lost work."""
+    if problem.outdated is None:
+        return False
+    contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
+    return _free_norm(here.gradient, tools) <= _NEARLY * contact and problem.outdated(here.positions)
+
+
+def _is_balanced(problem: Problem, here: Model, tools: Tools) -> bool:
+    contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
+    return _free_norm(here.gradient, tools) <= problem.convergence.force * contact
+
+
+def _is_converged(problem: Problem, length: float, here: Model, tools: Tools, touching: bool) -> bool:
+    contact = None
+    if touching:
+        contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
+    extent = float(np.abs(here.positions).max(initial=0.0))
+    return problem.convergence.is_reached(length, extent, _free_norm(here.gradient, tools), contact)
+
+
+def _free_norm(gradient: NDArray[np.float64], tools: Tools) -> float:
+    return float(np.linalg.norm(tools.freed(gradient)))

@@ -1,0 +1,310 @@
+"""`Implicit`: implicit time integration of finite elements that never invert."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from supple.errors import SolverError
+from supple.materials.flows.internal import checked
+from supple.materials.per_tet import NO_REGION
+from supple.model.actuator_readings import actuator_fields, start_of
+from supple.model.energy_balance import add_works, no_works, works_of_actuators
+from supple.model.joints.at_state import initial_joint_details, refuse_apart, refuse_moved_welds
+from supple.model.joints.geometry import JointGeometry
+from supple.model.state import State, Status, StepReport
+from supple.model.stitched_points import with_stitched_points
+from supple.model.system import System
+from supple.numerics.noninverting_step import KEEP
+from supple.runtime.threads import threads_for
+from supple.scene.scene import Scene
+from supple.solvers.implicit.contact.build import contact_model
+from supple.solvers.implicit.contact.points import forces_on_owners
+from supple.solvers.implicit.contact.scales import smallest_diagonal
+from supple.solvers.implicit.contact.settings import IPCContact
+from supple.solvers.implicit.details import ImplicitDetails
+from supple.solvers.implicit.energies.damping import quadratic_viscosity_of, viscosity_of
+from supple.solvers.implicit.energies.elasticity import SERIAL_TETS, elasticity_of
+from supple.solvers.implicit.energies.potential import HessianBlocks
+from supple.solvers.implicit.energies.regularization import regularization_of
+from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
+from supple.solvers.implicit.energies.stitches import StitchEnergy
+from supple.solvers.implicit.inversion_guard import refuse_inverted
+from supple.solvers.implicit.joints.rigidity import Rigidity
+from supple.solvers.implicit.newton.direction import Tools
+from supple.solvers.implicit.newton.free_motion import FreeMotion
+from supple.solvers.implicit.newton.linear_solver import LinearSolver
+from supple.solvers.implicit.newton.trace import NewtonRow
+from supple.solvers.implicit.stepping.integrators import Integrator, Newmark, Static, integrator_of
+from supple.solvers.implicit.stepping.joint_support import refuse_joints
+from supple.solvers.implicit.stepping.reactions import reaction_forces, weld_forces
+from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors
+from supple.solvers.implicit.stepping.substep import StepSettings, Substep, take_substep
+from supple.solvers.implicit.stepping.substepping import Substepping
+from supple.solvers.implicit.stepping.workspace import Workspace
+from supple.solvers.implicit.timings import PARTS
+from supple.solvers.solver import Solver
+
+logger = logging.getLogger(__name__)
+
+_LINEAR_SOLVERS = ("auto", "pcg", "direct")
+
+
+# Measured on cubes: 2900 bytes per tet, and 5800 more for one in patches; for a factorization 870 bytes times the
+# number of vertices to the power 4/3, as the factor of a solid body grows. The margin is for contact.
+_BYTES_PER_TET = 5000
+_BYTES_OF_PATCHES = 7000
+_BYTES_OF_FACTOR = 1200
+# Beyond the above, for the matrices of its quadrature points and its blocks: 45,000 on a cube of 6,000.
+_BYTES_PER_QUADRATIC_TET = 50_000
+
+
+@dataclass(frozen=True)
+class Implicit(Solver):
+    """Implicit integration by projected Newton with a step filter: in a body without inverted tets none ever inverts.
+
+    Parameters
+    ----------
+    integrator : "backward_euler", "bdf2", "newmark" (midpoint), "static", or an `Integrator`.
+    tolerance : Newton stops when no vertex's step is longer than this share of the (smallest) body's diagonal, per
+        second of the step [1/s]; for "static", than this share of the diagonal [-]. None: 1e-3 1/s or 1e-9, and where
+        there is contact no longer than a tenth of `dhat`, with friction than a hundredth of `friction_velocity`.
+    force_tolerance : where surfaces touch, Newton also goes on until the forces left over are below this share of
+        contact's [-].
+    max_iterations : of Newton in one (sub)step.
+    linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
+    max_substeps : largest number of substeps: a step that fails is halved. Steps in which scripts turn far are first
+        divided into straight pieces (1024 at most), each of which may take this number. 1: never divided.
+    path_tolerance : how far a script may go off the straight line within a piece, as a share of the (smallest) body's
+        diagonal [-].
+    volume_kept : share of its volume that a tet keeps at least in one Newton iteration, above 0 and below 1 [-].
+    barrier_onset : J = det F below which a barrier against inversion acts on materials that have a finite energy at
+        J = 0, above 0 and at most 1 [-]. Stress and energy are the material's alone above it.
+    contact : of bodies with each other, with themselves and with obstacles; None turns it off.
+
+    Raises
+    ------
+    SolverError : where a parameter is out of range.
+
+    Source: Li, Jiang, Luo, "Physics-Based Simulation", chapters 2 to 4 and 23.
+    """
+
+    integrator: str | Integrator = "backward_euler"
+    tolerance: float | None = None
+    force_tolerance: float = 1e-4
+    max_iterations: int = 120
+    linear_solver: str = "auto"
+    max_substeps: int = 64
+    path_tolerance: float = 0.05
+    volume_kept: float = KEEP
+    barrier_onset: float = 0.1
+    contact: IPCContact | None = field(default_factory=IPCContact)
+
+    def __post_init__(self) -> None:
+        integrator_of(self.integrator)
+        for key, limit, wanted in (
+            ("tolerance", np.inf, "a finite number above zero"),
+            ("force_tolerance", 1.0, "a share above 0 and below 1"),
+            ("path_tolerance", np.inf, "a finite number above zero"),
+            ("volume_kept", 1.0, "a share above 0 and below 1"),
+            ("barrier_onset", np.nextafter(1.0, 2.0), "a number above 0 and at most 1"),
+        ):
+            value: Any = getattr(self, key)
+            if value is None and key == "tolerance":
+                continue
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0.0 < value < limit:
+                raise SolverError(f"Implicit: {key} is {value!r}; give {wanted}")
+        for key in ("max_iterations", "max_substeps"):
+            value = getattr(self, key)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+                raise SolverError(f"Implicit: {key} is {value!r}; give a whole number of one or more")
+        if self.linear_solver not in _LINEAR_SOLVERS:
+            raise SolverError(
+                f"Implicit: there is no linear_solver {self.linear_solver!r}; there are 'auto', 'pcg' and 'direct'"
+            )
+
+    def bytes_needed(self, scene: Scene) -> int:
+        """Estimate of the memory that a simulation takes beyond that of the program itself [bytes]."""
+        needed = 0
+        for body in scene.bodies:
+            averaged = body.material.per_tet(len(body.mesh.tets)).region != NO_REGION
+            if body.mesh.order == 2:
+                needed += _BYTES_PER_QUADRATIC_TET * len(averaged)
+            needed += _BYTES_PER_TET * len(averaged) + _BYTES_OF_PATCHES * int(np.count_nonzero(averaged))
+        if self.linear_solver == "direct":
+            needed += int(_BYTES_OF_FACTOR * sum(len(body.mesh.vertices) ** (4.0 / 3.0) for body in scene.bodies))
+        return needed
+
+    def prepare(self, system: System) -> Workspace:
+        """Compute the patterns, groups and memory for a system.
+
+        Raises
+        ------
+        SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, free bodies
+            with the static integrator, and joints with integrators that do not hold them.
+        """
+        method, system = integrator_of(self.integrator), with_stitched_points(system)
+        # In a step of the midpoint rule, the rigidity of what joints hold is a condition at its end.
+        midpoint = isinstance(method, Newmark) and bool(system.linked_bodies)
+        elasticity = elasticity_of(system, not midpoint)
+        contact = None
+        if self.contact is not None:
+            contact = contact_model(system, self.contact, elasticity.material.mu)
+            if contact.system is not system:
+                system = contact.system
+                elasticity = elasticity_of(system, not midpoint)
+        elif system.obstacles:
+            raise SolverError(
+                f"{system.obstacles[0].label}: with contact=None obstacles have no effect; give contact=IPCContact(), "
+                "or remove them"
+            )
+        if isinstance(method, Newmark) and system.laws.material.flowing_laws:
+            raise SolverError(
+                "Implicit: integrator='newmark' cannot simulate Viscoelastic and J2Plastic, which flow to the end of a "
+                "step; use 'backward_euler', 'bdf2' or 'static'"
+            )
+        free_motion = FreeMotion.of(system)
+        if isinstance(method, Static) and len(free_motion.totals):
+            body = next(part for part in system.bodies if free_motion.piece[part.vertices].max() >= 0)
+            raise SolverError(
+                f"body {body.name!r}: nothing holds it, so that it has no static equilibrium; pin some of its "
+                "vertices, or use another integrator"
+            )
+        refuse_joints(method, system.scene)
+        tools = Tools(
+            LinearSolver.of(system, self.linear_solver),
+            HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching)),
+            system.pinned_vertices,
+            free_motion,
+        )
+        stitches = StitchEnergy.of(system.stitching, 0.0) if len(system.stitching) else None
+        viscosity = viscosity_of(elasticity)
+        damped = StitchViscosity.of(system.stitching)
+        return Workspace(
+            system,
+            contact,
+            elasticity,
+            viscosity,
+            tools,
+            smallest_diagonal(system),
+            regularization_of(elasticity),
+            stitches,
+            damped,
+            quadratic_viscosity_of(elasticity),
+            JointGeometry.of(system) if system.scene.joints or midpoint else None,
+            Rigidity.of(system) if midpoint else None,
+        )
+
+    def check(self, system: System, state: State, workspace: Workspace) -> None:
+        """Raise where a step cannot start from `state`; see `Solver.check`.
+
+        Raises
+        ------
+        SceneError : where surfaces intersect, or a body is inside something solid.
+        SolverError : where surfaces touch, or a tet is inverted whose material has no energy there.
+        """
+        refuse_inverted(system, workspace.elasticity.material, state.positions)
+        refuse_moved_welds(system, state)
+        if workspace.joints is not None:
+            refuse_apart(workspace.joints, state)
+        if workspace.contact is not None:
+            workspace.contact.raise_if_intersecting(workspace.extended(state).positions, state.time)
+        workspace.checked = state
+
+    def initial_details(self, system: System, workspace: Workspace) -> ImplicitDetails:
+        """No iterations, and all forces zero; see `Solver.initial_details`."""
+        zero = np.zeros((len(workspace.system.rest_positions), 3))
+        pushes = {} if workspace.contact is None else forces_on_owners(workspace.contact, zero)
+        return ImplicitDetails(
+            contact_forces=pushes,
+            friction_forces=pushes,
+            reaction_forces=reaction_forces(system, zero)[0],
+            weld_forces=weld_forces(system, zero),
+            orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
+            **initial_joint_details(workspace.joints, workspace.checked or system.start_states[-1]),
+            seconds=dict.fromkeys((*PARTS, "other"), 0.0),
+            **actuator_fields(system, *start_of(system)),
+            work=no_works(system),
+        )
+
+    def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
+        """Advance by dt in one or more substeps; see `Solver.step`.
+
+        Raises
+        ------
+        SceneError, SolverError : see `check`, which is called here for a state that is not known to pass it.
+        """
+        workspace.tools.clock.restart()
+        if workspace.checked is None or state.positions is not workspace.checked.positions:
+            self.check(system, state, workspace)
+        state = replace(state, internal=checked(system.laws.material, state.internal))
+        n = len(state.positions)
+        state = workspace.extended(state)
+        substepping = Substepping.of(
+            workspace.system, state.time, dt, self.path_tolerance * workspace.diagonal, self.max_substeps
+        )
+        now = state
+        settings = StepSettings(
+            integrator_of(self.integrator),
+            self.tolerance,
+            self.force_tolerance,
+            self.max_iterations,
+            self.volume_kept,
+            self.barrier_onset,
+        )
+        rows: list[NewtonRow] = []
+        substeps = 0
+        worst, message = Status.CONVERGED, ""
+        last: Substep | None = None
+        forces, parts, works = start_of(system)
+        parts = [each.parts(now.positions) for each in system.actuators]
+        energy, residual = no_works(system), 0.0
+        while not substepping.over:
+            # For a small scene all at once: changing the number of threads takes longer than its kernels.
+            with threads_for(len(system.tets), SERIAL_TETS):
+                taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
+            rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
+            if taken.outcome.status is not Status.CONVERGED:
+                logger.debug("step of %g s: %s", substepping.length, taken.outcome.status)
+                if substepping.halve():
+                    continue
+                worst, message = taken.outcome.status, _limit_message(taken.outcome.message, substepping)
+                if not worst.can_go_on:
+                    break
+            now, last = taken.state, taken
+            before, parts = parts, [each.parts(now.positions) for each in system.actuators]
+            forces = list(taken.actuators)
+            works = [w + Q * (s - t) for w, Q, s, t in zip(works, forces, parts, before, strict=True)]
+            add_works(energy, taken.works)
+            residual += taken.residual
+            substeps += 1
+            substepping.advance()
+        add_works(energy, works_of_actuators(system, works))
+        now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
+        workspace.checked = now
+        details = replace(ImplicitDetails.of_rows(rows, substeps), work=energy, energy_residual=residual)
+        nearest, contacts = None, None
+        if last is not None:
+            gradient = last.outcome.end.gradient / last.contact.weight
+            details = replace(details, weld_forces=weld_forces(system, gradient))
+            if workspace.tools.linear_solver.reduction is not None:
+                workspace.tools.linear_solver.reduction.reduce(gradient)
+            totals, by_vertex = reaction_forces(system, gradient)
+            details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
+            details, nearest, contacts = last.contact.measured(details, last.state.positions)
+            if last.joints is not None:
+                details = last.joints.measured(details, last.outcome.end.positions)
+        details = replace(details, **actuator_fields(system, forces, parts, works))
+        errors = orthogonality_errors(system, now.positions)
+        details = replace(details, orthogonality_errors=errors, seconds=workspace.tools.clock.shares())
+        return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)
+
+
+def _limit_message(message: str, substepping: Substepping) -> str:
+    """Why a substep failed that may not be shorter."""
+    if substepping.halves == 1:
+        return message
+    return f"{message}; in a substep of {substepping.length:.3g} s, the shortest that max_substeps allows"

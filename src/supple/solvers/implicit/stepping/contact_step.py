@@ -1,0 +1,139 @@
+"""Contact within one step: its terms of the objective, and whether they have to be updated before the step is done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.state import ContactPoints, Status
+from supple.solvers.implicit.contact.friction import Friction
+from supple.solvers.implicit.contact.model import Barriers, ContactModel
+from supple.solvers.implicit.contact.points import contact_points, forces_on_owners
+from supple.solvers.implicit.details import ImplicitDetails
+from supple.solvers.implicit.newton.minimize import Outcome
+from supple.solvers.implicit.newton.objective import Objective
+
+FindContacts = Callable[[], ContactPoints] | None
+
+# An adaptive barrier becomes ten times stiffer where surfaces are nearer than this share of dhat, so that distances
+# stay far above round-off. Six increases are for bodies up to 1e6 times as stiff as the softest, which sets the scale.
+_TOO_NEAR = 1e-2
+_STIFFENING = 10.0
+_MOST_INCREASES = 6
+
+# What scripts press together stays together, however stiff the barrier is: an increase has to double the distance.
+_LEAST_GAIN = 2.0
+
+# The default of `Contact.friction_iterations`: friction's normal forces are updated while they change by more than this
+# share, and at most this often. More updates cost time and change little.
+_FORCE_CHANGE = 0.1
+_MOST_UPDATES = 5
+
+
+@dataclass(eq=False)
+class ContactStep:
+    """The contact of one step from `start` (n, 3), between two times [s].
+
+    Attributes
+    ----------
+    stiffness : of the barrier now [Pa], the integrator's weight included
+    stiffness_increases : their number; nearest : the smallest distance before the latest one [m]
+    friction_updates : their number; normal_gradient : (n, 3) of the barriers at the latest one [N]
+    """
+
+    model: ContactModel | None
+    start: NDArray[np.float64]
+    times: tuple[float, float]
+    weight: float
+    stiffness: float = field(init=False)
+    stiffness_increases: int = 0
+    nearest: float = 0.0
+    friction_updates: int = 0
+    barriers: Barriers | None = None
+    frictions: list[Friction] | None = None
+    normal_gradient: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        self.stiffness = self.model.scales.stiffness * self.weight if self.model is not None else 0.0
+
+    def with_contact(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
+        """The objective with barriers, and with friction whose normal forces are those at x (n, 3)."""
+        if self.model is None:
+            return objective
+        if self.barriers is None:
+            # Weights stay during the step: with those of every minimum in turn, the minima can alternate.
+            self.model.collisions.forget_weights()
+        self.barriers = self.model.barriers(self.stiffness)
+        self.frictions = self.model.frictions(self.barriers, x, self.start, self.times)
+        if self.model.coefficients.any():
+            self.normal_gradient = Objective(self.barriers.terms).gradient(x)
+        return Objective([*objective.terms, *self.barriers.terms, *self.frictions], objective.clock)
+
+    def needs_update(self, x: NDArray[np.float64]) -> bool:
+        """Whether to continue from x (n, 3) with a stiffer barrier or with friction of the normal forces there."""
+        if self.model is None:
+            return False
+        scales = self.model.scales
+        nearest = self.model.smallest_distance(x)
+        increases = self.stiffness_increases
+        allowed = increases == 0 or (increases < _MOST_INCREASES and nearest > _LEAST_GAIN * self.nearest)
+        if scales.adaptive and allowed and nearest < _TOO_NEAR * scales.dhat:
+            self.stiffness *= _STIFFENING
+            self.stiffness_increases += 1
+            self.nearest = nearest
+            return True
+        if self.friction_is_outdated(x):
+            self.friction_updates += 1
+            return True
+        return False
+
+    def friction_is_outdated(self, x: NDArray[np.float64]) -> bool:
+        """Whether friction has to be updated with the normal forces at x (n, 3)."""
+        if self.model is None or self.barriers is None or not self.model.coefficients.any():
+            return False
+        wanted = self.model.friction_iterations
+        if self.friction_updates + 1 >= (_MOST_UPDATES if wanted is None else wanted):
+            return False
+        now = Objective(self.barriers.terms).gradient(x)
+        change = float(np.linalg.norm(now - self.normal_gradient))
+        return wanted is not None or change > _FORCE_CHANGE * float(np.linalg.norm(now))
+
+    def verified(self, outcome: Outcome) -> Outcome:
+        """The outcome, or a failure where surfaces intersect because of rounding.
+
+        Every state that the next step may start from is tested, whether Newton's method has converged or not.
+        """
+        if self.model is None or not outcome.status.can_go_on:
+            return outcome
+        if self.model.collisions.intersect(outcome.end.positions):
+            return replace(outcome, status=Status.LINE_SEARCH_FAILED, message="two surfaces intersect after the step")
+        return outcome
+
+    def measured(
+        self, details: ImplicitDetails, x: NDArray[np.float64]
+    ) -> tuple[ImplicitDetails, float | None, FindContacts]:
+        """The details of a step that ended at x (n, 3), with what contact does there.
+
+        Returns
+        -------
+        details, nearest, contacts : the latter two are `min_distance` and `contacts` of `StepReport`.
+        """
+        model, barriers = self.model, self.barriers
+        if model is None or barriers is None:
+            return details, None, None
+        normal, tangential = (Objective(terms).gradient(x) for terms in (barriers.terms, self.frictions or ()))
+        details = replace(
+            details,
+            contacts=model.count(x),
+            contact_forces=forces_on_owners(model, normal / self.weight),
+            friction_forces=forces_on_owners(model, tangential / self.weight),
+            contact_stiffness=self.stiffness / self.weight,
+            dhat=model.scales.dhat,
+        )
+        nearest = model.smallest_distance(x)
+        nearest = nearest if np.isfinite(nearest) else None
+        between, frictions = model.collisions.at(x), tuple(self.frictions or ())
+        return details, nearest, lambda: contact_points(model, barriers, frictions, x, between, self.weight)

@@ -1,0 +1,253 @@
+"""One step of an integrator: its minimization problem, set up and solved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.state import State, Status
+from supple.model.system import System
+from supple.solvers.implicit.energies.damping import Damping
+from supple.solvers.implicit.energies.elasticity import Elasticity
+from supple.solvers.implicit.energies.inertia import Inertia
+from supple.solvers.implicit.energies.inversion_barrier import inversion_barrier
+from supple.solvers.implicit.energies.loads.actuators import ActuatorPotential, actuators_at
+from supple.solvers.implicit.energies.loads.external_forces import ExternalForces, total_forces
+from supple.solvers.implicit.energies.loads.muscles import muscles_at
+from supple.solvers.implicit.energies.loads.pressure import pressures_at
+from supple.solvers.implicit.energies.loads.soft_targets import soft_targets_at
+from supple.solvers.implicit.energies.loads.springs import springs_at
+from supple.solvers.implicit.energies.midpoint import ActingWithin
+from supple.solvers.implicit.energies.potential import Potential
+from supple.solvers.implicit.energies.stitch_damping import StitchDamping
+from supple.solvers.implicit.inversion_guard import InversionGuard
+from supple.solvers.implicit.joints.joint_step import JointStep
+from supple.solvers.implicit.joints.midpoint_step import MidpointJoints, agreeing, joints_in_step
+from supple.solvers.implicit.newton.convergence import Convergence
+from supple.solvers.implicit.newton.minimize import Outcome, Problem, minimize
+from supple.solvers.implicit.newton.objective import Objective
+from supple.solvers.implicit.newton.trace import NewtonRow
+from supple.solvers.implicit.step_limits import StepLimits
+from supple.solvers.implicit.stepping.contact_step import ContactStep
+from supple.solvers.implicit.stepping.dirichlet import move_pins
+from supple.solvers.implicit.stepping.integrators import Integrator, Plan, Static
+from supple.solvers.implicit.stepping.numerical_energy import makes_energy
+from supple.solvers.implicit.stepping.rigid_bodies import rigid_ends, strained, with_rigid_bodies
+from supple.solvers.implicit.stepping.works import works_of_step
+from supple.solvers.implicit.stepping.workspace import Workspace
+
+# The defaults of `Implicit.tolerance`. Halving the first is meant to move results by less than 1e-4; an equilibrium has
+# no later steps that would make up for the rest.
+_DYNAMIC_TOLERANCE = 1e-3
+_STATIC_TOLERANCE = 1e-9
+
+# Of `dhat`, over which contact's force goes from zero to its full size, and of the displacement below which friction is
+# static: steps have to resolve both.
+_DHAT_SHARE = 0.1
+_FRICTION_SHARE = 1e-2
+
+
+@dataclass(frozen=True)
+class StepSettings:
+    """The settings of a step; see `Implicit`."""
+
+    integrator: Integrator
+    tolerance: float | None
+    force_tolerance: float
+    max_iterations: int
+    volume_kept: float
+    barrier_onset: float
+
+    def shortest(self, workspace: Workspace, h: float) -> float:
+        """The length of Newton's step [m] below which the minimum of a step of h [s] is reached."""
+        static = isinstance(self.integrator, Static)
+        if self.tolerance is not None:
+            return float(self.tolerance) * workspace.diagonal * (1.0 if static else h)
+        length = (_STATIC_TOLERANCE if static else _DYNAMIC_TOLERANCE * h) * workspace.diagonal
+        contact = workspace.contact
+        if contact is not None:
+            length = min(length, _DHAT_SHARE * contact.scales.dhat)
+            if contact.coefficients.any():
+                length = min(length, _FRICTION_SHARE * contact.scales.friction_velocity * h)
+        return length
+
+
+@dataclass(frozen=True, eq=False)
+class Substep:
+    """The result of a step: the state at its end, the course of Newton's method, contact and joints at the end.
+
+    actuators : generalized forces of each actuator, as they acted in the step; works, residual : see `works_of_step`
+    """
+
+    state: State
+    outcome: Outcome
+    contact: ContactStep
+    joints: JointStep | None
+    actuators: tuple[NDArray[np.float64], ...] = ()
+    works: dict[str, float] = field(default_factory=dict)
+    residual: float = 0.0
+
+
+def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
+    """One step of length h [s] to the time `end` [s], from a state with the obstacles' vertices.
+
+    Where its integrator makes energy of the velocities before a blow, the step is taken again without its history.
+    """
+    taken = _take(state, end, h, settings, workspace)
+    method = settings.integrator.without_history
+    if method is None or state.memory is None or taken.outcome.status is not Status.CONVERGED:
+        return taken
+    balance = taken.works, taken.residual, taken.actuators
+    if not makes_energy(state, taken.state, *balance, settings.shortest(workspace, h) / h, workspace):
+        return taken
+    again = _take(state, end, h, replace(settings, integrator=method), workspace)
+    return replace(again, outcome=replace(again.outcome, rows=taken.outcome.rows + again.outcome.rows))
+
+
+def _take(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
+    system, tools = workspace.system, workspace.tools
+    targets = system.pin_targets(end)
+    obstacles = len(state.positions) - workspace.bodies_end
+    if obstacles:
+        # What a script moves has the script's velocity, so that its inertia plays no part.
+        state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
+    if workspace.joints is not None and workspace.rigidity is not None and state.memory is None:
+        state = agreeing(workspace.joints, workspace.rigidity, state, h)
+    plan = settings.integrator.plan(system, state, h)
+    middle = end - (1.0 - plan.place) * h
+    forces = total_forces(system, state.positions, middle)
+    guard = InversionGuard.at(system, state.positions, settings.volume_kept)
+    limits = StepLimits(guard, workspace.contact, tools.clock)
+    grown = workspace.elasticity_at(middle)
+    elasticity = grown.in_step(state.internal, h)
+    mu = workspace.elasticity.material.mu
+    actuators = actuators_at(system, state.positions, (state.time, middle), plan.scale, mu)
+    base = _objective(elasticity, state.positions, middle, plan, forces, workspace, actuators)
+    onset = settings.barrier_onset
+    barriers = (inversion_barrier(workspace.elasticity, guard.guarded, onset), guard.quadratic_barrier(onset))
+    base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
+    times = state.time, end
+    joints = joints_in_step(workspace.joints, workspace.rigidity, state, times, plan.scale, plan.place)
+    contact = ContactStep(workspace.contact, state.positions, times, plan.contact_weight)
+    problem = Problem(
+        contact.with_contact(_with_joints(base, joints), state.positions),
+        plan.scale,
+        Convergence(settings.shortest(workspace, h), settings.force_tolerance),
+        settings.max_iterations,
+        workspace.diagonal,
+        contact.friction_is_outdated,
+    )
+    tools.linear_solver.begin_step()
+    x = state.positions
+    rows: list[NewtonRow] = []
+    if np.array_equal(targets, x[tools.pinned]):
+        x = _first_guess(system, problem, x, plan, forces, limits, tools.pinned)
+    else:
+        x, moved = move_pins(system, problem, x, targets, limits, tools)
+        rows = moved.rows
+        if moved.status is not Status.CONVERGED:
+            return Substep(state, moved, contact, joints)
+    while True:
+        outcome = minimize(problem, x, limits, tools)
+        rows = rows + outcome.rows
+        x = outcome.end.positions
+        if outcome.status is not Status.CONVERGED:
+            break
+        updated = joints is not None and joints.update(x)
+        if not contact.needs_update(x) and not updated:
+            break
+        problem = replace(problem, objective=contact.with_contact(_with_joints(base, joints), x))
+    outcome = contact.verified(replace(outcome, rows=rows))
+    if joints is not None:
+        outcome = joints.verified(outcome)
+    internal = grown.flowed(x, state.internal, h)
+    angles = {} if joints is None else joints.hinge_angles(x)
+    after = State(end, x, plan.velocity(x), plan.memory, internal=internal, hinge_angles=angles)
+    residual = plan.place * outcome.end.gradient
+    impact = 0.0
+    if isinstance(joints, MidpointJoints):
+        impact = joints.finish(x, after.velocities, residual, tools)
+    after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
+    gained = workspace.conservation.gained(after)
+    if gained is not None and outcome.status is Status.CONVERGED:
+        share, name = gained
+        text = f"{100.0 * share:.2g} % of the energy of body {name!r} came from nowhere; take a shorter step"
+        outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
+    if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
+        after = rigid_ends(system, state, after, limits)
+        if text := strained(system, after):
+            outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
+    acted = state.positions + plan.place * (x - state.positions)
+    forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
+    works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, end, workspace)
+    if impact:
+        works["joints"] += impact
+    return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual)
+
+
+def _with_joints(objective: Objective, joints: JointStep | None) -> Objective:
+    """The objective with the present energy of the joints."""
+    return objective if joints is None else replace(objective, terms=[*objective.terms, *joints.terms])
+
+
+def _objective(
+    elasticity: Elasticity,
+    x: NDArray[np.float64],
+    time: float,
+    plan: Plan,
+    forces: NDArray[np.float64],
+    workspace: Workspace,
+    actuators: Sequence[ActuatorPotential],
+) -> Objective:
+    """All but contact and the inversion barrier, with the loads of `time` [s]; energies of loads are zero at x."""
+    system = workspace.system
+    terms: list[Potential] = [elasticity]
+    if workspace.stitches is not None:
+        terms.append(workspace.stitches.at(time))
+    if forces.any():
+        terms.append(ExternalForces(forces, x))
+    if system.soft_targets:
+        terms.append(soft_targets_at(system, time))
+    terms += pressures_at(system, x, time)
+    terms += springs_at(system, time)
+    terms += muscles_at(system, time)
+    terms += actuators
+    if plan.scale is not None and workspace.viscosity is not None:
+        terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
+    if plan.scale is not None and workspace.quadratic_viscosity is not None:
+        terms.append(workspace.quadratic_viscosity.damping(plan.strain_rate(workspace.quadratic_viscosity)))
+    if plan.scale is not None and workspace.stitch_viscosity is not None:
+        rate = plan.strain_rate(workspace.stitch_viscosity)
+        terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
+    if plan.place != 1.0:
+        terms = [ActingWithin(term, x, plan.place) for term in terms]
+    terms.append(workspace.regularization if plan.scale is None else Inertia(system.masses, plan.predicted, plan.scale))
+    return Objective(terms, workspace.tools.clock)
+
+
+def _first_guess(
+    system: System,
+    problem: Problem,
+    x: NDArray[np.float64],
+    plan: Plan,
+    forces: NDArray[np.float64],
+    limits: StepLimits,
+    pinned: NDArray[np.int32],
+) -> NDArray[np.float64]:
+    """The positions without elasticity, with rigid bodies rigid, as far as the filters allow; x where that has less
+    energy."""
+    if plan.scale is None:
+        return x
+    ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
+    ahead = with_rigid_bodies(system, x, ahead, plan.place)
+    ahead[pinned] = x[pinned]
+    system.welding.follow(ahead)
+    step = limits.largest_step(x, ahead - x).step
+    if step < 1.0:
+        ahead = x + step * (ahead - x)
+    if not limits.allows(ahead):
+        return x
+    return ahead if problem.objective.value(ahead) <= problem.objective.value(x) else x

@@ -1,0 +1,110 @@
+"""Measures every frame: what is wrong with its end, and what the next frame must know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.system import System
+from supple.solvers.xpbd.assessment.energy_balance import EnergyBalance
+from supple.solvers.xpbd.assessment.findings import Findings, count_inverted, tangled_bodies
+from supple.solvers.xpbd.assessment.moment import Moment
+from supple.solvers.xpbd.assessment.softening import MeasuredWork, Softening
+from supple.solvers.xpbd.assessment.surfaces import Overlap, SurfaceCheck
+from supple.solvers.xpbd.contact.settings import XPBDContact
+
+# Of the energy of the scene: what appears in a frame, and does not count. Old overlaps are removed with as little.
+LEAST_GAIN = 2e-4
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """What an assessment must know of the frames before.
+
+    Attributes
+    ----------
+    tangled : names of the bodies that began with inverted tets and still have some
+    excess : energy that came from nowhere and has not been lost since [J]
+    scale : the largest energy so far without the excess of its time, to compare the excess with [J]
+    """
+
+    tangled: frozenset[str] = frozenset()
+    excess: float = 0.0
+    scale: float = 0.0
+
+
+class Assessment:
+    """What is needed to judge the frames of a system, in the solver's numbering.
+
+    Parameters
+    ----------
+    settings : of contact; edge_length : mean surface edge [m]
+    """
+
+    def __init__(self, system: System, settings: XPBDContact | None, edge_length: float) -> None:
+        self.system = system
+        self.softening = Softening(system)
+        self.balance = EnergyBalance(system, edge_length)
+        self._surfaces = SurfaceCheck(system, settings, edge_length)
+        self._ledger = Ledger()
+
+    def begin(self, moment: Moment, J: NDArray[np.float64], h: float, ledger: Ledger | None) -> NDArray[np.bool_]:
+        """Begin a frame. Returns the tets (m,) of the bodies without an inverted one.
+
+        Parameters
+        ----------
+        J : (m,) of all tets; h : length of the substeps [s]; ledger : of the frame before, None at the start
+        """
+        tangled = tangled_bodies(self.system, J)
+        self._ledger = Ledger(tangled=tangled) if ledger is None else ledger
+        self.balance.begin(moment, h)
+        sound = np.ones(len(J), dtype=np.bool_)
+        for part in self.system.bodies:
+            sound[part.tets] = part.name not in tangled
+        return sound
+
+    def overlaps(self, world: NDArray[np.float64], time: float, asleep: NDArray[np.bool_]) -> list[Overlap]:
+        """What is through what at world positions (n, 3) [m] and a time [s]; see `SurfaceCheck.find`."""
+        return self._surfaces.find(world, time, asleep)
+
+    def end(
+        self,
+        moment: Moment,
+        world: NDArray[np.float64],
+        J: NDArray[np.float64],
+        h: float,
+        accuracy: float,
+        held: float,
+        asleep: NDArray[np.bool_],
+        works: Mapping[str, float],
+        measured: MeasuredWork,
+    ) -> tuple[Findings, Ledger]:
+        """Judge the end of a frame.
+
+        Parameters
+        ----------
+        world : (n, 3) positions in the world [m]; J : (m,) of all tets
+        h : length of the substeps [s]; accuracy : how much stiffness a body may lack
+        held : the share of the substeps in which the motion of bodies was shortened
+        asleep : (b,) bodies that did not move; works : of the frame, by name [J]
+        measured : of the stresses that substeps of h delivered, with this frame
+        """
+        before = self._ledger
+        tangled = before.tangled & tangled_bodies(self.system, J)
+        gain, energy, gainer = self.balance.end(moment, works)
+        counts = not 0.0 < gain < LEAST_GAIN * max(before.scale, energy)
+        excess = max(0.0, before.excess + (gain if counts else 0.0))
+        scale = max(before.scale, energy - max(before.excess, excess))
+        lacks = zip(self.softening.shares(h, measured).tolist(), self.softening.names, strict=True)
+        findings = Findings(
+            inverted=count_inverted(self.system, J, tangled),
+            overlaps=self._surfaces.find(world, moment.time, asleep),
+            held=held,
+            gained=excess / (scale + excess) if excess > 0.0 else 0.0,
+            gainer=self.system.bodies[gainer].name,
+            softened=[(share, name) for share, name in lacks if share > accuracy],
+        )
+        return findings, Ledger(tangled, excess, scale)

@@ -1,0 +1,187 @@
+"""Whether surfaces are through each other, or vertices deep inside of obstacles, at the end of a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.model.system import System
+from supple.numerics.geometry.box_tree import boxes_of_triangles, near_boxes, overlap
+from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
+from supple.runtime.kernel_cache import njit
+from supple.scene.contact_pairs import pair_table
+from supple.solvers.xpbd.assessment.seams import Seams
+from supple.solvers.xpbd.contact.settings import XPBDContact
+
+# Of the mean surface edge: how deep a vertex may be in an obstacle. Old overlaps are removed slowly.
+TOLERATED_DEPTH = 0.05
+# More pairs of triangles than this say nothing new.
+MOST_PAIRS = 1000
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Two things that are through each other: their names, and how far.
+
+    Attributes
+    ----------
+    first, second : names with their kind, such as "body 'ball'"; equal where a body is through itself
+    pairs : number of pairs of triangles; depth : of a vertex in an obstacle that has no triangles [m]
+    numbers : of the two things: bodies, then obstacles
+    """
+
+    first: str
+    second: str
+    pairs: int = 0
+    depth: float = 0.0
+    numbers: tuple[int, int] = (-1, -1)
+
+    def __str__(self) -> str:
+        if not self.pairs:
+            return f"{self.first} is {self.depth:.2g} m deep in {self.second}"
+        other = "itself" if self.first == self.second else self.second
+        return f"{self.first} passes through {other} ({self.pairs} pairs of triangles)"
+
+
+def crossings(overlaps: Iterable[Overlap]) -> int:
+    """Number of pairs of triangles that are through each other."""
+    return sum(overlap.pairs for overlap in overlaps)
+
+
+class SurfaceCheck:
+    """The surfaces of a system that must stay apart, in the solver's numbering.
+
+    Obstacles with what is stitched to them, pairs without contact, and what `settings` turns off, are left out; of
+    bodies that are stitched or welded to each other, the triangles at the seam.
+    """
+
+    def __init__(self, system: System, settings: XPBDContact | None, edge_length: float) -> None:
+        self.system = system
+        self.tolerated = TOLERATED_DEPTH * edge_length
+        self._poses = ObstaclePoses(system.obstacles)
+        self._names = [f"body {part.name!r}" for part in system.bodies] + [o.label for o in system.obstacles]
+        self._collide = colliding_pairs(system, settings, joined=True)
+        bodies, n = len(system.bodies), len(system.points)
+        triangles, points, self._owners = [system.triangles], [], []
+        owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
+        self._formulas = []
+        for k, obstacle in enumerate(system.obstacles):
+            mesh = obstacle.contact_mesh
+            if mesh is None:
+                self._formulas.append(k)
+                continue
+            triangles.append(mesh.triangles.astype(np.int32) + n + sum(map(len, points)))
+            points.append(mesh.vertices)
+            self._owners += [k] * len(mesh.vertices)
+            owner.append(np.full(len(mesh.triangles), bodies + k))
+        self._triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
+        self._owner = np.concatenate(owner).astype(np.int32)
+        joins = len(system.stitching) or len(system.welding)
+        self._seams = Seams(system, self._owner[: len(system.triangles)]) if joins else None
+        pairs = self._collide[np.ix_(owned := np.unique(self._owner), owned)]
+        self._may_cross = bool(pairs.any())
+        self._fixed = np.concatenate(points) if points else np.zeros((0, 3))
+        # The arguments and the result of the last search: the end of a frame is the beginning of the next one.
+        self._last: tuple[NDArray[np.float64], float, NDArray[np.bool_], list[Overlap]]
+        self._last = (np.zeros((0, 3)), -np.inf, np.zeros(0, dtype=np.bool_), [])
+        self._obstacles_move = bool(self._poses.moving.any())
+        own = [np.unique(system.triangles[part.triangles]) for part in system.bodies]
+        self._surface, self._begins = np.concatenate(own), np.cumsum([0, *map(len, own[:-1])])
+
+    def find(self, x: NDArray[np.float64], time: float, asleep: NDArray[np.bool_] | None = None) -> list[Overlap]:
+        """What is through what, at world positions x (n, 3) [m] and a time [s].
+
+        Sleeping bodies (b,) are not compared with each other and with obstacles: nothing has moved there.
+        """
+        asleep = np.zeros(len(self.system.bodies), dtype=np.bool_) if asleep is None else asleep
+        known, at, slept, found = self._last
+        moved = self._obstacles_move and time != at
+        if moved or not np.array_equal(slept, asleep) or not np.array_equal(known, x):
+            still = np.ones(len(self._names), dtype=np.bool_)
+            still[: len(asleep)] = asleep
+            collide = self._collide & ~(still[:, None] & still)
+            found = [*(self._crossings(x, time, collide) if self._may_cross else ()), *self.depths(x, time, collide)]
+            self._last = (x.copy(), time, asleep.copy(), found)
+        return found
+
+    def _crossings(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_]) -> list[Overlap]:
+        R, t = self._poses.at(time)
+        rows = np.array(self._owners, dtype=np.int64)
+        points = np.concatenate(
+            [self.system.points.positions(x), np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]]
+        )
+        chosen = np.zeros(len(self._triangles), dtype=np.bool_)
+        boxes = np.empty((len(self._names), 6))
+        _note_near(boxes_of_triangles(points, self._triangles), self._owner, collide, boxes, chosen)
+        if not chosen.any():
+            return []
+        picked = np.flatnonzero(chosen)
+        seams = None if self._seams is None else self._seams.among(picked, len(self._triangles))
+        shapes = points, self._triangles[picked], self._owner[picked]
+        pairs, kinds = crossing_triangles(*shapes, collide, MOST_PAIRS, seams)
+        owners = np.sort(self._owner[picked][pairs[kinds == CROSSING]], axis=1)
+        found, counts = np.unique(owners, axis=0, return_counts=True) if len(owners) else (owners, [])
+        return [
+            Overlap(self._names[a], self._names[b], int(k), numbers=(int(a), int(b)))
+            for (a, b), k in zip(found, counts, strict=True)
+        ]
+
+    def depths(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_] | None = None) -> list[Overlap]:
+        """Bodies with vertices deep in obstacles without triangles, of the pairs `collide` (p, p)."""
+        collide = self._collide if collide is None else collide
+        R, t = self._poses.at(time)
+        x = self.system.points.positions(x)
+        bodies, found = len(self.system.bodies), []
+        for k in self._formulas:
+            # Of all points at once: a scene may have many bodies of a few points each.
+            obstacle, local = self.system.obstacles[k], (x - t[k]) @ R[k]
+            deepest = np.maximum.reduceat(-obstacle.signed_distance(local[self._surface])[0], self._begins)
+            for number in np.flatnonzero((deepest > self.tolerated) & collide[:bodies, bodies + k]):
+                found.append(Overlap(self._names[number], self._names[bodies + k], depth=float(deepest[number])))
+        return found
+
+
+@njit(cache=True)
+def _note_near(own, owner, collide, boxes, chosen):
+    """Choose the triangles (t,) that reach into the box of another thing that they collide with, or of their own.
+
+    own : (t, 6) boxes of the triangles; boxes : (p, 6) of all things, scratch memory
+    """
+    boxes[:, :3] = np.inf
+    boxes[:, 3:] = -np.inf
+    for t in range(len(owner)):
+        for j in range(3):
+            boxes[owner[t], j] = min(boxes[owner[t], j], own[t, j])
+            boxes[owner[t], 3 + j] = max(boxes[owner[t], 3 + j], own[t, 3 + j])
+    starts, near = near_boxes(boxes, collide)
+    for t in range(len(owner)):
+        k = owner[t]
+        chosen[t] = collide[k, k]
+        for i in range(starts[k], starts[k + 1]):
+            if chosen[t]:
+                break
+            chosen[t] = overlap(boxes, near[i], own[t])
+
+
+def colliding_pairs(system: System, settings: XPBDContact | None, joined: bool = False) -> NDArray[np.bool_]:
+    """(p, p) which things must stay apart: bodies, then obstacles, without those that are stitched or welded.
+
+    joined : with bodies that are stitched or welded to each other
+    """
+    bodies = len(system.bodies)
+    collide = pair_table(system.scene).collide.copy()
+    if settings is None or not settings.body_collision:
+        collide[:bodies, :bodies] &= np.eye(bodies, dtype=np.bool_)
+    if settings is None or not settings.self_collision:
+        collide[np.arange(bodies), np.arange(bodies)] = False
+    names = [part.name for part in system.bodies] + [str(obstacle.name) for obstacle in system.obstacles]
+    joints = [(stitch.first, stitch.second) for stitch in system.scene.stitches]
+    for first, second in [*joints, *((weld.body, weld.rigid) for weld in system.scene.welds)]:
+        a, b = names.index(first), names.index(second)
+        if not joined or max(a, b) >= bodies:
+            collide[a, b] = collide[b, a] = False
+    return collide

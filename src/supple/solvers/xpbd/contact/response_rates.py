@@ -1,0 +1,52 @@
+"""How fast the material around a vertex answers to its displacement, and how much of a contact's force is kept for it.
+
+The force of a contact in one substep predicts that of the next one where the elastic constraints resolve the motion
+of single vertices: where kappa = h^2 k / m is well below one, with k the stiffness that a vertex feels. There, all of
+it is kept, and contact transmits the loads that the material carries. Where kappa is large, the elastic constraints
+answer with less than the true force, a kept force follows the motion with a delay of kappa substeps, and a delayed
+spring gains energy. So the share that is kept is 1 / (1 + kappa), which bounds the delay to a quarter of a substep.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.system import System
+from supple.runtime.kernel_cache import njit
+
+
+def response_rates(system: System) -> NDArray[np.float64]:
+    """(n,) k / m of every vertex [1/s^2], with k = sum (lam + 2 mu) V |b|^2 over its tets; inf without an energy.
+
+    Those of rigid bodies are zero: nothing yields between their points and their masses.
+    """
+    b = np.concatenate([-system.rest_shape_inverse.sum(axis=1, keepdims=True), system.rest_shape_inverse], axis=1)
+    stiffness = np.zeros(len(system.tets))
+    for part in system.bodies:
+        if part.rigid:
+            continue
+        material = part.body.material.per_tet(part.tets.stop - part.tets.start)
+        modulus = material.lam + 2.0 * material.mu
+        stiffness[part.tets] = np.where(modulus > 0.0, modulus, np.inf)
+    each = (stiffness * system.rest_volumes)[:, None] * np.einsum("tnj,tnj->tn", b, b)
+    sums = np.bincount(system.tets.ravel(), weights=each.ravel(), minlength=len(system.masses))
+    return np.where(system.inverse_masses > 0.0, sums, 0.0) * system.inverse_masses
+
+
+@njit
+def kept_share(kappa):
+    """The part of a contact's force with which the next substep begins."""
+    return 1.0 / (1.0 + kappa)
+
+
+@njit(cache=True)
+def keep_shares(forces, shares):
+    """Multiply forces (k, 3) with their shares (k,); returns whether any is left."""
+    left = False
+    for e in range(len(forces)):
+        for j in range(3):
+            if forces[e, j] != 0.0:
+                forces[e, j] *= shares[e]
+                left = left or forces[e, j] != 0.0
+    return left

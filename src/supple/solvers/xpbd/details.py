@@ -1,0 +1,47 @@
+"""What XPBD reports of a step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.state import SolverDetails
+
+
+@dataclass(frozen=True, eq=False)
+class XPBDDetails(SolverDetails):
+    """What `XPBD` reports of a step.
+
+    Attributes
+    ----------
+    contacts : number of contacts that the last substep resolved, and of those between things at rest
+    smallest_gap : smallest signed distance of a vertex from a surface at the beginnings of the substeps [m], below zero
+        where they overlapped, of bodies that do not sleep; None where no gap was smaller than about one edge length.
+        Pairs of edges are not in it.
+    substeps : number of substeps; repeats : how often the frame was undone and repeated with more
+    substeps_reason : what asked for this number
+    softening : by body, the share of its stiffness that it lacks at this length of the substep, estimated (see
+        `supple.solvers.xpbd.assessment.softening`)
+    energy_gained : energy that came from nowhere, and has not been lost since, over the energy of the scene [-]
+    weld_forces : of the rigid bodies that no pin holds on what is welded to them, by name of the weld, (3,) means over
+        the frame [N]; zero where they sleep
+    contact_forces, friction_forces : by name of the body or obstacle, (3,) means over the frame [N]; each sum to zero
+    asleep : by body, whether it rests, so that no substep was taken for it (see `supple.solvers.xpbd.sleep`)
+    held_back : substeps in which the motion of a body was shortened, so that no tet inverts and nothing passes
+        through anything
+    """
+
+    smallest_gap: float | None = None
+    substeps: int = 0
+    repeats: int = 0
+    substeps_reason: str = field(default="", compare=False)
+    softening: Mapping[str, float] = field(default_factory=dict)
+    energy_gained: float = 0.0
+    held_back: int = 0
+    asleep: Mapping[str, bool] = field(default_factory=dict)
+    weld_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    contact_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    friction_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)

@@ -1,0 +1,122 @@
+"""The end of a frame: what it showed, its report, and the state with what later frames must know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from supple.model.state import State, Status, StepReport
+from supple.solvers.xpbd.assessment.findings import Findings
+from supple.solvers.xpbd.assessment.softening import enough
+from supple.solvers.xpbd.assessment.surfaces import Overlap, crossings
+from supple.solvers.xpbd.details import XPBDDetails
+from supple.solvers.xpbd.frame.advance import damping_in
+from supple.solvers.xpbd.integration import to_world
+from supple.solvers.xpbd.memory import XPBDMemory
+from supple.solvers.xpbd.sleep import SleepMemory
+from supple.solvers.xpbd.substeps import FALL, Substeps
+from supple.solvers.xpbd.workspace import XPBDWorkspace
+
+# From this number of substeps, the remedy is another solver or a rigid body.
+IMPRACTICAL = 5000
+
+
+def end_frame(
+    ws: XPBDWorkspace,
+    time: float,
+    dt: float,
+    held_back: int,
+    used: Substeps,
+    repeats: int,
+    before: XPBDMemory,
+    overlaps: list[Overlap],
+    sleep: SleepMemory,
+    accuracy: float,
+    setting: str,
+) -> tuple[State, StepReport, Status | None]:
+    """The state at the end of a frame, its report, and the status that more substeps might cure.
+
+    Parameters
+    ----------
+    time : at the end [s]; held_back : in how many substeps the motion of a body was shortened
+    used : substeps of the frame; repeats : how often it was repeated; before : of the frame before
+    overlaps, sleep : as the frame began with them; accuracy : how much stiffness a body may lack
+    setting : the solver's parameter that more substeps need
+    """
+    h = dt / used.count
+    to_world(ws.points, ws.origins, ws.world)
+    ws.guard.measure(ws.points, False)
+    ws.works.end_frame(ws.velocities, ws.actuators.works())
+    held, works = held_back / used.count, ws.works.by_name
+    softening = ws.assessment.softening
+    delivered = ws.delivered.end(ws.points, h)
+    measured = softening.after(softening.own(before.measured), delivered, h, sleep.asleep)
+    shares = softening.by_body(h, measured)
+    findings, ledger = ws.assessment.end(
+        ws.moment(time), ws.world, ws.guard.J, h, accuracy, held, sleep.asleep, works, measured
+    )
+    joints = {"apart": ws.joints.apart(ws.world, time, accuracy), "stalled": ws.joints.stalled(accuracy)}
+    findings = replace(findings, **joints)
+    status = findings.status
+    problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
+    if crossings(findings.overlaps) > crossings(overlaps):
+        problem = Status.INTERSECTING
+    elif problem is None and held_back:
+        problem = Status.INVERTED
+    elif problem is None and (findings.softened or findings.apart):
+        problem = Status.SOFTENED
+    forces, old_points = ws.collisions.forces, ws.layout.old_points
+    x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
+    sound = status in (Status.CONVERGED, Status.SOFTENED) and not held_back
+    rest = ws.sleep.end(x, v, time, sleep, forces, sound)
+    damping = damping_in(ws, h)
+    memory = XPBDMemory(
+        contact=ws.collisions.memory(ws.world),
+        viscous=None if damping is None else damping.memory(v),
+        ledger=ledger,
+        measured=measured,
+        substeps=float(used.count) if repeats else FALL * before.substeps,
+        sleep=rest,
+        futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
+    )
+    pushes, friction = forces.by_name()
+    details = XPBDDetails(
+        contacts=ws.collisions.contacts + sum(len(part[0]) for part in forces.standing),
+        smallest_gap=ws.collisions.smallest_gap,
+        substeps=used.count,
+        repeats=repeats,
+        substeps_reason=used.reason,
+        softening=shares,
+        energy_gained=findings.gained,
+        held_back=held_back,
+        asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
+        contact_forces=pushes,
+        friction_forces=friction,
+        weld_forces=ws.welded.forces(ws.rigid, ws.velocities, dt, sleep.asleep),
+        **ws.actuators.fields(h * used.count),
+        **ws.joints.fields(ws.world, time),
+        work=works,
+        energy_residual=ws.works.residual,
+    )
+    world, surfaces = ws.collisions.obstacles.places(ws.world).copy(), ws.collisions.positions
+    message = findings.message(time, _remedy(findings, used.count, shares, accuracy, setting))
+    report = StepReport(
+        status,
+        used.count,
+        message,
+        details=details,
+        contacts=lambda: forces.points(world, surfaces, old_points),
+    )
+    return State(time, x, v, memory=memory, hinge_angles=ws.joints.hinge_angles()), report, problem
+
+
+def _remedy(findings: Findings, used: int, shares: Mapping[str, float], accuracy: float, setting: str) -> str:
+    """What helps against what was found."""
+    count = enough(used, shares, accuracy)
+    contradicted = bool(findings.apart or findings.stalled)
+    if findings.status is not Status.SOFTENED or contradicted:
+        count = max(count, 2 * used)
+    more = ", or remove what contradicts the joint: a pin, a script, contact or another joint" if contradicted else ""
+    if count > IMPRACTICAL:
+        return f"take Implicit, or a RigidBody for what hardly deforms ({setting}={count} would do){more}"
+    return f"take {setting}={count}{more}"

@@ -1,0 +1,60 @@
+"""What XPBD must know of earlier steps beside positions and velocities. It is stored in `State.memory`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.state import State
+from supple.solvers.xpbd.assessment.assessment import Ledger
+from supple.solvers.xpbd.assessment.softening import MeasuredWork
+from supple.solvers.xpbd.contact.memory import ContactMemory
+from supple.solvers.xpbd.damping.kelvin_voigt import ViscousMemory
+from supple.solvers.xpbd.sleep import SleepMemory
+
+
+@dataclass(frozen=True, eq=False)
+class ControlMemory:
+    """Control points of rigid bodies, to the bit, with the masses of what is welded to them.
+
+    Attributes
+    ----------
+    inner : (2, c, 3) their positions [m] and velocities [m/s]; outer : those in the state
+    """
+
+    inner: NDArray[np.float64]
+    outer: NDArray[np.float64]
+
+    def belongs_to(self, state: State, rows: NDArray[np.integer]) -> bool:
+        """Whether a state has these rows (c,) of positions and velocities."""
+        if len(rows) != self.outer.shape[1]:
+            return False
+        return np.array_equal(np.stack([state.positions[rows], state.velocities[rows]]), self.outer)
+
+
+@dataclass(frozen=True, eq=False)
+class XPBDMemory:
+    """The memory of one state.
+
+    Attributes
+    ----------
+    contact : of contact; None without contact of surfaces
+    viscous : of damping; None where nothing is damped
+    ledger : of the assessment of frames; None at the start
+    measured : how much of their stiffness bodies lacked; None at the start
+    substeps : what the last frame asks of the next one, where repetitions helped; falls back to zero
+    sleep : of bodies at rest; None at the start
+    futile : the statuses that the last frame had in spite of repetitions
+    control : of rigid bodies; None where nothing is welded to any
+    """
+
+    contact: ContactMemory | None = None
+    viscous: ViscousMemory | None = None
+    ledger: Ledger | None = None
+    measured: MeasuredWork | None = None
+    substeps: float = 0.0
+    futile: frozenset[str] = frozenset()
+    sleep: SleepMemory | None = None
+    control: ControlMemory | None = None

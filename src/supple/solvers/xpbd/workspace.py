@@ -1,0 +1,163 @@
+"""What XPBD computes once for a system, and its scratch arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import dataclass, field, replace
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.active import Growth
+from supple.model.state import State
+from supple.model.system import System
+from supple.runtime.thread_tuning import ThreadTuner
+from supple.runtime.threads import numba_threads, one_thread
+from supple.solvers.xpbd.assessment.assessment import Assessment
+from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
+from supple.solvers.xpbd.assessment.moment import Moment
+from supple.solvers.xpbd.assessment.substep import Substep
+from supple.solvers.xpbd.assessment.works import Works
+from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
+from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
+from supple.solvers.xpbd.constraints.registry import ConstraintSet
+from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
+from supple.solvers.xpbd.constraints.stitch_anchors import StitchAnchors
+from supple.solvers.xpbd.contact.collisions import Collisions
+from supple.solvers.xpbd.damping.kelvin_voigt import Damping
+from supple.solvers.xpbd.external_forces import ExternalForces
+from supple.solvers.xpbd.integration import apply_changes
+from supple.solvers.xpbd.limits.rigid_fallback import RigidFallback
+from supple.solvers.xpbd.limits.volume_guard import VolumeGuard
+from supple.solvers.xpbd.memory import XPBDMemory
+from supple.solvers.xpbd.momentum import MomentumRestore
+from supple.solvers.xpbd.rigid.bodies import RigidBodies
+from supple.solvers.xpbd.rigid.joints import JointProjection
+from supple.solvers.xpbd.sleep import Sleep
+from supple.solvers.xpbd.substeps import SubstepChoice
+from supple.solvers.xpbd.sweeps.ordering import Layout, reordered
+from supple.solvers.xpbd.welded_masses import WeldedMasses
+
+
+@dataclass(eq=False)
+class XPBDWorkspace:
+    """What is computed once for a system, and scratch arrays, in the solver's own numbering of vertices.
+
+    It caches and never remembers: a step reads nothing of an earlier step but the state.
+
+    Attributes
+    ----------
+    growth : which the elastic constants have now
+    threads : of Numba's parallel kernels; None leaves their number as it is; most_threads : in the present frame
+    extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
+        of the anchors (inverse mass 0); points : the rows of the vertices
+    time : of these positions, between two substeps [s]
+    previous : (n, 3) positions at the beginning of the substep [m]; begun : those, which contacts do not change
+    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
+    """
+
+    system: System
+    layout: Layout
+    welded: WeldedMasses
+    rigid: RigidBodies
+    joints: JointProjection
+    sets: list[ConstraintSet]
+    damping: Damping | None
+    momentum: MomentumRestore | None
+    collisions: Collisions
+    loads: ExternalForces
+    actuators: ActuatorProjection
+    guard: VolumeGuard
+    fallback: RigidFallback
+    assessment: Assessment
+    delivered: DeliveredWork
+    works: Works
+    choice: SubstepChoice
+    sleep: Sleep
+    threads: int | None
+    pace: ThreadTuner
+    anchors: StitchAnchors
+    extended: NDArray[np.float64]
+    growth: Growth | None = None
+    most_threads: int = 1
+    time: float = 0.0
+    points: NDArray[np.float64] = field(init=False)
+    previous: NDArray[np.float64] = field(init=False)
+    begun: NDArray[np.float64] = field(init=False)
+    velocities: NDArray[np.float64] = field(init=False)
+    origins: NDArray[np.float64] = field(init=False)
+    world: NDArray[np.float64] = field(init=False)
+    world_previous: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.system.masses)
+        self.points = self.extended[:n]
+        for name in ("previous", "begun", "velocities", "origins", "world", "world_previous"):
+            setattr(self, name, np.zeros((n, 3)))
+
+    def with_loads(self, system: System) -> XPBDWorkspace:
+        """The workspace for a system that differs only by its loads on vertices and its soft targets."""
+        inner = reordered(system, self.layout)
+        works = copy(self.works)
+        works.system = inner
+        return replace(self, system=inner, loads=ExternalForces(inner), works=works, sleep=self.sleep.of(inner))
+
+    def set_asleep(self, bodies: NDArray[np.bool_]) -> None:
+        """Let no vertex of these bodies (b,) move, and no constraint of them be projected."""
+        free = np.where(self.sleep.vertices(bodies), 0.0, self.system.inverse_masses)
+        if not np.array_equal(free, self.points[:, 3]):
+            self.points[:, 3] = free
+            for constraints in self.sets:
+                constraints.sweep.choose(self.extended[:, 3])
+            if self.damping is not None:
+                self.damping.choose(self.extended[:, 3])
+
+    @contextmanager
+    def own_threads(self) -> Iterator[None]:
+        """A frame's block. What is outside of substeps runs in the mode that was faster in them so far."""
+        with numba_threads(self.threads):
+            self.most_threads = numba.get_num_threads()
+            with one_thread(not self.pace.parallel):
+                yield
+
+    def grow(self, time: float) -> float:
+        """Take the stress-free shapes of the tets at `time` [s]; returns the work of that [J]."""
+        laws = self.system.laws_at(time)
+        if laws.growth is None or laws.growth.equals(self.growth):
+            return 0.0
+        elastic = self.assessment.balance.elastic
+        before = float(elastic.of(self.points, False).sum())
+        self.growth = laws.growth
+        shapes = laws.stress_free.Dm_inv, laws.stress_free.volumes
+        for each in (*self.sets, self.assessment.balance.elastic, self.works.at_pins):
+            if isinstance(each, (StableNeoHookeanConstraints, ElasticEnergy)):
+                each.grow(*shapes)
+        return float(elastic.of(self.points, False).sum()) - before
+
+    def begin_frame(self, time: float, h: float) -> None:
+        """Begin a frame at `time` [s], in substeps of h [s]."""
+        self.actuators.begin_frame(self.substep(time, h))
+        self.works.begin_frame(self.velocities)
+        self.rigid.begin_frame(self.velocities)
+
+    def substep(self, time: float, h: float) -> Substep:
+        """The arrays of a substep of h [s] that ends at `time` [s]."""
+        return Substep(self.points, self.velocities, self.origins, self.begun, time, h)
+
+    def apply_changes(self, h: float) -> None:
+        """Apply what contacts changed in `world` and `world_previous`."""
+        places = self.origins, self.previous, self.world, self.world_previous
+        apply_changes(self.points, self.velocities, h, *places, self.works.impulses)
+
+    def present(self) -> State:
+        """The state after the latest substep, in the numbering of the scene, without what later frames must know."""
+        new = self.layout.new_from_old
+        state = State(self.time, (self.points[:, :3] + self.origins)[new], self.velocities[new], memory=XPBDMemory())
+        return replace(self.welded.outer(state), memory=None)
+
+    def moment(self, time: float) -> Moment:
+        """What the assessment reads, at `time` [s]."""
+        return Moment(self.points, self.extended, self.velocities, self.origins, time)

@@ -1,0 +1,203 @@
+"""Demos: each can be built for each of its solvers, the claims of the quick ones hold, and claims can fail."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from supple.app.cli.app import main
+from supple.app.cli.exit_codes import ExitCode
+from supple.app.demos import cantilever, quilt
+from supple.app.demos.actuators import pneunet
+from supple.app.demos.demo import Claim, Demo, Measurement
+from supple.app.demos.motion_measures import stitch_lengths
+from supple.app.demos.registry import DEMOS, find_demo
+from supple.app.demos.rigid import dzhanibekov, gripper
+from supple.errors import SceneError, SolverError
+from supple.model.state import Status
+from supple.model.system import build_system, initial_state
+from supple.simulate import simulate
+from supple.solvers.implicit.solver import Implicit
+from supple.solvers.solver import Solver
+from supple.solvers.xpbd.solver import XPBD
+
+# Torture scenes are tested in test_torture.py.
+EVERY = [(name, kind) for name, demo in DEMOS.items() for kind in demo.kinds if not name.startswith("torture-")]
+SOLVERS = {"xpbd": XPBD, "implicit": Implicit}
+
+
+def run(demo, kind, steps=None):
+    demo = demo.on(kind)
+    measurement = demo.measurement()
+    frames = list(simulate(demo.scene(), demo.solver(kind), demo.dt, steps or demo.steps, sinks=[measurement]))
+    return frames, measurement.claims()
+
+
+def test_the_names_and_solvers_of_the_demos():
+    soft = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt", "balloon", "muscle"}
+    soft |= {"pneunet", "tendon_finger", "foam_press"}
+    rigid = {"dzhanibekov", "dominoes", "gripper", "ragdoll"}
+    assert {name for name, _ in EVERY} == soft | rigid
+    assert {kind for _, kind in EVERY} == set(SOLVERS)
+    assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
+
+
+@pytest.mark.parametrize(("name", "kind"), EVERY)
+def test_the_solver_of_each_kind_accepts_the_scene(name, kind):
+    demo = find_demo(name).on(kind)
+    assert demo.name == name
+    solver = demo.solver(kind)
+    assert isinstance(solver, SOLVERS[kind])
+    scene = demo.scene()
+    system = build_system(scene, initial_state(scene))
+    assert np.all(system.rest_volumes > 0.0)
+    solver.prepare(system)
+
+
+# The first steps of these take long: a fine mesh, and patches that are compiled.
+LONG = {("cantilever", "implicit"), ("balloon", "implicit"), ("pneunet", "implicit")}
+
+
+@pytest.mark.parametrize(("name", "kind"), [pair for pair in EVERY if pair not in LONG])
+def test_two_frames_converge_and_every_claim_is_measured(name, kind):
+    frames, claims = run(DEMOS[name], kind, steps=2)
+    assert [frame.report.status for frame in frames] == [Status.CONVERGED] * 2
+    assert all(frame.report.min_det_F > 0.0 for frame in frames)
+    assert len(claims) >= 3
+    assert all(claim.text and claim.measured for claim in claims)
+    assert not all(claim.holds for claim in claims), "two frames are too few for all claims"
+
+
+def test_the_box_turns_over_when_it_should_and_not_by_other_equations(monkeypatch):
+    frames, claims = run(DEMOS["dzhanibekov"], "implicit")
+    assert len(frames) == 600
+    assert all(claim.holds for claim in claims), claims
+    true = dzhanibekov.spin_by_euler
+    monkeypatch.setattr(dzhanibekov, "spin_by_euler", lambda inertia, times: true(inertia * [1.0, 1.0, 1.1], times))
+    assert not run(DEMOS["dzhanibekov"], "implicit", steps=320)[1][0].holds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["dominoes", "ragdoll"])
+def test_scenes_of_rigid_bodies_keep_their_claims(name):
+    _, claims = run(DEMOS[name], "implicit")
+    assert all(claim.holds for claim in claims), claims
+
+
+@pytest.mark.slow
+def test_the_gripper_holds_its_box_and_not_a_slippery_one(monkeypatch):
+    for kind in ("implicit", "xpbd"):
+        frames, claims = run(DEMOS["gripper"], kind)
+        assert {frame.report.status for frame in frames} == {Status.CONVERGED}
+        assert all(claim.holds for claim in claims), claims
+    monkeypatch.setattr(gripper, "FRICTION", 0.1)
+    lifted, *_ = run(DEMOS["gripper"], "implicit", steps=100)[1]
+    assert not lifted.holds
+
+
+@pytest.mark.slow
+def test_cantilever_on_coarser_meshes_bends_less_than_theory(monkeypatch):
+    monkeypatch.setattr(cantilever, "MESHES", {"coarse": (16, 3, 1), "medium": (32, 6, 2), "fine": (64, 12, 4)})
+    assert cantilever.beam_theory() == pytest.approx(4.031e-4, rel=1e-4)
+    frames, (below, finest, _) = run(DEMOS["cantilever"], "implicit")
+    assert frames[-1].report.status is Status.CONVERGED
+    assert below.holds
+    assert not finest.holds, "64 x 12 x 4 cells are 6 % too stiff"
+
+
+def test_cantilever_claims_fail_with_another_theory(monkeypatch):
+    monkeypatch.setattr(cantilever, "MESHES", {"coarse": (8, 2, 1), "medium": (16, 3, 1), "fine": (32, 6, 2)})
+    monkeypatch.setattr(cantilever, "beam_theory", lambda: 1e-4)
+    assert not any(claim.holds for claim in run(DEMOS["cantilever"], "implicit")[1])
+
+
+def test_both_solvers_stretch_the_ball_to_the_same_shape():
+    lengths = {}
+    for kind in ("xpbd", "implicit"):
+        frames, _ = run(DEMOS["stretch"], kind, steps=30)
+        lengths[kind] = np.ptp(frames[-1].positions["ball"][:, 1])
+    assert lengths["implicit"] == pytest.approx(lengths["xpbd"], rel=0.02)
+
+
+def test_the_hat_stays_on_the_flying_bear_with_both_solvers():
+    for kind in ("xpbd", "implicit"):
+        frames, _ = run(DEMOS["stitch"], kind, steps=6)
+        stitching = frames[-1].system.stitching
+        assert len(stitching.tets) >= 8
+        assert len(np.unique(frames[-1].system.joined_components)) == 1
+        longer = np.abs(stitch_lengths(frames[-1]) - stitch_lengths(frames[0])).max()
+        assert longer < 1e-3
+        assert frames[-1].positions["hat"][:, 1].min() > 0.12
+
+
+@pytest.mark.slow
+def test_both_solvers_bend_the_quilt_into_the_static_shape(monkeypatch):
+    """The whole demo in a shorter time, on a coarser patch and bar."""
+    monkeypatch.setattr(quilt, "RAMP", 1.0)
+    monkeypatch.setattr(quilt, "BAR_DIVISIONS", (8, 1, 2))
+    monkeypatch.setattr(quilt, "PATCH_DIVISIONS", (6, 1, 2))
+    for kind in ("xpbd", "implicit"):
+        _, claims = run(DEMOS["quilt"], kind, steps=80)
+        assert [claim.measured for claim in claims if not claim.holds] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "kind"), EVERY)
+def test_every_claim_of_the_whole_demo_holds(name, kind):
+    _, claims = run(DEMOS[name], kind)
+    assert [claim for claim in claims if not claim.holds] == []
+
+
+def test_an_unknown_demo_and_an_unknown_solver_are_errors():
+    with pytest.raises(SceneError, match=r"there is no demo 'squish'; there are squash, stretch"):
+        find_demo("squish")
+    with pytest.raises(SolverError, match=r"demo 'bears': there is no solver 'implicit' for it; it has xpbd"):
+        DEMOS["bears"].on("implicit")
+    with pytest.raises(SolverError, match=r"demo 'twist': there is no solver 'xpbd' for it; it has implicit"):
+        DEMOS["twist"].solver("xpbd")
+
+
+def test_implicit_rejects_an_xpbd_material_in_one_line():
+    with pytest.raises(SolverError, match=r"body 'ball': EdgesAndVolume is a material for XPBD only") as error:
+        simulate(DEMOS["squash"].scene(), Implicit(), 1 / 60, 1)
+    assert "\n" not in str(error.value)
+
+
+class OneFrame(Measurement):
+    """Claims two things, of which one is false."""
+
+    def claims(self):
+        moved = self.last.index - self.first.index
+        return [Claim("one frame passes", str(moved), moved == 1), Claim("ten frames pass", str(moved), moved == 10)]
+
+
+def demo_of(scene, solver: Solver) -> Demo:
+    return Demo("made up", "for a test", "A test.", scene, {"xpbd": lambda: solver}, OneFrame, steps=1)
+
+
+def test_a_claim_that_does_not_hold_is_reported_and_exits_1(monkeypatch, capfd, tmp_path):
+    demo = demo_of(DEMOS["stretch"].scene, XPBD(substeps=2))
+    assert [claim.holds for claim in run(demo, "xpbd")[1]] == [True, False]
+    monkeypatch.setitem(DEMOS, "made", demo)
+    code = main(["demo", "made", "-q", "--no-page", "--no-plot", "-o", str(tmp_path)])
+    assert code == ExitCode.FAILED
+    assert capfd.readouterr().out.splitlines() == [
+        "holds: one frame passes (1)",
+        "does not hold: ten frames pass (1)",
+    ]
+
+
+def test_newton_iterations_go_to_the_log_at_debug(caplog):
+    name = "supple.solvers.implicit.newton.minimize"
+    with caplog.at_level(logging.DEBUG, logger=name):
+        frames, _ = run(DEMOS["twist"], "implicit", steps=1)
+    logged = [record.getMessage() for record in caplog.records if record.name == name]
+    rows = [row for row in frames[0].report.details.newton if row.kind == "newton"]
+    assert len(rows) >= 1
+    assert sum("iteration=" in line for line in logged) == len(rows)
+
+
+@pytest.mark.slow
+def test_the_reference_of_the_bellows_finger_is_that_of_a_finer_mesh():
+    frames = simulate(pneunet.scene(pneunet.FINER), DEMOS["pneunet"].solver(), 1.0, pneunet.STEPS)
+    np.testing.assert_allclose([pneunet.bend(frame) for frame in frames], pneunet.REFERENCE, rtol=2e-3)

@@ -1,0 +1,113 @@
+"""Scene files of a live page read nothing outside their folder, and run no code."""
+
+import os
+
+import pytest
+
+import supple as sp
+from supple.app.scene_file.confined import ConfinedMeshStore
+from supple.app.scene_file.loader import load_run
+from supple.errors import SceneError, SuppleError
+
+SCENE = """
+bodies:
+  - name: cube
+    {source}
+    material: {{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}}
+"""
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder with a scene and meshes inside and outside of it."""
+    home = tmp_path / "home"
+    (home / "meshes").mkdir(parents=True)
+    cube = sp.shapes.box((1, 1, 1), (1, 1, 1))
+    cube.save(tmp_path / "outside.msh")
+    cube.save(tmp_path / "outside.1.ele")
+    cube.save(home / "meshes" / "inside.msh")
+    cube.save(home / "family.1.ele")
+    cube.surface.save(tmp_path / "outside.stl")
+    return home
+
+
+def load(home, source):
+    path = home / "scene.yaml"
+    path.write_text(SCENE.format(source=source))
+    return load_run(path, ConfinedMeshStore)
+
+
+@pytest.mark.parametrize(
+    "file", ["meshes/inside.msh", "./meshes/../meshes/inside.msh", "family.1.ele", "family.1.node"]
+)
+def test_files_inside_are_read(place, file):
+    assert len(load(place, f"mesh: {{file: {file}}}").scene.body("cube").mesh.tets) == 6
+
+
+def outward(place):
+    (place / "link.msh").symlink_to(place.parent / "outside.msh")
+    (place / "folder").symlink_to(place.parent)
+    (place / "half.1.ele").write_bytes((place / "family.1.ele").read_bytes())
+    (place / "half.1.node").symlink_to(place.parent / "outside.1.node")
+    return [
+        "../outside.msh",
+        "meshes/../../outside.msh",
+        str(place.parent / "outside.msh"),
+        str(place / "meshes" / "inside.msh"),  # no absolute path, not even to the folder
+        "link.msh",
+        "folder/outside.msh",
+        "half.1.ele",
+        "../outside.stl",
+        "/etc/passwd",
+        "/dev/zero",
+        "//etc/passwd",
+        "~/.ssh/id_rsa",
+    ]
+
+
+def test_files_outside_are_not_read(place):
+    for file in outward(place):
+        with pytest.raises(SceneError) as caught:
+            load(place, f'mesh: {{file: "{file}"}}')
+        assert "outside the scene file's folder" in str(caught.value) or file.startswith("~"), file
+        assert "root:" not in str(caught.value)
+        with pytest.raises(SceneError):
+            load(place, f'shape: {{kind: box}}\n    skin: {{file: "{file}"}}')
+
+
+def test_a_run_from_the_shell_reads_any_file(place):
+    path = place / "scene.yaml"
+    path.write_text(SCENE.format(source="mesh: {file: ../outside.msh}"))
+    assert load_run(path).scene.body("cube")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_an_error_without_waiting_for_it(place):
+    os.mkfifo(place / "pipe.msh")
+    with pytest.raises(SceneError, match="not a regular file"):
+        load(place, "mesh: {file: pipe.msh}")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "!!python/object/apply:os.system ['touch {marker}']",
+        "!!python/object/new:subprocess.Popen [['touch', '{marker}']]",
+        "!!python/name:os.system",
+        "bodies: !!python/module:os",
+        "bodies: &a [*a]",
+        "bodies: [{{name: !!python/tuple [1], shape: {{kind: box}}}}]",
+        "a: &a [x,x,x,x,x,x,x,x,x]\nb: &b [*a,*a,*a,*a,*a,*a,*a,*a,*a]\nc: &c [*b,*b,*b,*b,*b,*b,*b,*b,*b]\n"
+        "d: &d [*c,*c,*c,*c,*c,*c,*c,*c,*c]\ne: &e [*d,*d,*d,*d,*d,*d,*d,*d,*d]\nf: &f [*e,*e,*e,*e,*e,*e,*e,*e]\n"
+        "bodies: [*f,*f,*f,*f,*f,*f,*f,*f,*f]",
+        "bodies: " + "[" * 100_000,
+        "\0\1\2",
+    ],
+)
+def test_hostile_files_are_errors_and_run_no_code(tmp_path, text):
+    marker, path = tmp_path / "marker", tmp_path / "scene.yaml"
+    path.write_text(text.replace("{marker}", str(marker)))
+    with pytest.raises(SuppleError) as caught:
+        load_run(path, ConfinedMeshStore)
+    assert "\n" not in str(caught.value)
+    assert not marker.exists()

@@ -1,0 +1,39 @@
+"""The files and the program of docs/studies.md."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import supple as sp
+from supple.app.scene_file.loader import load_run
+
+PAGE = (Path(__file__).parents[3] / "docs" / "studies.md").read_text(encoding="utf-8")
+
+
+def test_the_files_of_the_page(tmp_path):
+    scene, study = re.findall(r"^```yaml\n(.*?)^```", PAGE, flags=re.S | re.M)
+    (tmp_path / "bar.yaml").write_text(scene, encoding="utf-8")
+    (tmp_path / "study.yaml").write_text(study, encoding="utf-8")
+    assert load_run(tmp_path / "bar.yaml").steps == 10
+    described = sp.load_study(tmp_path / "study.yaml")
+    points = described.design.points(described.factors)
+    assert len(points) == 12
+    for point in points:
+        described.source.check({path: point[name] for name in point for path in described.paths[name]})
+
+
+def test_the_program_of_the_page_runs(tmp_path):
+    (program,) = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.S | re.M)
+    (tmp_path / "script.py").write_text(program, encoding="utf-8")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    lines = (tmp_path / "slide" / "table.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "case,youngs [Pa],friction,measure [m],status,reason"
+    assert len(lines) == 7
+    assert all(",done," in line for line in lines[1:])
+    assert {path.name for path in (tmp_path / "slide" / "plots").iterdir()} == {"measure.png", "measure-tornado.png"}

@@ -1,0 +1,75 @@
+"""Measures of study files, on the recording of a free fall with a known solution."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.app.studies.measures import SERIES, BodyMeasure, Measures, SeriesMeasure
+
+from .conftest import FALL_DT, FALL_STEPS, fallen, make_fall
+
+G = 10.0
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path = tmp_path_factory.mktemp("fall") / "recording.vtkhdf"
+    solver = sp.XPBD(substeps=1, contact=None)
+    for _ in sp.simulate(make_fall(G), solver, FALL_DT, FALL_STEPS, sinks=[sp.Recorder(path)]):
+        pass
+    with sp.read_recording(path) as opened:
+        yield opened
+
+
+SPEED = G * FALL_DT * FALL_STEPS
+
+
+@pytest.mark.parametrize(
+    ("measure", "expected"),
+    [
+        (SeriesMeasure("kinetic_energy"), 500.0 * SPEED**2),
+        (SeriesMeasure("kinetic_energy", time="first"), 0.0),
+        (SeriesMeasure("min_det_F", time="min"), 1.0),
+        (SeriesMeasure("linear_momentum", axis="y"), -1000.0 * SPEED),
+        (SeriesMeasure("linear_momentum", axis="length", time="max"), 1000.0 * SPEED),
+        (SeriesMeasure("potential_energy", time="range"), 1000.0 * G * -fallen(G)),
+        (BodyMeasure("displacement", "cube", axis="y"), fallen(G)),
+        (BodyMeasure("displacement", "cube"), -fallen(G)),
+        (BodyMeasure("displacement", "cube", axis="x", time="max"), 0.0),
+        (BodyMeasure("position", "cube", axis="y", over="max", time="first"), 2.5),
+        (BodyMeasure("position", "cube", axis="y", over="range", time="mean"), 1.0),
+        (BodyMeasure("position", "cube", axis="x", vertices=(0,)), -0.5),
+        (BodyMeasure("velocity", "cube", axis="y", time="min"), -SPEED),
+        (BodyMeasure("velocity", "cube", axis="y", time="sum"), fallen(G) / FALL_DT),
+    ],
+)
+def test_measures_equal_the_formula(recording, measure, expected):
+    assert measure.of(recording) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_every_series_is_one_that_recordings_have(recording):
+    for name in SERIES:
+        assert len(recording.series(name)) == FALL_STEPS + 1
+
+
+@pytest.mark.parametrize(
+    ("measure", "words"),
+    [
+        (SeriesMeasure("linear_momentum"), "give an axis"),
+        (SeriesMeasure("kinetic_energy", axis="x"), "has no axis"),
+        (SeriesMeasure("largest_stitch_stretch"), "is in no frame"),
+        (BodyMeasure("position", "ball"), "no body 'ball'"),
+        (BodyMeasure("position", "cube", vertices=(1, 8)), "8 vertices; there is no vertex 8"),
+    ],
+)
+def test_what_cannot_be_measured_is_one_line(recording, measure, words):
+    with pytest.raises(sp.SuppleError, match=words) as caught:
+        measure.of(recording)
+    assert "\n" not in str(caught.value)
+
+
+def test_measures_have_names_and_units(recording):
+    measures = Measures({"drop": BodyMeasure("displacement", "cube"), "energy": SeriesMeasure("kinetic_energy")})
+    assert list(measures(recording)) == ["drop", "energy"]
+    assert measures.units == {"drop": "m", "energy": "J"}
+    assert all(np.isfinite(list(measures(recording).values())))

@@ -1,0 +1,52 @@
+"""Points of surfaces under the mouse."""
+
+import numpy as np
+import pytest
+
+from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
+from supple.app.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
+
+
+@pytest.fixture
+def moment(fake):
+    return MomentBuilder().moment(fake.snapshot)
+
+
+def place_of(moment, point):
+    rows = point.vertices + point.body.vertices.start
+    return point.weights @ moment.positions[rows]
+
+
+def test_nearest_point_of_any_surface(moment):
+    low, high = moment.positions[moment.model.bodies[1].vertices].min(axis=0), moment.positions.max(axis=0)
+    point = nearest_surface_point(moment, high - np.array([-0.5, 0.3, 0.4]))
+    assert point.body.name == "body 1"
+    np.testing.assert_allclose(place_of(moment, point), high - [0.0, 0.3, 0.4], atol=1e-12)
+    np.testing.assert_allclose(place_of(moment, nearest_surface_point(moment, low - 1.0)), point_of(moment, low))
+    assert point.weights.min() >= 0.0
+    assert point.weights.sum() == pytest.approx(1.0)
+
+
+def point_of(moment, low):
+    """The corner of the nearer body that is nearest to what lies below and before both."""
+    offsets = np.linalg.norm(moment.positions - (low - 1.0), axis=1)
+    return moment.positions[np.argmin(offsets)]
+
+
+def test_first_intersection_of_a_ray(moment):
+    low, high = moment.positions.min(axis=0), moment.positions.max(axis=0)
+    across = 0.5 * (low + high) + [0.0, 0.07, 0.03]
+    point = surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [1.0, 0.0, 0.0])
+    assert point.body.name == "body 0"
+    np.testing.assert_allclose(place_of(moment, point), [low[0], *across[1:]], atol=1e-9)
+    vertex = moment.positions[point.nearest_vertex + point.body.vertices.start]
+    assert np.linalg.norm(vertex - point.place) <= 0.36  # half the diagonal of a facet
+    assert surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [-1.0, 0.0, 0.0]) is None
+    assert surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [0.0, 0.0, 0.0]) is None
+
+
+def test_points_on_planes_parallel_to_the_screen():
+    eye, look = np.array([0.0, 0.0, -4.0]), np.array([0.0, 0.0, 1.0])
+    place = point_on_camera_plane(eye, [3.0, 3.0, 8.0], look, [9.0, -9.0, 0.0])
+    np.testing.assert_allclose(place, [1.0, 1.0, 0.0])
+    assert point_on_camera_plane(eye, [3.0, 3.0, -8.0], look, [9.0, -9.0, 0.0]) is None

@@ -1,0 +1,363 @@
+"""The live page in a browser with a real simulation: both state and picture are checked."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.app.viewer.app import Address, opened_page
+from supple.app.viewer.protocol.commands import RemoveBody
+from supple.app.viewer.protocol.live_source import LiveSource
+from supple.mesh.primitives.surfaces import sphere_surface
+
+RADIUS, START = 0.3, 0.5
+MASS = 1000.0 * 4.0 / 3.0 * np.pi * RADIUS**3
+
+# Whether the first picture after a message with vertices is drawn with them.
+IN_NEXT_PICTURE = """() => { window.inNextPicture = new Promise((resolve) => {
+  const client = suppleViewer.mutable.current, { scene, messageQueue } = client, before = scene.onBeforeRender;
+  let sent = null;
+  messageQueue.push = (message) => {
+    sent = message.updates?.vertices?.slice() ?? sent;
+    return Array.prototype.push.call(messageQueue, message);
+  };
+  scene.onBeforeRender = (renderer) => {
+    before(renderer);
+    if (!sent) return;
+    delete messageQueue.push;
+    scene.onBeforeRender = before;
+    let mesh;
+    client.nodeRefFromName["/bodies/0 ball"].traverse((each) => { mesh ??= each.geometry; });
+    resolve(sent.every((value, k) => value === mesh.attributes.position.array[k]));
+  };
+  setTimeout(resolve, 5000, false);
+}); }"""
+
+
+@pytest.fixture(scope="module")
+def live(look, spot):
+    """A page with a soft ball above a floor."""
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.02)
+    ball = sp.Body("ball", sp.shapes.sphere(radius=RADIUS, edge_length=0.2), rubber, position=(0.0, START, 0.0))
+    scene = sp.Scene([ball], obstacles=[sp.HalfSpace(friction=0.5)])
+    source = LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60)
+    with opened_page(source, Address(port=0)) as page:
+        screen = look(page.url + "&fixedDpr=0.5", page.server)  # few pixels: they are drawn in software
+        controller = page.content.controller
+        made = SimpleNamespace(screen=screen, page=page.content, panel=page.content.panel)
+        made.snapshot = lambda: controller.snapshot
+        made.middle = lambda: controller.snapshot.positions.mean(axis=0)
+        made.height = lambda: float(np.ptp(controller.snapshot.positions[:, 1]))
+        made.red = lambda: spot(screen.shot(), "red")
+        made.seen = lambda: made.red()[1]
+
+        def drawn(holds, what):
+            """Wait for the picture, which is later than the state."""
+            return screen.wait(lambda: holds(made.red()), what)
+
+        made.drawn = drawn
+        yield made
+        screen.close()
+
+
+@pytest.fixture
+def still(live):
+    """The page at the start of time, paused."""
+    if not live.snapshot().paused:
+        live.screen.press("Pause")
+        live.screen.wait(lambda: live.snapshot().paused, "the pause")
+    live.screen.press("reset")
+    live.screen.wait(lambda: live.snapshot().frame == 0 and abs(live.middle()[1] - START) < 1e-3, "the start")
+    where = live.screen.place(live.middle())
+    live.drawn(lambda red: red[0] > 300 and np.abs(red[1] - where).max() < 25, "the ball at its start")
+    return live
+
+
+@pytest.fixture
+def resting(still):
+    """The ball at rest on the floor, while time runs."""
+    still.screen.press("Play")
+    speed = lambda: np.sqrt(2.0 * still.snapshot().measures.kinetic_energy / MASS)  # noqa: E731
+    still.screen.wait(
+        lambda: still.snapshot().time > 0.6 and still.middle()[1] < 0.32 and speed() < 0.03, "the ball on the floor"
+    )
+    still.drawn(lambda red: abs(red[1][1] - still.screen.place(still.middle())[1]) < 25, "the ball on the floor")
+    return still
+
+
+def test_play_pause_step_and_reset(still):
+    screen, before = still.screen, still.seen()
+    screen.press("Play")
+    screen.wait(lambda: still.middle()[1] < 0.35, "the fall")
+    still.drawn(lambda red: red[1][1] > before[1] + 8, "the fall in the picture")
+    screen.press("Pause")
+    screen.wait(lambda: still.snapshot().paused, "the pause")
+    frame = still.snapshot().frame
+    screen.tab.wait_for_timeout(200)
+    assert still.snapshot().frame == frame
+    low = still.seen()
+    screen.press("step")
+    screen.wait(lambda: still.snapshot().frame == frame + 1, "one frame")
+    screen.press("reset")
+    screen.wait(lambda: still.snapshot().frame == 0, "the start")
+    assert still.middle()[1] == pytest.approx(START, abs=1e-3)
+    still.drawn(lambda red: np.abs(red[1] - before).max() < 4, "the picture of the start")
+    assert low[1] > before[1] + 8
+    assert screen.errors == []
+
+
+# Keeps the first vertex of every mesh that arrives in the browser.
+KEEP_MESHES = """() => {
+  const queue = suppleViewer.mutable.current.messageQueue;
+  window.meshes = [];
+  queue.push = (message) => {
+    const vertices = message.updates?.vertices;
+    if (vertices) meshes.push([...vertices.slice(0, 3)]);
+    return Array.prototype.push.call(queue, message);
+  };
+}"""
+
+
+def test_pictures_arrive_in_order_and_the_last_one_is_the_state(still):
+    screen, stage, drawn = still.screen, still.page.stage, []
+    show = stage.show
+
+    def noted_show(moment):
+        show(moment)
+        drawn.append(stage.body_handles[0].vertices[0].tolist())
+
+    screen.tab.evaluate(KEEP_MESHES)
+    stage.show = noted_show
+    try:
+        screen.press("Play")
+        screen.wait(lambda: still.middle()[1] < 0.4, "the fall")
+        screen.press("Pause")
+        screen.wait(lambda: still.snapshot().paused, "the pause")
+        screen.wait(lambda: screen.tab.evaluate("meshes.at(-1)") == drawn[-1], "the last picture")
+    finally:
+        del stage.show
+        meshes = screen.tab.evaluate("() => { delete suppleViewer.mutable.current.messageQueue.push; return meshes; }")
+    places = [drawn.index(mesh) for mesh in meshes]  # each is one that was drawn
+    assert places == sorted(places)
+    assert 2 <= len(meshes) <= len(drawn)
+    first = np.flatnonzero((stage.moment.positions.astype(np.float32) == np.float32(meshes[-1])).all(axis=1))
+    assert len(first) == 1
+
+
+def test_a_message_is_in_the_next_picture(still):
+    tab = still.screen.tab
+
+    def steps():
+        tab.evaluate(IN_NEXT_PICTURE)
+        still.screen.press("step")
+        return tab.evaluate("inNextPicture")
+
+    # One that comes soon after another may be in the picture after the next.
+    assert any(steps() for _ in range(4))
+
+
+def test_shadows_follow_less_often_where_pictures_take_long(still):
+    tab = still.screen.tab
+    still.screen.wait(
+        lambda: tab.evaluate("suppleViewer.mutable.current.scene.onBeforeRender.name === 'beforePicture'"),
+        "the function that is called before each picture",
+    )
+    starts, gaps = (0.0, 10_000.0, 30_000.0, 60_000.0), (10.0, 50.0, 300.0, 10.0)  # of pictures [ms]
+    times = [start + gap * k for start, gap in zip(starts, gaps, strict=True) for k in range(100)]
+    drawn = tab.evaluate("(times) => { const needs = suppleShadows(); return times.map(needs); }", times)
+    quick, slow, seldom, later = np.reshape(drawn, (4, 100))
+    assert quick.all()
+    assert (np.diff(np.flatnonzero(slow[20:])) == 5).all()  # four times a second
+    assert not slow[20:].all()
+    assert seldom.all()
+    assert later.all()
+
+
+def test_a_body_follows_the_mouse_until_it_is_released(resting):
+    screen, mouse = resting.screen, resting.screen.tab.mouse
+    low = resting.seen()
+    grip, up = resting.middle() + np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.2, 0.0])
+    mouse.move(*screen.place(grip))
+    mouse.down()
+    mouse.move(*screen.place(grip + up), steps=3)
+    screen.wait(lambda: resting.snapshot().grabs, "the spring")
+    mouse.move(*screen.place(grip + 3.0 * up), steps=3)
+    screen.wait(lambda: resting.middle()[1] > 0.45, "the ball in the air")
+    resting.drawn(lambda red: red[1][1] < low[1] - 12, "the ball in the air in the picture")
+    length = screen.tab.get_by_text(" cm").or_(screen.tab.get_by_text(" mm"))
+    screen.wait(lambda: length.count() >= 1, "how long the spring is")
+    mouse.up()
+    screen.wait(lambda: not resting.snapshot().grabs, "the end of the spring")
+    screen.wait(lambda: resting.middle()[1] < 0.35, "the fall")
+    where = lambda: np.array(screen.place(resting.middle()))  # noqa: E731 - thrown, it may have rolled
+    resting.drawn(lambda red: np.abs(red[1] - where()).max() < 25, "the fall in the picture")
+
+
+@pytest.mark.slow
+def test_a_click_pins_a_vertex_and_another_one_unpins_it(resting):
+    screen, tab = resting.screen, resting.screen.tab
+    top = resting.snapshot().positions[np.argmax(resting.snapshot().positions[:, 1])]
+    x, y = screen.place(top - [0.0, 0.05, 0.0])
+
+    def dark() -> int:
+        shot = screen.shot()[int(y) - 30 : int(y) + 30, int(x) - 40 : int(x) + 40]
+        return int((shot.max(axis=2) < 60).sum())
+
+    screen.wait(lambda: dark() < 5, "a ball without a pin in the picture")
+    tab.mouse.click(x, y)
+    screen.wait(lambda: len(resting.snapshot().pinned) == 1, "the pin")
+    screen.wait(lambda: dark() > 10, "the pin in the picture")
+    tab.wait_for_timeout(500)  # two clicks within a shorter time are one double click
+    tab.mouse.click(x, y)
+    screen.wait(lambda: len(resting.snapshot().pinned) == 0, "no pin")
+    screen.wait(lambda: dark() < 5, "no pin in the picture")
+
+
+@pytest.mark.slow  # without a browser: tests/app/viewer/test_changes.py, test_solver_change.py
+def test_a_slider_takes_effect(resting):
+    screen = resting.screen
+    screen.show_tab("Solver")
+    gravity, low = resting.panel.solver.inputs["gravity"].handle, resting.seen()
+    value = lambda: resting.snapshot().description.values["gravity"]  # noqa: E731
+    # It points down: below zero is up.
+    screen.insist(lambda: screen.slide(gravity, "Home"), lambda: value() == -20.0, "gravity upwards")
+    screen.wait(lambda: resting.middle()[1] > 0.6, "the ball to rise")
+    resting.drawn(lambda red: red[0] == 0 or red[1][1] < low[1] - 25, "the ball to rise in the picture")
+    typed = screen.tab.locator(f'[id="{gravity._impl.uuid}"]').locator("xpath=ancestor::*[.//input][1]//input").last
+
+    def write():
+        typed.fill("9.81")
+        typed.press("Enter")
+
+    screen.insist(write, lambda: value() == 9.81, "gravity downwards")
+    screen.show_tab("Bodies")
+
+
+@pytest.mark.slow
+def test_a_squashed_ball_recovers(resting):
+    screen = resting.screen
+    before, seen = resting.height(), resting.red()[2]
+    screen.press("Pause")
+    screen.wait(lambda: resting.snapshot().paused, "the pause")
+    screen.press("squash")
+    screen.wait(lambda: resting.height() < 0.6 * before, "the squash")
+    resting.drawn(lambda red: red[2] < 0.8 * seen, "the squash in the picture")
+    screen.press("Play")
+    screen.wait(lambda: abs(resting.height() - before) < 0.05 * before, "the ball's own shape")
+    resting.drawn(lambda red: abs(red[2] - seen) < 0.1 * seen, "the ball's own shape in the picture")
+
+
+@pytest.mark.slow  # without a browser: tests/app/viewer/test_changes.py, test_solver_change.py
+def test_another_solver_continues(still):
+    screen, solver = still.screen, still.panel.solver
+    screen.show_tab("Solver")
+    try:
+        before = still.seen()
+        screen.choose(solver.kind, "implicit")
+        screen.wait(lambda: still.snapshot().description.solver == "implicit", "the other solver")
+        assert "substeps" not in still.snapshot().description.values
+        screen.press("Play")
+        screen.wait(lambda: still.middle()[1] < 0.35, "the fall")
+        still.drawn(lambda red: red[1][1] > before[1] + 8, "the fall in the picture")
+        assert np.isfinite(still.snapshot().positions).all()
+    finally:
+        screen.choose(solver.kind, "xpbd")
+        screen.wait(lambda: still.snapshot().description.solver == "xpbd", "the first solver")
+        screen.show_tab("Bodies")
+
+
+def test_a_body_is_added_and_removed(still, spot):
+    screen, bodies = still.screen, still.panel.bodies
+    blue = lambda: spot(screen.shot(), "blue")[0]  # noqa: E731
+    assert blue() < 20
+    screen.tab.get_by_text("Add a body").click()
+    screen.press("Add")
+    screen.wait(lambda: len(still.snapshot().description.bodies) == 2, "a second body")
+    screen.wait(lambda: blue() > 60, "the second body in the picture")
+    name = still.snapshot().description.bodies[1].name
+    screen.wait(lambda: name in bodies.which.options, "its name")
+    screen.choose(bodies.which, name)
+    screen.press("remove")
+    screen.wait(lambda: len(still.snapshot().description.bodies) == 1, "no second body")
+    screen.wait(lambda: blue() < 20, "no second body in the picture")
+    screen.tab.get_by_text("Add a body").click()
+
+
+@pytest.mark.slow
+def test_a_file_becomes_a_body_and_a_bad_file_a_message(resting, spot, tmp_path):
+    """The file is uploaded in the browser and meshed in another process, while the simulation continues."""
+    try:
+        upload_two_files(resting, spot, tmp_path)
+    finally:
+        resting.page.controller.send(None, lambda: RemoveBody("my ball 1"))
+        resting.screen.wait(lambda: len(resting.snapshot().description.bodies) == 1, "no second body")
+
+
+def upload_two_files(resting, spot, tmp_path):
+    screen, upload = resting.screen, resting.panel.upload
+    blue = lambda: spot(screen.shot(), "blue")[0]  # noqa: E731
+    # The page is open to files within reach of the camera: a ball of 30 cm lands beside or on the one that is there.
+    sphere_surface(radius=50.0, edge_length=25.0).save(tmp_path / "my ball.stl")
+    screen.tab.get_by_text("Add a body").click()
+    files = screen.tab.locator(f'[id="file_upload_{upload.button._impl.uuid}"]')
+    frames = []
+
+    def added():
+        frames.append(resting.snapshot().frame)
+        return len(resting.snapshot().description.bodies) == 2
+
+    files.set_input_files(tmp_path / "my ball.stl")
+    screen.wait(added, "the body")
+    assert frames[-1] > frames[0] + 5  # the time has run
+    body = resting.snapshot().description.bodies[1]
+    assert body.name == "my ball 1"
+    assert np.ptp(body.rest_positions, axis=0).max() == pytest.approx(0.18, abs=0.01)  # the size on the panel
+    screen.press("Pause")  # otherwise the body rolls away
+    screen.press("reset")
+    screen.wait(lambda: blue() > 60, "the body in the picture")
+    screen.press("Play")
+    data = bytearray((tmp_path / "my ball.stl").read_bytes())
+    (tmp_path / "half.stl").write_bytes(data[: len(data) // 2])
+    files.set_input_files(tmp_path / "half.stl")
+    line = screen.tab.get_by_text("half.stl: its header announces")
+    screen.wait(lambda: line.count() == 1, "why the file is refused")
+    frame = resting.snapshot().frame
+    screen.wait(lambda: resting.snapshot().frame > frame + 5, "the simulation to go on")
+    assert len(resting.snapshot().description.bodies) == 2
+    screen.tab.get_by_text("Add a body").click()
+
+
+@pytest.mark.slow
+def test_the_pusher_pushes_a_body(resting):
+    screen, controls = resting.screen, resting.panel.mouse_controls
+    screen.choose(controls.mode, "push")
+    screen.wait(lambda: controls.radius_input.handle.visible, "the ball's size")
+    middle = resting.middle()
+    x, y = screen.place(middle)
+    mouse = screen.tab.mouse
+
+    def hold():
+        """Before the browser has drawn the backdrop, this turns the camera slightly."""
+        mouse.up()
+        mouse.move(x + 130, y)
+        mouse.down()
+        mouse.move(x + 120, y, steps=2)
+
+    screen.insist(hold, lambda: resting.snapshot().pusher is not None, "the ball of the mouse", interval=15.0)
+    for k in range(10):
+        mouse.move(x + 120 - 12 * k, y)
+        screen.tab.wait_for_timeout(60)
+    screen.wait(lambda: np.linalg.norm(resting.middle() - middle) > 0.05, "the push")
+    violet = lambda: np.count_nonzero(  # noqa: E731
+        (screen.shot()[..., 2] - screen.shot()[..., 1] > 50) & (screen.shot()[..., 0] > screen.shot()[..., 1])
+    )
+    screen.wait(lambda: violet() > 60, "the ball of the mouse in the picture")
+    mouse.up()
+    screen.choose(controls.mode, "drag and pin")
+    screen.wait(lambda: resting.snapshot().pusher is None, "no ball of the mouse")
+
+
+def test_the_browser_reported_no_errors(live):
+    assert live.screen.errors == []
+    assert np.isfinite(live.snapshot().positions).all()

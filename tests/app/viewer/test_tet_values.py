@@ -1,0 +1,126 @@
+"""Values for coloring, compared with closed forms, and contact points."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.app.viewer.engine.measurement.contact_points import contact_points
+from supple.app.viewer.engine.measurement.tet_values import QUANTITIES, tet_values
+from supple.model.diagnostics import measure
+from supple.model.state import State
+from supple.model.system import build_system
+
+
+def cube_system(material, **parts):
+    mesh = sp.shapes.box((1, 1, 1), (2, 2, 2))
+    return build_system(sp.Scene([sp.Body("cube", mesh, material)], **parts))
+
+
+RUBBER = sp.StableNeoHookean(youngs=1e5, poisson=0.3)
+
+
+def test_J_is_the_ratio_of_volumes():
+    system = cube_system(RUBBER)
+    ratios = tet_values(system.laws, system.rest_positions * [2.0, 1.0, 0.75], "J")
+    assert ratios == pytest.approx(np.full(48, 1.5))
+
+
+def test_von_mises_stress_of_a_small_uniaxial_stretch():
+    system = cube_system(RUBBER)
+    e, nu = 1e-5, 0.3
+    x = system.rest_positions * [1.0 + e, 1.0 - nu * e, 1.0 - nu * e]
+    assert tet_values(system.laws, x, "von_mises") == pytest.approx(np.full(48, 1e5 * e), rel=1e-3)
+    assert tet_values(system.laws, x, "energy") == pytest.approx(np.full(48, 0.5 * 1e5 * e**2), rel=1e-3)
+
+
+def test_the_energy_of_patches_adds_up_to_that_of_the_report():
+    system = cube_system(sp.StableNeoHookean(youngs=1e5, poisson=0.49, integration="patches"))
+    x = system.rest_positions + 0.02 * np.random.default_rng(0).normal(size=system.rest_positions.shape)
+    total = measure(system, State(0.0, x, np.zeros_like(x))).elastic_energy
+    assert tet_values(system.laws, x, "energy") @ system.rest_volumes == pytest.approx(total, rel=1e-12)
+
+
+def test_pressure_has_no_von_mises_stress():
+    system = cube_system(RUBBER)
+    assert tet_values(system.laws, 0.9 * system.rest_positions, "von_mises") == pytest.approx(np.zeros(48), abs=1e-6)
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+@pytest.mark.parametrize("material", [RUBBER, sp.EdgesAndVolume(edge_compliance=1e-3, volume_compliance=1e-6)])
+def test_inverted_and_flat_tets_have_values(material, quantity):
+    system = cube_system(material)
+    for scale in (-1.0, 0.0, 1e-200, 1e200):
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = tet_values(system.laws, system.rest_positions * [1.0, scale, 1.0], quantity)
+        assert values.shape == (48,)
+        if quantity != "J" and scale == -1.0:
+            assert np.isfinite(values).all()
+
+
+def test_what_is_not_known_is_not_a_number():
+    rigid = cube_system(sp.EdgesAndVolume(volume_compliance=1e-6))
+    assert np.isnan(tet_values(rigid.laws, rigid.rest_positions, "von_mises")).all()
+    # An energy that is infinite for J <= 0 has no stress there.
+    logarithmic = cube_system(sp.NeoHookean(youngs=1e5, poisson=0.3))
+    inverted = logarithmic.rest_positions * [1.0, -1.0, 1.0]
+    assert np.isnan(tet_values(logarithmic.laws, inverted, "von_mises")).all()
+
+
+def test_the_energy_of_volumes_is_that_of_the_report():
+    system = cube_system(sp.EdgesAndVolume(edge_compliance=0.0, volume_compliance=1e-6))
+    x = system.rest_positions * [1.1, 1.0, 1.0]
+    from supple.model.diagnostics import measure
+    from supple.model.state import State
+
+    total = measure(system, State(0.0, x, np.zeros_like(x))).elastic_energy
+    assert tet_values(system.laws, x, "energy") @ system.rest_volumes == pytest.approx(total)
+
+
+OBSTACLES = {
+    "floor": sp.HalfSpace(point=(0, -0.5, 0)),
+    "ball": sp.Sphere(center=(0, -1.5, 0), radius=1.0),
+    "bowl": sp.Sphere(radius=np.sqrt(0.75), inside=True),
+    "box": sp.Box(center=(0, -1.0, 0), size=(3, 1, 3)),
+    "turned box": sp.Box(center=(0, -1.0, 0), size=(3, 3, 1), rotation=(np.pi / 2, 0, 0)),
+    "moving floor": sp.HalfSpace(point=(0, -2.5, 0), motion=sp.Keyframes([0, 1], [[0, 0, 0], [0, 2, 0]])),
+}
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_vertices_on_obstacles_are_contact_points(name):
+    system = cube_system(RUBBER, obstacles=[OBSTACLES[name]])
+    x = system.rest_positions
+    found = contact_points(system, x, 1.0)
+    bottom = x[np.isclose(x[:, 1], -0.5)]
+    expected = {"ball": [[0, -0.5, 0]], "bowl": x[np.isclose(np.abs(x).min(axis=1), 0.5)]}.get(name, bottom)
+    assert sorted(map(tuple, found)) == sorted(map(tuple, np.asarray(expected)))
+    away = 0.8 * x if name == "bowl" else x + np.array([0, 0.2, 0])
+    assert len(contact_points(system, away, 1.0)) == 0
+
+
+def test_contact_points_between_bodies():
+    mesh = sp.shapes.box((1, 1, 1), (2, 2, 2))
+    bodies = [sp.Body(name, mesh, RUBBER, position=(0, y, 0)) for name, y in (("low", 0.0), ("high", 1.01))]
+    sheet = sp.TriangleObstacle(
+        surface=sp.shapes.box_surface((4, 1, 4), (1, 1, 1)), motion=sp.Keyframes([0], [[0, -1.01, 0]])
+    )
+    system = build_system(sp.Scene(bodies, [sheet]))
+    x = np.concatenate([body.place(mesh.vertices) for body in bodies])
+    heights = contact_points(system, x, 0.0)[:, 1]
+    assert np.abs(heights) == pytest.approx(np.full(len(heights), 0.505), abs=0.005)
+    assert heights.min() < 0.0 < heights.max()
+    apart = x + np.repeat([[0, 0.3, 0], [0, 0.6, 0]], len(mesh.vertices), axis=0)
+    assert len(contact_points(system, apart, 0.0)) == 0
+
+
+def test_values_of_quadratic_tets_are_those_of_their_means():
+    mesh = sp.shapes.box((1, 1, 1), (1, 1, 1), order=2)
+    system = build_system(sp.Scene([sp.Body("cube", mesh, RUBBER)]))
+    x = system.rest_positions + 0.02 * np.random.default_rng(0).normal(size=system.rest_positions.shape)
+    measured = measure(system, State(0.0, x, np.zeros_like(x)))
+    energies = tet_values(system.laws, x, "energy")
+    assert energies @ system.rest_volumes == pytest.approx(measured.elastic_energy, rel=1e-12)
+    np.testing.assert_allclose(tet_values(system.laws, x, "J"), sp.TetMesh(x, mesh.nodes).volumes / mesh.volumes)
+    assert measured.min_det_F < tet_values(system.laws, x, "J").min()
+    stretched = system.rest_positions * [1.0 + 1e-5, 1.0 - 3e-6, 1.0 - 3e-6]
+    assert tet_values(system.laws, stretched, "von_mises") == pytest.approx(np.full(6, 1.0), rel=1e-3)

@@ -1,0 +1,202 @@
+"""For any contents of the file, the reader returns frames or raises an error of one line."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from supple.errors import OutputError
+from supple.model.state import Status
+from supple.results.export.exporter import export
+from supple.results.recording.reader import read_recording
+
+
+def _header(**changes):
+    def change(file):
+        header = json.loads(file["supple/header"][()])
+        header.update(changes)
+        del file["supple/header"]
+        file["supple/header"] = json.dumps(header)
+
+    return change
+
+
+def _set(path, value):
+    def change(file):
+        del file[path]
+        file[path] = value
+
+    return change
+
+
+def _claim_many_values(file):
+    del file["supple/masses"]
+    file.create_dataset("supple/masses", (1 << 40,), "f8", chunks=(1 << 16,))
+
+
+def _claim_many_rows(file):
+    del file["supple/rest_positions"]
+    file.create_dataset("supple/rest_positions", (1 << 40, 3), "f8", chunks=(1 << 10, 3))
+
+
+def _far_triangle(file):
+    file["supple/triangles"][0, 0] = 10_000
+
+
+def _delete(path):
+    def change(file):
+        del file[path]
+
+    return change
+
+
+def _newer(file):
+    file["supple"].attrs["format_version"] = 99
+
+
+def _swap_bodies(file):
+    header = json.loads(file["supple/header"][()])
+    header["bodies"][0]["vertices"] = [0, 10_000]
+    del file["supple/header"]
+    file["supple/header"] = json.dumps(header)
+
+
+DAMAGES = {
+    "more frames than rows": (_set("supple/frames_written", np.int64(26)), "26 frames need"),
+    "no frames": (_set("supple/frames_written", np.int64(0)), "number of frames is 0"),
+    "negative frames": (_set("supple/frames_written", np.int64(-3)), "number of frames is -3"),
+    "huge count": (_set("supple/frames_written", np.int64(1 << 62)), "frames need"),
+    "huge array": (_claim_many_values, "has shape"),
+    "huge rest shape": (_claim_many_rows, "claims more data than the file can contain"),
+    "triangle out of range": (_far_triangle, "points to row 10000"),
+    "rows out of range": (_swap_bodies, "outside of 54 vertices"),
+    "no header": (_delete("supple/header"), "supple/header is missing"),
+    "header is no JSON": (_set("supple/header", "{"), "header is not the expected JSON"),
+    "header is a number": (_set("supple/header", 3.0), "is no text"),
+    "no bodies": (_header(bodies=[]), "no bodies"),
+    "no time step": (_header(dt=0.0), "no time step"),
+    "bodies are no list of bodies": (_header(bodies=[1, 2]), "bodies in its header"),
+    "obstacles are none": (_header(obstacles=[{}]), "obstacles in its header"),
+    "obstacles of no known kind": (
+        _header(obstacles=[{"name": "x", "kind": "Cone", "parameters": {}}]),
+        "obstacle 'x' is of an unknown kind, 'Cone'; register",
+    ),
+    "obstacles with impossible numbers": (
+        _header(obstacles=[{"name": "x", "kind": "Sphere", "parameters": {"radius": -1}}]),
+        "obstacles in its header",
+    ),
+    "no points": (_delete("VTKHDF/Points"), "VTKHDF/Points is missing"),
+    "points of text": (_set("VTKHDF/Points", "here"), "has shape"),
+    "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),
+    "times are not finite": (_set("supple/frames/time", np.full(25, np.nan)), "time is not finite"),
+    "unknown status": (_set("supple/frames/status", np.full(25, len(Status), dtype=np.uint8)), "newer Supple"),
+    "newer format": (_newer, "format 99, this one reads 2"),
+    "another program's": (_delete("supple"), "a VTKHDF UnstructuredGrid of another program"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_contents_are_errors_of_one_line(tmp_path, recorded, damage):
+    path = tmp_path / "damaged.vtkhdf"
+    shutil.copy(recorded[0], path)
+    change, reason = DAMAGES[damage]
+    with h5py.File(path, "r+") as file:
+        change(file)
+    with pytest.raises(OutputError) as caught:
+        read_recording(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}: ")
+    assert reason in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("missing.vtkhdf", None, "there is no such file"),
+        ("empty.vtkhdf", b"", "is empty"),
+        ("text.vtkhdf", b"solid ascii\n" * 50, "it is no HDF5 file"),
+        ("noise.vtkhdf", random.Random(1).randbytes(5000), "it is no HDF5 file"),
+        ("head.vtkhdf", b"\x89HDF\r\n\x1a\n" + bytes(500), "is damaged"),
+    ],
+)
+def test_files_that_are_not_recordings(tmp_path, name, content, reason):
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(OutputError, match=reason) as caught:
+        read_recording(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_folders_and_plain_hdf5(tmp_path):
+    with pytest.raises(OutputError, match="is a folder"):
+        read_recording(tmp_path)
+    with h5py.File(tmp_path / "plain.h5", "w") as file:
+        file["x"] = 1
+    with pytest.raises(OutputError, match="is no recording of Supple"):
+        read_recording(tmp_path / "plain.h5")
+
+
+def test_files_cut_at_any_position(tmp_path, recorded):
+    whole = recorded[0].read_bytes()
+    chance = random.Random(3)
+    path = tmp_path / "cut.vtkhdf"
+    for length in [1, 7, 8, 95, 96, len(whole) - 1, *(chance.randrange(1, len(whole)) for _ in range(40))]:
+        path.write_bytes(whole[:length])
+        with pytest.raises(OutputError) as caught:
+            read_recording(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_random_bytes_give_frames_or_an_error(tmp_path, recorded):
+    """Random bytes anywhere: the reader need not notice a changed number, but it must not crash."""
+    whole = bytearray(recorded[0].read_bytes())
+    chance = random.Random(5)
+    path = tmp_path / "noisy.vtkhdf"
+    errors = []
+    for _ in range(150):
+        noisy = bytearray(whole)
+        for _ in range(chance.choice([1, 4, 64])):
+            noisy[chance.randrange(len(noisy))] = chance.randrange(256)
+        path.write_bytes(noisy)
+        try:
+            with read_recording(path) as recording:
+                _read_all(recording)
+        except OutputError as error:
+            errors.append(str(error))
+    assert errors
+    assert not any("\n" in text for text in errors)
+
+
+def _read_all(recording) -> None:
+    for frame in (recording[0], recording[-1]):
+        _ = frame.report, frame.positions, frame.velocities, frame.det_F, frame.obstacle_poses, frame.index
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="the superuser may read everything")
+def test_files_without_permission_to_read(tmp_path: Path, recorded):
+    path = tmp_path / "secret.vtkhdf"
+    shutil.copy(recorded[0], path)
+    path.chmod(0)
+    with pytest.raises(OutputError, match="permission denied"):
+        read_recording(path)
+
+
+def test_a_recording_with_damaged_names_is_not_copied(tmp_path, recorded):
+    """The reader does not need this name, so that the file opens; HDF5 reads it when the whole file is copied."""
+    data = recorded[0].read_bytes()
+    name = b"NumberOfCells\0"
+    assert name in data
+    (tmp_path / "r.vtkhdf").write_bytes(data.replace(name, b"\xff" * 13 + b"\0"))
+    with pytest.raises(OutputError, match=r"^\S*r\.vtkhdf: is damaged: ") as caught:
+        export(tmp_path / "r.vtkhdf", "vtkhdf")
+    assert "\n" not in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["r.vtkhdf"]

@@ -1,0 +1,119 @@
+"""The energy of joints against finite differences, and laws of limits and motors."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.model.joints.geometry import JointGeometry
+from supple.model.joints.laws import Law, Laws
+from supple.model.system import build_system, initial_state
+from supple.solvers.implicit.energies.potential import HessianBlocks
+from supple.solvers.implicit.joints.joint_step import JointStep
+
+BOX = sp.shapes.box_surface((0.4, 0.2, 0.1), (1, 1, 1))
+AXIS = (1.0, 2.0, -0.5)
+POINT = (0.3, 0.1, 0.0)
+PUSHED = sp.PositionMotor(lambda t: 0.3 + t, stiffness=40.0, damping=2.0)
+
+
+def potential_of(joints, noise=0.05, obstacles=()):
+    """The energy with multipliers that are not zero, at positions off the joints."""
+    first = sp.RigidBody("a", BOX, density=500.0, stiffness=1e5)
+    second = sp.RigidBody("b", BOX, density=900.0, stiffness=1e5, position=(0.5, 0, 0), rotation=(0.2, 0.5, -0.3))
+    scene = sp.Scene([first, second], joints=joints, obstacles=obstacles)
+    system, start = build_system(scene), initial_state(scene)
+    step = JointStep.of(JointGeometry.of(system), start, (0.0, 0.02), 4e-4, 1.5)
+    rng = np.random.default_rng(1)
+    x = start.positions + noise * rng.normal(size=start.positions.shape)
+    assert step.update(x)
+    return step.potential, x + noise * rng.normal(size=x.shape)
+
+
+def slope_of(errors):
+    """Of the error over the step, in a log-log plot."""
+    return np.polyfit(np.log([1e-3, 5e-4, 2.5e-4]), np.log(errors), 1)[0]
+
+
+JOINTS = {
+    "fixed": [sp.FixedJoint("a", "b")],
+    "ball": [sp.BallJoint("a", point=POINT)],
+    "hinge": [sp.HingeJoint("a", "b", point=POINT, axis=AXIS, limits=(-1e-3, 1e-3), motor=PUSHED)],
+    "slider": [sp.SliderJoint("a", "b", point=POINT, axis=AXIS, motor=PUSHED), sp.SliderJoint("b", axis=AXIS)],
+    "limited ball": [
+        sp.BallJoint("a", "b", point=POINT, axis=AXIS, max_swing=0.05, twist_limits=(-1e-3, 1e-3)),
+    ],
+    "obstacle": [sp.HingeJoint("a", "wheel", point=POINT, axis=AXIS, motor=sp.VelocityMotor(3.0))],
+}
+WHEEL = sp.Sphere(radius=0.1, center=(5, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 5]))
+
+
+@pytest.mark.parametrize("kind", JOINTS)
+def test_derivatives_are_those_of_the_energy(kind):
+    """Taylor's remainders have the slopes 2 for gradient and Hessian alike."""
+    energy, x = potential_of(JOINTS[kind], obstacles=[WHEEL] if kind == "obstacle" else ())
+    along = 0.1 * np.random.default_rng(2).normal(size=x.shape)
+    gradient = np.zeros_like(x)
+    energy.add_gradient(x, gradient)
+    blocks = HessianBlocks.zeros(2, len(x))
+    energy.add_hessian(x, blocks, project=False)
+    product = np.zeros_like(x)
+    for coupling in blocks.couplings:
+        coupling.add_product(along, product)
+    remainders, of_gradients = [], []
+    for h in (1e-3, 5e-4, 2.5e-4):
+        ahead, behind = x + h * along, x - h * along
+        remainders.append(abs((energy.value(ahead) - energy.value(behind)) / (2 * h) - np.vdot(gradient, along)))
+        g = [np.zeros_like(x) for _ in range(2)]
+        energy.add_gradient(ahead, g[0])
+        energy.add_gradient(behind, g[1])
+        of_gradients.append(np.linalg.norm((g[0] - g[1]) / (2 * h) - product))
+    # Quadratic energies have no remainder but round-off.
+    size, scale = np.linalg.norm(gradient), np.linalg.norm(product)
+    assert max(remainders) < 1e-6 * size or slope_of(remainders) == pytest.approx(2.0, abs=0.1)
+    assert max(of_gradients) < 1e-7 * scale or slope_of(of_gradients) == pytest.approx(2.0, abs=0.1)
+    assert (kind in ("fixed", "ball")) == (max(of_gradients) < 1e-7 * scale)
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slider", "limited ball"])
+def test_the_projected_hessian_is_positive_semidefinite_and_near_the_true_one(kind):
+    energy, x = potential_of(JOINTS[kind])
+    found = {}
+    for project in (False, True):
+        blocks = HessianBlocks.zeros(2, len(x))
+        energy.add_hessian(x, blocks, project=project)
+        columns = []
+        for k in range(x.size):
+            unit, out = np.zeros(x.size), np.zeros_like(x)
+            unit[k] = 1.0
+            for coupling in blocks.couplings:
+                coupling.add_product(unit.reshape(x.shape), out)
+            columns.append(out.ravel())
+        found[project] = np.array(columns)
+        np.testing.assert_allclose(found[project], found[project].T, atol=1e-9 * np.abs(found[project]).max())
+    true, projected = (np.linalg.eigvalsh(found[key]) for key in (False, True))
+    assert projected.min() > -1e-9 * projected.max()
+    assert true.min() < -1e-6 * true.max()
+
+
+@pytest.mark.parametrize("kind", ["fixed", "hinge", "slider", "limited ball"])
+def test_forces_of_a_joint_are_those_of_its_energy_and_have_no_sum(kind):
+    energy, x = potential_of(JOINTS[kind][:1])
+    gradient = np.zeros_like(x)
+    energy.add_gradient(x, gradient)
+    (force,), (torque,) = energy.actions(x)
+    on_a = -gradient[:4] / energy.weight
+    np.testing.assert_allclose(force, on_a.sum(axis=0), rtol=1e-10)
+    np.testing.assert_allclose(gradient.sum(axis=0), 0.0, atol=1e-9 * np.abs(gradient).max())
+    if kind == "fixed":  # its point is the center
+        np.testing.assert_allclose(torque, np.cross(x[:4] - x[:4].mean(axis=0), on_a).sum(axis=0), rtol=1e-8)
+
+
+def test_laws_are_lines_that_are_cut_off():
+    laws, multipliers = Laws.of([Law(0, 2.0, 1.0, -3.0, 5.0, 0.5), Law(0, 0.0, 0.0, multiplier=4.0, adapts=False)])
+    g = np.linspace(-4.0, 6.0, 2001)
+    efforts = np.array([laws.efforts(np.full(2, value), multipliers) for value in g])
+    energies = np.array([laws.energies(np.full(2, value), multipliers) for value in g])
+    assert (efforts[:, 0].min(), efforts[:, 0].max()) == (-3.0, 5.0)
+    np.testing.assert_allclose(np.gradient(energies, g, axis=0)[1:-1], efforts[1:-1], atol=6e-3)
+    assert laws.stiffness(np.zeros(2), multipliers).tolist() == [2.0, 0.0]
+    assert laws.stiffness(np.full(2, 6.0), multipliers).tolist() == [0.0, 0.0]
