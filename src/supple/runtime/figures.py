@@ -24,7 +24,6 @@ _LETTERS_OF_INCH, _LETTERS_OF_HANDLE, _LONGEST = 16.0, 5, 28
 _LEGEND_DROP = 31.0
 # An axis whose ends have at least this ratio is logarithmic.
 _LOGARITHMIC = 50.0
-_COLORS = ("#30638e", "#d1495b", "#3a7d44", "#edae49", "#7a3e9d", "#5ba3d0")
 _STYLE: dict[str, Any] = {
     "font.family": ["STIXGeneral", "DejaVu Serif"],
     "mathtext.fontset": "stix",
@@ -44,6 +43,7 @@ _STYLE: dict[str, Any] = {
     "grid.color": "0.9",
     "grid.linewidth": 0.5,
     "lines.linewidth": 1.4,
+    "axes.prop_cycle": "cycler('color', ['#30638e', '#d1495b', '#3a7d44', '#edae49', '#7a3e9d', '#5ba3d0'])",
     "xtick.direction": "in",
     "ytick.direction": "in",
     "xtick.major.width": 0.6,
@@ -63,14 +63,13 @@ def paper_figure(path: Path, width: float, height: float) -> Iterator[Any]:
     OutputError : where there is no such format, or the system refuses.
     """
     import matplotlib
-    from cycler import cycler
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     kind = path.suffix[1:].lower()
     if kind not in KINDS and not path.is_dir():
         raise OutputError(f"{path}: there is no picture format {path.suffix!r}; take .png, .pdf or .svg")
-    with matplotlib.rc_context(_STYLE | {"axes.prop_cycle": cycler(color=_COLORS)}):
+    with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(width, height), layout="constrained", dpi=150)
         FigureCanvasAgg(figure)
         figure.get_layout_engine().set(h_pad=0.08, w_pad=0.08)  # type: ignore[union-attr]
