@@ -23,10 +23,10 @@ demo: .venv/.base
 
 # Three processes on two cores: tests of the page and of other processes wait much of their time.
 test: .venv/.dev
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not slow"
+	$(BIN)/python -m pytest -n 3 --dist worksteal --durations=30 -m "not slow"
 
 test-all: .venv/.dev
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(BIN)/python -m pytest -n 2 --dist worksteal --durations=30
 
 # Every reader on many thousands of damaged files, which are new ones each time; with SEED, those of an earlier run.
 fuzz: .venv/.dev

@@ -25,7 +25,7 @@ class RepositoryMetadata(MetadataHookInterface):
         if address:
             metadata["urls"] = {
                 "Repository": address,
-                "Documentation": f"{address}/blob/HEAD/docs/tutorial.md",
+                "Documentation": f"{address}/blob/HEAD/docs/learn/tutorial.md",
                 "Changelog": f"{address}/blob/HEAD/CHANGELOG.md",
                 "Issues": f"{address}/issues",
             }

@@ -127,7 +127,7 @@ def main(counts: Sequence[int] = COUNTS) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure the three smallest piles, and write the figures of docs/benchmarks.md."""
+    """Measure the three smallest piles, and write the figures of docs/validation/benchmarks.md."""
     publish("bear_pile", main(COUNTS[:3]))
 
 

@@ -99,7 +99,7 @@ def main(counts: tuple[int, ...] = COUNTS) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md."""
     publish("candidate_search", main())
 
 

@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from tests.torture.registry import TORTURE
 
 import supple as sp
 from benchmarks.table import Table
-from supple.app.demos.torture.registry import TORTURE
 from supple.solvers.implicit.details import ImplicitDetails
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -159,7 +159,7 @@ def _add(table: Table, item: str, result: dict[str, float]) -> None:
 
 
 def run() -> None:
-    """Measure the small scenes, and write the figures of docs/benchmarks.md."""
+    """Measure the small scenes, and write the figures of docs/validation/benchmarks.md."""
     from benchmarks.published import publish  # not above: `measured` also runs with the package of other versions
 
     publish("contact_scenes", main(quick=True))

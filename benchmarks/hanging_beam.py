@@ -49,7 +49,7 @@ def main(rounds: int = 3, frames: int = 20) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md and README.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md and README.md."""
     publish("hanging_beam", main())
 
 

@@ -41,7 +41,7 @@ def main(quick: bool = False) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md."""
     publish("implicit_scaling", main())
 
 

@@ -161,7 +161,7 @@ def printed(found: dict[str, Any]) -> str:
 
 
 def live_page_text(figures: dict[str, Any]) -> str:
-    """The tables of docs/live.md."""
+    """The table of docs/reference/live_page.md."""
     sizes, implicit = figures["sizes"], figures["implicit"]
 
     def both(found: dict[str, float]) -> str:
@@ -181,14 +181,10 @@ def live_page_text(figures: dict[str, Any]) -> str:
         row("a step", (f"{one['step_ms']:.1f} ms" for one in sizes)),
         row("**move to moved mesh: median / 95 % [ms]**", (both(one) for one in sizes)),
         *(row(text, (both(one["parts"][name]) for one in sizes)) for name, (text, _) in PARTS.items()),
-        *(row(f"stage: {text}", (both(one["stages"][name]) for one in sizes)) for name, text in STAGES.items()),
         row("paused, of a core", (f"{one['paused_percent']:.1f} %" for one in sizes)),
         row("without a browser, of a core", (f"{one['unwatched_percent']:.1f} %" for one in sizes)),
     ]
     if implicit:
-        lines += [
-            "",
-            f"`Implicit` takes {implicit['median_fps']:.0f} steps a second with {implicit['tets']:,} tets and "
-            f"{implicit['contacts']:.0f} contacts (two blocks that fall onto each other).",
-        ]
+        text = f"`Implicit`, {implicit['tets']:,} tets with {implicit['contacts']:.0f} contacts: steps a second"
+        lines.append(row(text, [f"{implicit['median_fps']:.0f}", *[""] * (len(sizes) - 1)]))
     return "\n".join(lines)

@@ -138,7 +138,7 @@ def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: 
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md."""
     publish("live", main())
 
 

@@ -8,7 +8,7 @@ simulation is measured at rest: paused with a browser, and playing without one. 
 second of implicit steps with contact.
 
 Each part runs in a process of its own, which is ended where it takes too long; the other parts are then written
-without it. Without arguments, the figures of docs/live.md are written: about three minutes.
+without it. Without arguments, the figures of docs/reference/live_page.md are written: about three minutes.
 
 usage: python -m benchmarks.live_page [tets ...]      (Linux, with Chromium and the packages of the tests)
 """
@@ -247,7 +247,7 @@ def main(sizes: tuple[int, ...] = (5_000, 60_000)) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure the two sizes of docs/live.md, and write the page's figures."""
+    """Measure the two sizes of docs/reference/live_page.md, and write the page's figures."""
     if shutil.which("chromium") is None:
         print("live_page: left out, Chromium is not on the path")
         return

@@ -156,7 +156,7 @@ def main(quick: bool = False) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md and README.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md and README.md."""
     publish("projections", main())
 
 

@@ -152,7 +152,7 @@ def main(problems: tuple[Problem, ...] = PROBLEMS, rounds: int = 2) -> dict[str,
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/locking.md."""
+    """Measure, and write the figures of docs/theory/locking.md."""
     publish("quadratic_tets", main())
 
 

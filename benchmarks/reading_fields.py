@@ -108,7 +108,7 @@ def main(chambers: int = 3, frames: int = 40, skipped: int = 20) -> dict[str, An
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/forces_and_stresses.md."""
+    """Measure, and write the figures of docs/reference/forces_and_stresses.md."""
     publish("reading_fields", main())
 
 

@@ -90,7 +90,7 @@ def main(edge: float = 0.03, steps: int = 30, skipped: int = 4, rounds: int = 3)
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md."""
     publish("rigid_bodies", main())
 
 

@@ -21,10 +21,10 @@ from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
+from tests.torture.registry import TORTURE
 
 import supple as sp
 from benchmarks.table import Table
-from supple.app.demos.torture.registry import TORTURE
 from supple.model.system import build_system, initial_state
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -144,7 +144,7 @@ def main(names: list[str], against: str | None, rounds: int) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md."""
     from benchmarks.published import publish  # not above: `measured` also runs with the package of other versions
 
     publish("small_scenes", main([], None, 3))

@@ -43,7 +43,7 @@ def main(rounds: int = 5) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md."""
     publish("startup", main())
 
 

@@ -42,7 +42,6 @@ class Table:
     def __init__(self, title: str, columns: dict[str, str], threads: int | None = None) -> None:
         self.columns = columns
         self.rows: list[list[Any]] = []
-        self.notes: list[str] = []
         self._at_start = circumstances(threads)
         self._widths: list[int] = []
         print(f"\n{title}")
@@ -61,14 +60,12 @@ class Table:
         print("  ".join(f"{text:>{width}}" for text, width in zip(texts, self._widths, strict=True)), flush=True)
 
     def note(self, text: str) -> None:
-        """A sentence below the table."""
-        self.notes.append(text)
+        """Print a sentence below the table; pages show tables only."""
         print(text, flush=True)
 
     def figures(self) -> dict[str, Any]:
         """What is published."""
-        rows = {"columns": self.columns, "rows": self.rows, "notes": self.notes}
-        return {**self._at_start, "load_after": load(), **rows}
+        return {**self._at_start, "load_after": load(), "columns": self.columns, "rows": self.rows}
 
 
 def _texts(cells: Any, columns: dict[str, str]) -> list[str]:
@@ -94,9 +91,4 @@ def table_text(figures: dict[str, Any]) -> str:
     columns = figures["columns"]
     lines = [measured_on(figures), "", f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
     lines += [f"| {' | '.join(_texts(row, columns))} |" for row in figures["rows"]]
-    return "\n".join(lines + [part for note in figures["notes"] for part in ("", note)])
-
-
-def row_of(figures: dict[str, Any], first: str) -> dict[str, Any]:
-    """The cells of the row that begins with this text, by column."""
-    return next(dict(zip(figures["columns"], row, strict=True)) for row in figures["rows"] if row[0] == first)
+    return "\n".join(lines)

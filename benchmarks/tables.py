@@ -1,10 +1,10 @@
-"""Tables of docs/benchmarks.md, from the figures that benchmarks write."""
+"""Tables of pages, from the figures that benchmarks write."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.table import measured_on, row_of
+from benchmarks.table import measured_on
 
 _PLATES = {
     "obstacles": "obstacles of triangles, the upper one moved as the free plate",
@@ -46,42 +46,21 @@ def live_text(figures: dict[str, Any]) -> str:
     for way, text in _WAYS.items():
         one = figures["ways"][way]
         lines.append(f"| {text} | {one['best']:.1f} | {one['median']:.1f} | {one['ratio']:.2f} |")
-    lines += ["", f"In real time, with the page served, it ran at {figures['real_time']:.3f} of real time."]
+    lines.append(f"| speed in real time, with the page served | | | {figures['real_time']:.3f} |")
     return "\n".join(lines)
 
 
 def reading_text(figures: dict[str, Any]) -> str:
-    """The sentences of `benchmarks.reading_fields`."""
+    """The table of `benchmarks.reading_fields`."""
+    lines = [
+        f"A finger of {figures['tets']:,} tets with cavity and cable; times of the processor on one thread. "
+        f"{measured_on(figures)}",
+        "",
+        "| | ms |",
+        "|---|---|",
+        f"| a step of XPBD with {figures['substeps']:.0f} substeps | {figures['ms_per_step']:.1f} |",
+        f"| reading all fields | {figures['ms_of_reading']:.1f} |",
+    ]
     slowest = sorted(figures["fields"], key=figures["fields"].__getitem__, reverse=True)[:3]
-    parts = ", ".join(f"`{name}` {figures['fields'][name]:.1f} ms" for name in slowest)
-    rates = " and ".join(
-        f"{one['frames_a_second']:.0f} frames a second at E = {1e-3 * one['youngs']:g} kPa ({one['substeps']} substeps)"
-        for one in figures["live"]
-    )
-    return "\n".join(
-        [
-            f"Reading all fields of the tables takes {figures['ms_of_reading']:.1f} ms of processor time on one thread "
-            f"for a finger of {figures['tets']:,} tets",
-            f"with cavity and cable in `XPBD`: {100.0 * figures['share']:.0f} % of a step, which takes "
-            f"{figures['ms_per_step']:.0f} ms with {figures['substeps']:.0f} substeps. Most of it: {parts}.",
-            f"Without reading, threads={figures['threads_live']} ({figures['layer'] or 'one thread'}) simulates "
-            f"{rates}",
-            "(frames of 1/60 s, wall time): the number of substeps grows with the root of the modulus.",
-            measured_on(figures),
-        ]
-    )
-
-
-def speed_text(beam: dict[str, Any], projections: dict[str, Any]) -> str:
-    """The sentence of README.md about speed, from `benchmarks.hanging_beam` and `benchmarks.projections`."""
-    ours = row_of(beam, "Supple XPBD, 20 substeps")
-    newton = row_of(beam, "Newton XPBD, 20 substeps x 1 iteration")
-    mujoco = row_of(beam, "MuJoCo flex, explicit, 1 ms")
-    column = list(projections["columns"]).index("1 / C")
-    ratios = [row[column] for row in projections["rows"]]
-    return (
-        f"On one thread, a beam of {ours['tets']:,} tets takes {ours['ms/frame']:.1f} ms of the processor a frame (20 "
-        f"substeps):\n{newton['ratio']:.1f} times as fast as Newton's XPBD and {mujoco['ratio']:.1f} times as fast as "
-        f"MuJoCo's flex in the same run; constraint projections\nrun at {min(ratios):.1f} to {max(ratios):.1f} times "
-        "plain C ([how it was measured](docs/benchmarks.md))."
-    )
+    lines += [f"| reading `{name}` | {figures['fields'][name]:.1f} |" for name in slowest]
+    return "\n".join(lines)

@@ -81,7 +81,7 @@ def main(steps: int = 20) -> dict[str, Any]:
 
 
 def write() -> None:
-    """Measure, and write the figures of docs/implicit.md."""
+    """Measure, and write the figures of docs/theory/implicit.md."""
     publish("tolerances", main())
 
 

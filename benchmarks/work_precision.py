@@ -206,7 +206,7 @@ def main(quick: bool = False, scale: int = 1, threads: int | None = 1) -> dict[s
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/benchmarks.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md."""
     publish("work_precision", main())
 
 

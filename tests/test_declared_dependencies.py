@@ -14,8 +14,6 @@ SOURCES = Path(supple.__file__).parent
 TESTS = Path(__file__).parent
 # Packages that are imported under another name than they are installed with.
 IMPORT_NAMES = {
-    "arro3-core": "arro3",
-    "arro3-io": "arro3",
     "fast-simplification": "fast_simplification",
     "imageio-ffmpeg": "imageio_ffmpeg",
     "lazy-loader": "lazy_loader",
@@ -23,11 +21,10 @@ IMPORT_NAMES = {
     "pillow": "PIL",
     "pydantic-core": "pydantic_core",
     "pyyaml": "yaml",
-    "scikit-image": "skimage",
     "usd-core": "pxr",
 }
 # Development tools that are run, or loaded by pytest; no test imports them.
-TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-benchmark", "pytest-xdist", "ruff"}
+TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-xdist", "ruff"}
 OWN = {"supple", "tests", "benchmarks"}
 
 

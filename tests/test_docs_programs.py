@@ -1,13 +1,15 @@
-"""Every program of the documentation runs: the blocks of a page one after the other, in one empty folder.
+"""Every program of the documentation and of README runs: the blocks of a page one after the other, in one folder.
 
 Python blocks share their names. A YAML block that begins with `# name.yaml` is written to that file. Shell blocks are
-lines of `supple`, which run in this process.
+lines of `supple`, which run in this process; a demo whose claim fails returns 1. The folder is empty but for README's
+`examples`.
 """
 
 import importlib.util
 import json
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
@@ -20,14 +22,17 @@ from supple.model.state import Status
 DOCS = Path(__file__).parents[1] / "docs"
 # Pages with blocks that another test runs, or that are parts of a program.
 ELSEWHERE = {
-    "tutorial.md": "tests/test_tutorial.py",
-    "studies.md": "tests/app/studies/test_docs.py",
-    "scene_files.md": "tests/app/scene_file/test_loader.py",
-    "check.md": "lines that need a recording; tests/results/check runs the same commands",
-    "runs.md": "lines that need a run; tests/app/cli/test_resume.py runs the same commands",
-    "stitches.md": "two lines of the program of howto/stitching.md",
+    "learn/tutorial.md": "tests/test_tutorial.py",
+    "reference/studies.md": "tests/app/studies/test_docs.py",
+    "reference/scene_files.md": "tests/app/scene_file/test_loader.py",
+    "reference/checks.md": "lines that need a recording; tests/results/check runs the same commands",
+    "reference/runs.md": "lines that need a run; tests/app/cli/test_resume.py runs the same commands",
+    "reference/stitches.md": "two lines of the program of learn/stitching.md",
 }
 PAGES = [str(path.relative_to(DOCS).as_posix()) for path in sorted(DOCS.rglob("*.md"))]
+README = "../README.md"
+# README's blocks that install Supple, or that CI runs itself.
+INSTALLATION = re.compile(r"^(make|pip install|git clone)\b", flags=re.M)
 BLOCK = re.compile(r"^```(python|yaml|sh)\n(.*?)^```", flags=re.S | re.M)
 
 
@@ -35,14 +40,19 @@ def blocks_of(page):
     return BLOCK.findall((DOCS / page).read_text(encoding="utf-8"))
 
 
-WITH_PROGRAMS = [page for page in PAGES if blocks_of(page) and page not in ELSEWHERE]
+WITH_PROGRAMS = [page for page in [README, *PAGES] if blocks_of(page) and page not in ELSEWHERE]
 
 
 @pytest.mark.parametrize("page", WITH_PROGRAMS)
 def test_the_programs_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    for kind, text in blocks_of(page):
+    blocks = blocks_of(page)
+    if page == README:
+        shutil.copytree(DOCS.parent / "examples", "examples")
+        blocks = [(kind, text) for kind, text in blocks if not (kind == "sh" and INSTALLATION.search(text))]
+        assert {kind for kind, _ in blocks} == {"python", "sh"}
+    for kind, text in blocks:
         if kind == "python":
             exec(compile(text, page, "exec"), names)
         elif kind == "yaml":
@@ -54,7 +64,7 @@ def test_the_programs_of_a_page_run(page, tmp_path, monkeypatch):
                 program, *arguments = shlex.split(line, comments=True)
                 assert program == "supple", f"{page}: {line!r} is not run; use lines of supple"
                 assert main(arguments) == 0, line
-    frame = names.get("exact" if page == "contact.md" else "frame")
+    frame = names.get("exact" if page == "theory/contact.md" else "frame")
     if frame is not None:
         assert frame.report.status == "converged"  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -72,7 +82,7 @@ def test_every_block_has_a_language_and_ends():
 
 
 def test_the_page_on_reports_lists_every_status():
-    page = (DOCS / "howto" / "reading_the_report.md").read_text(encoding="utf-8")
+    page = (DOCS / "reference" / "reports.md").read_text(encoding="utf-8")
     listed = re.findall(r"^\| `(\w+)` \|", page, flags=re.M)[1:]  # after the heading
     assert set(listed) == {str(status) for status in Status}
 

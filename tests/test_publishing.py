@@ -54,7 +54,7 @@ def test_with_an_address_all_links_of_the_readme_lead_to_it(hook, monkeypatch):
     found = links(metadata["readme"]["text"])
     assert len(found) == len(links(README))
     assert all(link.startswith("https://") for link in found)
-    assert "https://git.example/a/supple/raw/HEAD/docs/images/bears.png" in found
+    assert "https://git.example/a/supple/raw/HEAD/docs/images/bears.gif" in found
     for link in found:
         path = re.fullmatch(r"https://git\.example/a/supple/(?:raw|blob)/HEAD/(.*)", link)
         assert path is None or (ROOT / path[1]).exists(), link

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from supple.app.cli.app import main
 
-TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial.md"
+TUTORIAL = Path(__file__).parents[1] / "docs" / "learn" / "tutorial.md"
 
 
 def in_the_shell(block):

@@ -32,7 +32,7 @@ OF_ROOT = {
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages."""
-    made = {"examples.md": examples(), "gallery.md": gallery()} | api_pages()
+    made = {"learn/examples.md": examples(), "learn/gallery.md": gallery()} | api_pages()
     made |= {page: root_page(path) for page, path in OF_ROOT.items()}
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
@@ -45,8 +45,7 @@ def root_page(path: str) -> str:
         (ROOT / path)
         .read_text(encoding="utf-8")
         .replace("](docs/", "](")
-        .replace("](examples)", "](examples.md)")
-        .replace("[docs](docs)", "`docs`")
+        .replace("](examples)", "](learn/examples.md)")
     )
     for page, other in OF_ROOT.items():
         text = text.replace(f"]({other})", f"]({page})")
@@ -78,7 +77,7 @@ def gallery() -> str:
             for claim in demo["claims"]
         ]
         parts.append(
-            f"## {name}\n\n![{demo['summary']}](images/gallery/{name}.png)\n\n{demo['explanation']}\n\n"
+            f"## {name}\n\n![{demo['summary']}](../images/gallery/{name}.png)\n\n{demo['explanation']}\n\n"
             f"{demo['tets']:,} tets, {demo['frames']} frames of {demo['dt']:.4g} s, solver `{demo['solver']}`: "
             f"`supple demo {name}`\n\n| claim | measured | |\n|---|---|---|\n" + "\n".join(rows) + "\n"
         )

@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 
 import h5py
 import numpy as np
@@ -232,3 +233,9 @@ def test_a_recording_with_a_hostile_formula_is_refused(tmp_path):
 def test_what_is_no_energy_is_one_clear_line(arguments, message):
     with pytest.raises(SceneError, match=f"^EnergyMaterial: {message}"):
         sp.EnergyMaterial(**arguments)
+
+
+def test_without_sympy_the_error_names_the_install_command(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sympy", None)
+    with pytest.raises(SceneError, match=r"needs SymPy, which is not installed; pip install 'supple\[symbolic\]'$"):
+        sp.EnergyMaterial(psi="mu / 2 * (I1 - 3)", parameters={"mu": 1e4}, density=1000.0)

@@ -170,7 +170,7 @@ def test_supple_run_records_the_fields_of_the_file_or_of_the_option(tmp_path, mo
     assert main(["run", "scene.yaml", "-o", "a"]) == ExitCode.OK
     assert "von_mises: 24 bytes for each frame, 48 bytes for 2 frames" in capfd.readouterr().out
     assert main(["run", "scene.yaml", "-o", "b", "--fields", "contact_pressure, stress"]) == ExitCode.OK
-    assert main(["table", "b", "--to", "parquet"]) == ExitCode.OK
+    assert main(["table", "b"]) == ExitCode.OK
     for folder, names in (("a", ["von_mises"]), ("b", ["contact_pressure", "stress"])):
         with sp.read_recording(tmp_path / folder / "recording.vtkhdf") as recording:
             assert [field.name for field in recording.fields] == names

@@ -1,10 +1,7 @@
-"""The reports of all frames as CSV and Parquet."""
+"""The reports of all frames as CSV."""
 
 import csv
 import math
-from importlib import import_module
-
-import numpy as np
 
 import supple as sp
 from supple.results.export.exporter import export
@@ -50,19 +47,6 @@ def test_csv_contains_every_digit(recorded, tmp_path):
             assert same(read, value), name
 
 
-def test_parquet_contains_the_same(recorded, tmp_path):
-    path = export(recorded[0], "parquet")
-    table = import_module("arro3.io").read_parquet(path).read_all()
-    columns = {name: table.column(name).to_pylist() for name in table.column_names}
-    with read_recording(recorded[0]) as recording:
-        wanted = list(expected(recording))
-    for k, values in enumerate(wanted):
-        for name, value in values.items():
-            assert same(columns[name][k], value), name
-    header = export(recorded[0], "csv", tmp_path / "r.csv").read_text(encoding="utf-8").partition("\n")[0]
-    assert header.split(",") == table.column_names
-
-
 def test_a_message_may_contain_anything(tmp_path, tools):
     message = 'a "quoted", text\nof two lines ☃'
     sink = sp.Recorder(tmp_path / "r.vtkhdf")
@@ -70,6 +54,3 @@ def test_a_message_may_contain_anything(tmp_path, tools):
     with export(tmp_path / "r.vtkhdf", "csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["message"] for row in rows] == ["", message, message]
-    table = import_module("arro3.io").read_parquet(export(tmp_path / "r.vtkhdf", "parquet")).read_all()
-    assert table.column("message").to_pylist() == ["", message, message]
-    assert np.array_equal(table.column("time").to_numpy(), [0.0, 0.1, 0.2])

@@ -179,10 +179,10 @@ class Elastic(Hyperelastic):
     ----------
     youngs : Young's modulus E of small strains [Pa]; one number, or one per tetrahedron of the body.
     poisson : Poisson's ratio nu [-], above -1 and below 0.5; one number, or one per tetrahedron. Below 0
-        (auxetic), some energies have no lower bound at large strains; see docs/materials.md.
+        (auxetic), some energies have no lower bound at large strains; see docs/reference/materials.md.
     integration : "tets", the energy of each tet from its own F; or "patches", from the mean F around each edge and
         the mean J around each vertex, with which tets bend, twist and keep their volume without locking (`Implicit`
-        only; energies with a volume term lam U(J)). See docs/locking.md.
+        only; energies with a volume term lam U(J)). See docs/theory/locking.md.
 
     Raises
     ------

@@ -1,40 +1,63 @@
-"""`njit` as of Numba, with a cache that is renewed when a function that the kernel calls has changed, in any file.
+"""`njit` as of Numba, with a cache that is keyed by content.
 
-Numba compares a cached kernel with the text of the file that the kernel stands in. It does not look at the functions
-that the kernel calls: when one of them changes in another file, Numba loads the old machine code. Here the index of
-the cache also holds a digest of the code of everything that the kernel reaches.
+Numba names a cached kernel by its file and line, and compares it with the text and the time of that file. Here the name
+is a digest of the code of everything that the kernel reaches, in any file, and of nothing else: another checkout, a
+moved file or an edited comment compiles nothing, and a changed function compiles the kernels that call it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import pickle
-from collections.abc import Iterator
+import sys
 from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
-from time import monotonic, sleep
-from types import CodeType, FunctionType, ModuleType
+from types import FunctionType
 from typing import Any
 
+import llvmlite
 import numba
 import numpy as np
 from numba import prange
-from numba.core.caching import FunctionCache
+from numba.core import config, types
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
+from numba.core.serialize import dumps
+from numba.np.numpy_support import numpy_version
 from numpy.typing import NDArray
 
+from supple.runtime import kernel_folder
 from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
+from supple.runtime.reached_code import reached_code
 
-# How long a process waits for another one that compiles the same kernel, and how long between two looks [s].
-_LONGEST_WAIT, _PAUSE = 60.0, 0.02
+# Below this many rows, a loop ends before a second thread has started.
+ROWS = 2_000
+# What decides on machine code besides the kernel, its signature and the processor.
+_SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "USING_SVML")
+_COMPILER = (
+    numba.__version__,
+    llvmlite.__version__,
+    numpy_version,
+    sys.implementation.cache_tag,
+    sys.abiflags if hasattr(sys, "abiflags") else "",
+    [getattr(config, name, None) for name in _SETTINGS],
+)
 
-__all__ = ["KernelCache", "njit", "prange", "reached_code", "read_only"]
+__all__ = ["KernelCache", "njit", "prange", "read_only"]
 
 
-def njit(function: FunctionType | None = None, *, cache: bool = False, parallel: bool = False, **options: Any) -> Any:
+def njit(
+    function: FunctionType | None = None,
+    *,
+    cache: bool = False,
+    parallel: bool = False,
+    rows: int = ROWS,
+    **options: Any,
+) -> Any:
     """Compile a function in Numba's nopython mode: `numba.njit`, with the cache of this module.
 
     A kernel runs without Python's global lock, so that threads of one process can simulate at the same time. It must
@@ -45,16 +68,17 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, parallel:
     cache : whether the machine code is kept on disk, see `KernelCache`.
     parallel : whether loops over `prange` may use several threads. The kernel is then a `ParallelKernel`, as is every
         kernel that calls one.
+    rows : the least number of rows of an array among the arguments for several threads, where it is `parallel`.
     options : as of `numba.njit`; `nogil=False` for a kernel with parts in Python.
     """
     if function is None:
-        return partial(njit, cache=cache, parallel=parallel, **options)
+        return partial(njit, cache=cache, parallel=parallel, rows=rows, **options)
     if not parallel and not _called_kernels(function):
         return _compiled(function, cache, options)
     serial = _compiled(_form(function, "serial"), cache, options)
     several = _compiled(_form(function, "parallel"), cache, {**options, "parallel": True} if parallel else options)
     # Where NUMBA_DISABLE_JIT is set, both are plain functions.
-    return ParallelKernel(function, serial, several) if isinstance(several, Dispatcher) else several
+    return ParallelKernel(function, serial, several, rows) if isinstance(several, Dispatcher) else several
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -84,6 +108,10 @@ class InnerFunction(CPUDispatcher):
 
     def __init__(self, py_func: FunctionType, locals: dict[str, Any], targetoptions: dict[str, Any]) -> None:
         super().__init__(py_func, locals, {**targetoptions, "no_cpython_wrapper": True})
+
+    def get_call_template(self, args, kws):
+        """Numba would compile a function once more for each constant, such as True, that a call passes."""
+        return super().get_call_template(tuple(map(types.unliteral, args)), kws)
 
     def __call__(self, *values: Any) -> Any:
         return self._from_python(*values)
@@ -115,105 +143,73 @@ def _form(function: FunctionType, form: str) -> FunctionType:
     return copy
 
 
-class KernelCache(FunctionCache):
-    """Numba's cache of one kernel, with the code that the kernel reaches in its stamp.
-
-    The code is that in memory, not that of the files: a file that is edited after its import cannot be mistaken for
-    what is compiled.
+class KernelCache(_Cache):
+    """The compiled forms of one kernel on disk, see `supple.runtime.kernel_folder`.
 
     Of several processes that need the kernel at once, as those of a study do, one compiles it and the others wait.
     """
 
-    _lock: FileLock | None = None
+    def __init__(self, function: FunctionType) -> None:
+        self._function = function
+        self._locks: dict[Path, FileLock] = {}
 
-    def load_overload(self, sig, target_context):
-        # A kernel may call what is defined below it, so the stamp waits for the first call. Numba loads, then saves.
-        self._cache_file._source_stamp = self._stamp
-        found = self._loaded(sig, target_context)
-        if found is None and self._lock is None and self._wait():
-            found = self._loaded(sig, target_context)
+    @property
+    def cache_path(self) -> str:
+        return str(kernel_folder.kernel_folder())
+
+    def enable(self) -> None:
+        """It is always enabled."""
+
+    def disable(self) -> None:
+        raise NotImplementedError("leave out `cache=True`")
+
+    def flush(self) -> None:
+        """Nothing is out of date: an entry is named by all that it depends on."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        path = self._path(sig, target_context.codegen())
+        found = _loaded(path, target_context)
+        if found is None and path not in self._locks:
+            lock, waited = kernel_folder.lock(path)
+            if lock is not None:
+                self._locks[path] = lock
+            found = _loaded(path, target_context) if waited else None
             if found is not None:
-                self._unlock()
+                self._unlock(path)
         return found
 
-    def _loaded(self, sig, target_context):
-        try:
-            return super().load_overload(sig, target_context)
-        except Exception:  # the files name a module that has moved since, or are damaged: unpickling may raise anything
-            with suppress(OSError):
-                self.flush()
-            return None
-
-    def save_overload(self, sig, data):
+    def save_overload(self, sig: Any, data: Any) -> None:
+        path = self._path(sig, data.codegen)
         # A kernel that is not kept is compiled again next time: a full disk is no reason to end a run.
         with suppress(OSError):
-            super().save_overload(sig, data)
-        self._unlock()
+            if not data.library.has_dynamic_globals:  # addresses of this process
+                kernel_folder.write(path, dumps(data._reduce()))
+        self._unlock(path)
 
-    def _wait(self) -> bool:
-        """Lock the kernel, to compile it here; whether another process has had it locked until then."""
-        waited, end = False, monotonic() + _LONGEST_WAIT
-        with suppress(OSError):  # where nothing can be written, nothing is kept
-            self._impl.locator.ensure_cache_path()
-            path = Path(self._cache_path) / f"{self._cache_file._index_name}.lock"
-            while (lock := FileLock.acquired(path)) is None and monotonic() < end:
-                waited = True
-                sleep(_PAUSE)
-            self._lock = lock
-        return waited
+    def _unlock(self, path: Path) -> None:
+        lock = self._locks.pop(path, None)
+        if lock is not None:
+            lock.release()
 
-    def _unlock(self) -> None:
-        if self._lock is not None:
-            self._lock.release()
-            self._lock = None
+    def _path(self, sig: Any, codegen: Any) -> Path:
+        # An entry refers to the module of its kernel, and its symbols to the name.
+        function = self._function
+        name = f"{function.__module__}.{function.__qualname__}"
+        text = repr((_COMPILER, codegen.magic_tuple(), name, str(sig), self._code))
+        return kernel_folder.kernel_folder() / f"{hashlib.sha256(text.encode()).hexdigest()[:40]}.kernel"
 
     @cached_property
-    def _stamp(self) -> tuple[Any, bytes]:
-        return self._impl.locator.get_source_stamp(), reached_code(self._py_func)
+    def _code(self) -> bytes:
+        # A kernel may call what is defined below it, so that the digest waits for the first call.
+        return reached_code(self._function)
 
 
-def reached_code(kernel: FunctionType) -> bytes:
-    """A digest of the bytecode, constants and compiler options of a kernel and of all compiled functions it reaches."""
-    digest = hashlib.sha256()
-    visited: set[FunctionType] = set()
-    pending: list[Any] = [kernel]
-    while pending:
-        value = pending.pop()
-        if isinstance(value, Dispatcher):
-            # Sets of options have no order of their own.
-            options = {k: sorted(v) if isinstance(v, (set, frozenset)) else v for k, v in value.targetoptions.items()}
-            digest.update(repr(sorted(options.items())).encode())
-            value = value.py_func
-        if isinstance(value, tuple):
-            pending += value
-        elif isinstance(value, (int, float, complex, str, bytes, np.generic, np.ndarray)):
-            digest.update(pickle.dumps(value))
-        elif isinstance(value, FunctionType) and value not in visited:
-            visited.add(value)
-            codes = list(_nested_codes(value.__code__))
-            for code in codes:
-                constants = [constant for constant in code.co_consts if not isinstance(constant, CodeType)]
-                digest.update(repr((code.co_code, code.co_names, code.co_varnames, constants)).encode())
-            pending += _used_values(value, codes)
-    return digest.digest()
-
-
-def _nested_codes(code: CodeType) -> Iterator[CodeType]:
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _nested_codes(constant)
-
-
-def _used_values(function: FunctionType, codes: list[CodeType]) -> Iterator[Any]:
-    """What the names in a function mean, in an order that every process agrees on.
-
-    Plain functions are left out: compiled code cannot call them.
-    """
-    cells = (cell.cell_contents for cell in function.__closure__ or ())
-    closure = dict(zip(function.__code__.co_freevars, cells, strict=True))
-    names = list(dict.fromkeys([*closure, *(name for code in codes for name in code.co_names)]))
-    for name in names:
-        value = closure.get(name, function.__globals__.get(name))
-        values = [getattr(value, member, None) for member in names] if isinstance(value, ModuleType) else [value]
-        yield from (value for value in values if not isinstance(value, FunctionType))
+def _loaded(path: Path, target_context: Any) -> Any:
+    content = kernel_folder.read(path)
+    if content is None:
+        return None
+    try:
+        return CompileResult._rebuild(target_context, *pickle.loads(content))
+    except Exception:  # it names something that has moved since; unpickling may raise anything
+        return None

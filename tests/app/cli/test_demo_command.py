@@ -43,7 +43,7 @@ def test_quiet_prints_only_the_claims(tmp_path, capfd):
     assert all(line.startswith(("holds: ", "does not hold: ")) for line in out.splitlines())
     assert err == ""
     written = sorted(path.name for path in (tmp_path / "here").iterdir())
-    assert written == ["recording.vtkhdf", "report.csv", "report.parquet", "run"]
+    assert written == ["recording.vtkhdf", "report.csv", "run"]
 
 
 def test_a_demo_whose_claims_all_hold_exits_0(tmp_path, monkeypatch, capfd):
@@ -59,7 +59,7 @@ class WithoutClaims(Measurement):
 
 
 def test_the_demos_of_the_readme_and_of_make_run_at_their_full_length():
-    """CI runs these commands and fails at an exit code above 0, so all of their claims must hold there."""
+    """`make demo` and test_docs_programs.py run these commands and fail at an exit code above 0: all claims must hold."""
     root = Path(__file__).parents[3]
     text = (root / "README.md").read_text(encoding="utf-8") + (root / "Makefile").read_text(encoding="utf-8")
     commands = re.findall(r"^.*supple demo [a-z].*$", text, flags=re.M)

@@ -53,7 +53,7 @@ def test_an_input_file_is_not_replaced(place, capsys, arguments):
     assert contents(place) == before
 
 
-@pytest.mark.parametrize("arguments", [["check"], ["plot"], ["export", "--to", "pvd"]], ids=lambda some: some[0])
+@pytest.mark.parametrize("arguments", [["check"], ["plot"], ["export", "--to", "obj"]], ids=lambda some: some[0])
 def test_the_folder_of_a_run_stands_for_its_recording(place, capsys, arguments):
     (place / "out").mkdir()
     assert main([*arguments, "out"]) == ExitCode.INPUT
@@ -63,7 +63,7 @@ def test_the_folder_of_a_run_stands_for_its_recording(place, capsys, arguments):
     assert {path.name for path in (place / "out").iterdir()} >= {
         "check": {"recording.vtkhdf"},
         "plot": {"plot.png"},
-        "export": {"recording_pvd"},
+        "export": {"recording_obj"},
     }[arguments[0]]
 
 

@@ -36,7 +36,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-ALWAYS = ["recording.vtkhdf", "report.csv", "report.parquet", "run"]
+ALWAYS = ["recording.vtkhdf", "report.csv", "run"]
 
 
 def listing(folder):

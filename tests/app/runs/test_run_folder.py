@@ -35,7 +35,6 @@ def test_the_files_of_a_run(out):
     assert listing(out) == [
         "recording.vtkhdf",
         "report.csv",
-        "report.parquet",
         "run/checkpoints/00000000.checkpoint",
         "run/checkpoints/00000015.checkpoint",
         "run/checkpoints/00000016.checkpoint",

@@ -269,7 +269,7 @@ def test_the_schema_rejects_what_the_loader_rejects(case):
 
 
 def test_the_scene_of_the_manual_is_valid(load, tmp_path):
-    manual = (Path(__file__).parents[3] / "docs" / "scene_files.md").read_text(encoding="utf-8")
+    manual = (Path(__file__).parents[3] / "docs" / "reference" / "scene_files.md").read_text(encoding="utf-8")
     example = manual.split("```yaml\n")[1].split("```")[0]
     sp.shapes.gummy_bear_surface(100.0, 24).save(tmp_path / "bear.stl")
     sp.shapes.box_surface((0.2, 0.2, 0.2)).save(tmp_path / "stairs.obj")
@@ -280,7 +280,7 @@ def test_the_scene_of_the_manual_is_valid(load, tmp_path):
 
 
 def test_the_rigid_bodies_of_the_manual_are_valid(load, tmp_path):
-    manual = (Path(__file__).parents[3] / "docs" / "scene_files.md").read_text(encoding="utf-8")
+    manual = (Path(__file__).parents[3] / "docs" / "reference" / "scene_files.md").read_text(encoding="utf-8")
     sp.shapes.box_surface((200.0, 20.0, 200.0)).save(tmp_path / "tray.stl")
     run = load(manual.split("```yaml\n")[2].split("```")[0])
     assert [body.kappa > 0.0 for body in run.scene.bodies] == [True, True]
@@ -291,7 +291,7 @@ def test_the_rigid_bodies_of_the_manual_are_valid(load, tmp_path):
     "kinds", ["material", "shape", "obstacle", "solver", "stitch", "load", "sensor", "joint", "motor"]
 )
 def test_the_manual_lists_every_kind(kinds):
-    manual = (Path(__file__).parents[3] / "docs" / "scene_files.md").read_text(encoding="utf-8")
+    manual = (Path(__file__).parents[3] / "docs" / "reference" / "scene_files.md").read_text(encoding="utf-8")
     row = next(line for line in manual.splitlines() if line.startswith(f"| {kinds} |"))
     known = {
         definition["properties"]["kind"]["const"]

@@ -1,4 +1,4 @@
-"""The files and the program of docs/studies.md."""
+"""The files and the program of docs/reference/studies.md."""
 
 import os
 import re
@@ -9,7 +9,7 @@ from pathlib import Path
 import supple as sp
 from supple.app.scene_file.loader import load_run
 
-PAGE = (Path(__file__).parents[3] / "docs" / "studies.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "studies.md").read_text(encoding="utf-8")
 
 
 def test_the_files_of_the_page(tmp_path):

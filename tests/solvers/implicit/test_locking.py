@@ -51,7 +51,7 @@ def cook_deflection(cells, material):
     ("poisson", "converged", "error"), [pytest.param(1 / 3, 25.0, 0.03, marks=pytest.mark.slow), (0.499, 24.9, 0.03)]
 )
 def test_cooks_membrane(poisson, converged, error):
-    """`converged` is extrapolated (docs/locking.md)."""
+    """`converged` is extrapolated (docs/theory/locking.md)."""
     assert cook_deflection(16, rubber(poisson)) == pytest.approx(converged, rel=error)
     assert cook_deflection(8, rubber(poisson)) > 0.85 * converged
     assert cook_deflection(8, rubber(poisson, "tets")) < 0.7 * converged
@@ -95,7 +95,7 @@ def test_affine_patch():
 
 
 def test_convergence_order():
-    """L2 errors of a smooth field without change of volume, at nu = 0.49: order 2 (docs/locking.md)."""
+    """L2 errors of a smooth field without change of volume, at nu = 0.49: order 2 (docs/theory/locking.md)."""
     errors, sizes = [], (6, 12)
     a, mu = 1e-6, 1.0 / (2 * 1.49)
     for n in sizes:
@@ -158,7 +158,7 @@ class CompressedBlock:
 
 
 def test_pressure_of_a_compressed_block_has_no_checkerboard():
-    """At nu = 0.4999. Between smooth plates it is constant; near bonded plates it varies (docs/locking.md)."""
+    """At nu = 0.4999. Between smooth plates it is constant; near bonded plates it varies (docs/theory/locking.md)."""
     smooth = CompressedBlock(5, rubber(0.4999), 0.7**-0.5 - 1.0)
     assert smooth.jump(smooth.pressures) < 1e-3
     bonded = CompressedBlock(5, rubber(0.4999))

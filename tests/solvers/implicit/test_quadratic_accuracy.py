@@ -45,14 +45,14 @@ def cook(cells, poisson):
     return (equilibrium(scene).positions["cook"] - x)[middle, 1].mean() / load
 
 
-# Limits of meshes with 16 and 24 graded cells; see docs/locking.md.
+# Limits of meshes with 16 and 24 graded cells; see docs/theory/locking.md.
 @pytest.mark.parametrize(("poisson", "converged"), [(1 / 3, 23.85), (0.499, 23.85)])
 def test_cooks_membrane_with_eight_elements_on_a_side(poisson, converged):
     assert cook(8, poisson) == pytest.approx(converged, rel=0.01)
 
 
 def test_cantilever():
-    """Timoshenko's deflection. That of a clamped solid is 0.9935 of it, from 8,640 graded tets (docs/locking.md)."""
+    """Timoshenko's deflection; that of a solid is 0.9935 of it, on 8,640 graded tets (docs/theory/locking.md)."""
     length, side, youngs, nu, load = 1.0, 0.1, 1e6, 0.3, 0.01
     linear = sp.shapes.box((1, side, side), (20, 3, 3))
     x = linear.vertices.copy()

@@ -19,15 +19,13 @@ from supple.app.demos.rigid.ragdoll import RAGDOLL
 from supple.app.demos.squash import SQUASH
 from supple.app.demos.stitch import STITCH
 from supple.app.demos.stretch import STRETCH
-from supple.app.demos.torture.registry import TORTURE
 from supple.app.demos.twist import TWIST
 from supple.errors import SceneError
 
-_TORTURE = [torture.full for torture in TORTURE.values()]
 _SOFT = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT)
 _DRIVEN = (BALLOON, MUSCLE, PNEUNET, TENDON_FINGER, FOAM_PRESS)
 _RIGID = (DZHANIBEKOV, DOMINOES, GRIPPER, RAGDOLL)
-DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_SOFT, *_DRIVEN, *_RIGID, *_TORTURE)}
+DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_SOFT, *_DRIVEN, *_RIGID)}
 
 
 def find_demo(name: str) -> Demo:

@@ -29,9 +29,9 @@ class RunPaths:
         return self.folder / "recording.vtkhdf"
 
     @property
-    def tables(self) -> tuple[Path, Path]:
-        """The reports of all frames, twice."""
-        return self.folder / "report.csv", self.folder / "report.parquet"
+    def table(self) -> Path:
+        """The reports of all frames."""
+        return self.folder / "report.csv"
 
     @property
     def own(self) -> Path:

@@ -80,7 +80,7 @@ class Keeper:
         """
         first: OutputError | None = None
         try:
-            for act in (self._write_last_checkpoint, self.recorder.end, self._end_session, self._write_tables):
+            for act in (self._write_last_checkpoint, self.recorder.end, self._end_session, self._write_table):
                 try:
                     act()
                 except OutputError as error:
@@ -108,10 +108,9 @@ class Keeper:
         write_journal(self.paths.journal, ended)
         self.log.note(f"frame {index} of {self.run.last_index}: {outcome}{message and ': '}{message}")
 
-    def _write_tables(self) -> None:
+    def _write_table(self) -> None:
         if self._last is not None and self.paths.recording.exists():
-            for path in self.paths.tables:
-                export(self.paths.recording, path.suffix[1:], path)
+            export(self.paths.recording, "csv", self.paths.table)
 
     def _outcome(self) -> tuple[str, str]:
         """How the session ended, and why."""

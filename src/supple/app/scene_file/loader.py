@@ -66,7 +66,7 @@ class Run:
 def load_scene(path: str | Path) -> Scene:
     """The scene of a scene file (YAML), or of a robot (URDF). Paths in it are relative to the file.
 
-    The format of scene files: `supple schema`; what is read of a URDF: docs/robots.md.
+    The format of scene files: `supple schema`; what is read of a URDF: docs/learn/robots.md.
 
     Solver, timing and deformed starts in the file are checked too, but only `load_run` returns them.
 

@@ -12,7 +12,7 @@ _HEAD = """\
 #   supple info {name}     what is in it, and whether anything is wrong
 #   supple view {name}     simulates it on a page, where bodies can be dragged
 #   supple run {name}      simulates it into the folder out
-# docs/scene_files.md describes all keys; `supple schema` writes them for editors with completion.
+# docs/reference/scene_files.md describes all keys; `supple schema` writes them for editors with completion.
 
 bodies:
 """

@@ -42,9 +42,9 @@ def expression_of(psi: Callable[..., Any] | str, of: str, names: tuple[str, ...]
     ------
     SceneError : where it cannot be called with symbols, or is no formula of them.
     """
+    symbols = symbols_of(of, names)
     import sympy
 
-    symbols = symbols_of(of, names)
     variables = [symbols[name] for name in VARIABLES[of]]
     rest = dict(zip(variables, (3.0, 3.0, 1.0) if of == "invariants" else (1.0, 1.0, 1.0), strict=True))
     if isinstance(psi, str):

@@ -86,13 +86,14 @@ class Formula:
 
     def expression(self) -> Any:
         """The formula of SymPy, of positive variables and real parameters."""
+        symbols = symbols_of(self.of, self.parameters)
         import sympy
 
         def number(value: Any) -> Any:
             return sympy.Rational(*value.as_integer_ratio()) if isinstance(value, Fraction) else sympy.Float(value)
 
         functions = {name: getattr(sympy, name) for name in FUNCTIONS}
-        return sympy.sympify(self.evaluated(symbols_of(self.of, self.parameters), functions, number))
+        return sympy.sympify(self.evaluated(symbols, functions, number))
 
     @classmethod
     def of_expression(cls, expression: Any, of: str, parameters: tuple[str, ...]) -> Formula | None:
@@ -110,8 +111,16 @@ class Formula:
 
 
 def symbols_of(of: str, parameters: tuple[str, ...]) -> dict[str, Any]:
-    """SymPy's symbols of the variables and of the parameters, by name."""
-    import sympy
+    """SymPy's symbols of the variables and of the parameters, by name.
+
+    Raises
+    ------
+    SceneError : where SymPy is not installed.
+    """
+    try:
+        import sympy
+    except ModuleNotFoundError:
+        raise SceneError("EnergyMaterial needs SymPy, which is not installed; pip install 'supple[symbolic]'") from None
 
     variables = {name: sympy.Symbol(name, positive=True) for name in VARIABLES[of]}
     return variables | {name: sympy.Symbol(name, real=True) for name in parameters}

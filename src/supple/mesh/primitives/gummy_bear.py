@@ -10,7 +10,7 @@ from supple.mesh.primitives.isosurface_stuffing import stuff
 from supple.mesh.primitives.sizes import fits, not_too_many, positive
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
-from supple.mesh.topology import unique_edges
+from supple.mesh.topology import without_unused
 
 # For a bear of height 1, feet at y = 0, looking along +z. Parts with x > 0 are mirrored. The last number is the
 # width [m] of the blend with the parts before.
@@ -29,7 +29,6 @@ CAPSULES = (
 )
 HOLLOWS = (((0.152, 0.93, 0.085), 0.045, 0.02),)  # inside of the ears
 LOW, HIGH = np.array([-0.27, 0.0, -0.205]), np.array([0.27, 1.0, 0.345])
-SMOOTHING_ROUNDS = 12
 
 
 def gummy_bear(height: float = 1.0, edge_length: float = 0.08) -> TetMesh:
@@ -52,12 +51,12 @@ def gummy_bear(height: float = 1.0, edge_length: float = 0.08) -> TetMesh:
 
 
 def gummy_bear_surface(height: float = 1.0, resolution: int = 64) -> SurfaceMesh:
-    """The bear's surface, watertight: marching cubes, then vertices spread evenly over the surface.
+    """The bear's surface, watertight: that of its tets.
 
     Parameters
     ----------
     height : [m]
-    resolution : number of cells along the height, 16 or more
+    resolution : the height in mean edges, 16 or more
 
     Raises
     ------
@@ -67,9 +66,8 @@ def gummy_bear_surface(height: float = 1.0, resolution: int = 64) -> SurfaceMesh
     if isinstance(resolution, bool) or not isinstance(resolution, int | np.integer) or resolution < 16:
         raise MeshError(f"gummy_bear_surface: resolution is {resolution!r}; give a whole number, 16 or more")
     not_too_many("gummy_bear_surface", float(resolution) ** 3, "make resolution smaller")
-    points, triangles = _marching_cubes(int(resolution))
-    points = _spread(points, triangles)
-    return SurfaceMesh((points - 0.5 * (LOW + HIGH)) * height, triangles)
+    tets = gummy_bear(height, height / resolution)
+    return SurfaceMesh(*without_unused(tets.vertices, tets.surface.triangles))
 
 
 def bear_distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -100,46 +98,3 @@ def _to_segment(x: NDArray[np.float64], start: NDArray[np.float64], end: NDArray
     along = end - start
     t = np.clip((x - start) @ along / (along @ along), 0.0, 1.0)
     return np.linalg.norm(x - start - t[:, None] * along, axis=1)
-
-
-def _marching_cubes(resolution: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    from skimage.measure import marching_cubes
-
-    spacing = 1.0 / resolution
-    low = LOW - 2.0 * spacing
-    shape = np.ceil((HIGH - LOW) / spacing).astype(int) + 5
-    grid = np.stack(np.meshgrid(*(np.arange(n) * spacing for n in shape), indexing="ij"), axis=-1)
-    values = bear_distance(grid.reshape(-1, 3) + low).reshape(shape)
-    points, triangles, _, _ = marching_cubes(
-        values, 0.0, spacing=(spacing,) * 3, gradient_direction="descent", allow_degenerate=False
-    )
-    return points.astype(np.float64) + low, triangles.astype(np.int32)
-
-
-def _spread(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Move each vertex along the surface towards the middle of its neighbours, then back onto the surface; repeat.
-
-    This removes the slivers of marching cubes where the surface passes close to a grid point.
-    """
-    edges = unique_edges(triangles, len(points))
-    both = np.concatenate([edges, edges[:, ::-1]])
-    degree = np.bincount(both[:, 0], minlength=len(points))
-    for _ in range(SMOOTHING_ROUNDS):
-        middle = np.column_stack(
-            [np.bincount(both[:, 0], weights=points[both[:, 1], k], minlength=len(points)) for k in range(3)]
-        )
-        step = middle / degree[:, None] - points
-        _, normal = _value_and_gradient(points)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        points = points + 0.7 * (step - np.einsum("ij,ij->i", step, normal)[:, None] * normal)
-        points = points - bear_distance(points)[:, None] * normal
-    for _ in range(2):
-        value, gradient = _value_and_gradient(points)
-        points = points - (value / np.einsum("ij,ij->i", gradient, gradient))[:, None] * gradient
-    return points
-
-
-def _value_and_gradient(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    h = 1e-6
-    value = bear_distance(points)
-    return value, np.column_stack([(bear_distance(points + s) - value) / h for s in h * np.eye(3)])

@@ -37,14 +37,12 @@ class Format:
 FORMATS = {
     "glb": Format("export.glb:write_glb", (".glb",)),  # glTF 2.0 with morph targets
     "obj": Format("export.obj:write_obj_folder"),  # one Wavefront OBJ for each frame
-    "pvd": Format("export.pvd:write_pvd"),  # a ParaView collection and one VTU for each frame
-    "vtu": Format("export.pvd:write_last_vtu", (".vtu",)),  # the last frame as a VTK unstructured grid
+    "vtu": Format("export.vtu:write_last_vtu", (".vtu",)),  # the last frame as a VTK unstructured grid
     "vtkhdf": Format("export.vtkhdf:write_vtkhdf", RECORDING_SUFFIXES),  # a recording again, compressed and repaired
     "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
     "gif": Format("export.video:write_video", (".gif",)),  # (extra: video)
     "mp4": Format("export.video:write_video", (".mp4",)),  # (extra: video)
     "csv": Format("export.table:write_csv", (".csv",)),  # the reports of all frames
-    "parquet": Format("export.table:write_parquet", (".parquet",)),  # the same
     "html": Format("page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }
 
@@ -55,7 +53,7 @@ def export(recording: Recording | str | Path, to: str, output: str | Path | None
     Parameters
     ----------
     recording : an open recording, or its path.
-    to : "glb", "obj", "pvd", "vtu", "vtkhdf", "usd", "gif", "mp4", "csv", "parquet" or "html"; see `FORMATS`.
+    to : "glb", "obj", "vtu", "vtkhdf", "usd", "gif", "mp4", "csv" or "html"; see `FORMATS`.
     output : file, with a suffix of the format, or folder; beside the recording, under its name, where it is not given.
         What is there is replaced.
 

@@ -7,7 +7,9 @@ metres, as in Supple.
 
 from __future__ import annotations
 
+import json
 import logging
+import struct
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -57,21 +59,18 @@ class _Glb:
     """A glTF document and its one buffer, to which meshes are added."""
 
     def __init__(self, frames: list[RecordedFrame]) -> None:
-        import pygltflib
-
-        self.kinds = pygltflib
         self.frames = frames
         self.blob = bytearray()
-        self.roots: list[int] = []
-        self.document = pygltflib.GLTF2(
-            asset=pygltflib.Asset(version="2.0", generator="Supple"),
-            scene=0,
-            scenes=[pygltflib.Scene()],
-            animations=[],
-        )
+        self.document: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "Supple"},
+            "scene": 0,
+            "scenes": [{"nodes": []}],
+            **{kind: [] for kind in ("nodes", "meshes", "materials", "accessors", "bufferViews")},
+        }
+        self.channels: list[dict[str, Any]] = []
+        self.samplers: list[dict[str, Any]] = []
         times = np.array([frame.time for frame in frames])
         self.times = self._accessor((times - times[0])[:, None], "SCALAR", bounds=True)
-        self.animation = pygltflib.Animation(name="recording", channels=[], samplers=[])
 
     def add_body(self, picture: Picture) -> None:
         """Add a mesh whose base shape is frame 0, and whose k-th morph target gives frame k."""
@@ -104,12 +103,15 @@ class _Glb:
 
     def to_bytes(self) -> bytes:
         """The whole file."""
-        self.document.scenes[0].nodes = self.roots
-        if self.animation.channels:
-            self.document.animations = [self.animation]
-        self.document.buffers = [self.kinds.Buffer(byteLength=len(self.blob))]
-        self.document.set_binary_blob(bytes(self.blob))
-        return b"".join(self.document.save_to_bytes())
+        document = {**self.document, "buffers": [{"byteLength": len(self.blob)}]}
+        if self.channels:
+            document["animations"] = [{"name": "recording", "channels": self.channels, "samplers": self.samplers}]
+        text = json.dumps(document, separators=(",", ":")).encode()
+        chunks = b"".join(
+            struct.pack("<I4s", len(data) + -len(data) % 4, kind) + data + pad * (-len(data) % 4)
+            for kind, data, pad in ((b"JSON", text, b" "), (b"BIN\0", self.blob, b"\0"))
+        )
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
     @cached_property
     def _weights(self) -> int:
@@ -120,45 +122,35 @@ class _Glb:
     def _mesh_node(
         self, name: str, x: NDArray, normals: NDArray, triangles: NDArray, material: int, targets: list[dict[str, int]]
     ) -> int:
-        kinds, document = self.kinds, self.document
-        primitive = kinds.Primitive(
-            attributes=kinds.Attributes(POSITION=self._vectors(x, bounds=True), NORMAL=self._vectors(normals)),
-            indices=self._append(triangles.astype("<u4").reshape(-1, 1), _UNSIGNED, "SCALAR", {}, _INDICES),
-            material=material,
-            targets=targets or None,
-        )
-        weights = [0.0] * len(targets)
-        document.meshes.append(kinds.Mesh(name=name, primitives=[primitive], weights=weights or None))
-        document.nodes.append(kinds.Node(name=name, mesh=len(document.meshes) - 1))
-        self.roots.append(len(document.nodes) - 1)
-        return len(document.nodes) - 1
+        primitive: dict[str, Any] = {
+            "attributes": {"POSITION": self._vectors(x, bounds=True), "NORMAL": self._vectors(normals)},
+            "indices": self._append(triangles.astype("<u4").reshape(-1, 1), _UNSIGNED, "SCALAR", {}, _INDICES),
+            "material": material,
+        }
+        mesh: dict[str, Any] = {"name": name, "primitives": [primitive]}
+        if targets:
+            primitive["targets"], mesh["weights"] = targets, [0.0] * len(targets)
+        node = self._added("nodes", {"name": name, "mesh": self._added("meshes", mesh)})
+        self.document["scenes"][0]["nodes"].append(node)
+        return node
 
     def _place(self, node: int, poses: NDArray[np.float64]) -> None:
         """Place a node by the first of its poses (frames, 3, 4), and animate it where they change."""
         rotations = _quaternions(poses[:, :, :3])
-        made = self.document.nodes[node]
-        made.translation, made.rotation = poses[0, :, 3].tolist(), rotations[0].tolist()
+        self.document["nodes"][node].update(translation=poses[0, :, 3].tolist(), rotation=rotations[0].tolist())
         if np.any(poses != poses[0]):
             self._animate(node, "translation", self._vectors(poses[:, :, 3]))
             self._animate(node, "rotation", self._accessor(rotations, "VEC4"))
 
     def _animate(self, node: int, path: str, values: int) -> None:
-        kinds, animation = self.kinds, self.animation
-        animation.samplers.append(kinds.AnimationSampler(input=self.times, output=values, interpolation="LINEAR"))
-        target = kinds.AnimationChannelTarget(node=node, path=path)
-        animation.channels.append(kinds.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
+        self.samplers.append({"input": self.times, "output": values, "interpolation": "LINEAR"})
+        self.channels.append({"sampler": len(self.samplers) - 1, "target": {"node": node, "path": path}})
 
     def _material(self, color: tuple[int, int, int], opacity: float) -> int:
-        kinds = self.kinds
         linear = ((np.array(color) / 255.0 + 0.055) / 1.055) ** 2.4  # sRGB; all our colors are above its linear part
-        surface = kinds.PbrMetallicRoughness(
-            baseColorFactor=[*linear.tolist(), opacity], metallicFactor=0.0, roughnessFactor=0.45
-        )
-        transparent = opacity < 1.0
-        mode = kinds.BLEND if transparent else kinds.OPAQUE
-        made = kinds.Material(pbrMetallicRoughness=surface, doubleSided=transparent, alphaMode=mode, alphaCutoff=None)
-        self.document.materials.append(made)
-        return len(self.document.materials) - 1
+        surface = {"baseColorFactor": [*linear.tolist(), opacity], "metallicFactor": 0.0, "roughnessFactor": 0.45}
+        transparent = {"doubleSided": True, "alphaMode": "BLEND"} if opacity < 1.0 else {}
+        return self._added("materials", {"pbrMetallicRoughness": surface, **transparent})
 
     def _vectors(self, values: NDArray, *, bounds: bool = False) -> int:
         return self._accessor(values, "VEC3", bounds=bounds, target=_VERTICES)
@@ -169,15 +161,17 @@ class _Glb:
         return self._append(data, _FLOAT, kind, limits, target)
 
     def _append(self, data: NDArray, component: int, kind: str, limits: dict[str, Any], target: int | None) -> int:
-        kinds, document = self.kinds, self.document
-        view = kinds.BufferView(buffer=0, byteOffset=len(self.blob), byteLength=data.nbytes, target=target)
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.blob), "byteLength": data.nbytes}
+        if target is not None:
+            view["target"] = target
         self.blob += data.tobytes()
-        document.bufferViews.append(view)
-        accessor = kinds.Accessor(
-            bufferView=len(document.bufferViews) - 1, componentType=component, count=len(data), type=kind, **limits
-        )
-        document.accessors.append(accessor)
-        return len(document.accessors) - 1
+        accessor = {"bufferView": self._added("bufferViews", view), "componentType": component, "count": len(data)}
+        return self._added("accessors", {**accessor, "type": kind, **limits})
+
+    def _added(self, kind: str, item: dict[str, Any]) -> int:
+        """The number of an item that is added to those of its kind."""
+        self.document[kind].append(item)
+        return len(self.document[kind]) - 1
 
 
 def _quaternions(R: NDArray[np.float64]) -> NDArray[np.float64]:

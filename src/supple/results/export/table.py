@@ -1,4 +1,4 @@
-"""The reports of all frames as a table: CSV, which every program reads, and Parquet, which keeps types and is small."""
+"""The reports of all frames as a table."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ import io
 import math
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from supple.results.recording.reader import Recording
 from supple.results.recording.report_columns import report_columns
@@ -27,25 +24,5 @@ def write_csv(recording: Recording, output: Path) -> None:
         fresh.write_text(text.getvalue(), encoding="utf-8", newline="")
 
 
-def write_parquet(recording: Recording, output: Path) -> None:
-    """Write the same columns in Parquet; NaN where there is no value."""
-    from arro3 import io as arro3_io
-    from arro3.core import Table
-
-    data = io.BytesIO()
-    columns = {name: _arrow(column) for name, column in report_columns(recording).items()}
-    arro3_io.write_parquet(Table.from_pydict(columns), data)
-    with whole_file(output) as fresh:
-        fresh.write_bytes(data.getvalue())
-
-
 def _cell(value: Any) -> Any:
     return "" if isinstance(value, float) and math.isnan(value) else value
-
-
-def _arrow(column: NDArray[Any]) -> Any:
-    from arro3.core import Array, DataType
-
-    if column.dtype.kind == "U":
-        return Array(column.tolist(), type=DataType.string())
-    return Array.from_numpy(np.ascontiguousarray(column))

@@ -1,6 +1,6 @@
 """A VTKHDF file that is valid at every moment, also when its writer is killed.
 
-The HDF5 library alone does not guarantee this (docs/decisions.md, 4). Therefore it first lays out the whole file, with
+The HDF5 library alone does not guarantee this (notes/decisions.md, 4). Therefore it first lays out the whole file, with
 room for many frames, and closes it. Every series of frames then has a fixed position ("contiguous" layout), and a frame
 is written there as plain bytes. The last writes of a frame are a few numbers of eight bytes: our count of frames, and
 the same number as the `NSteps` attribute and as the lengths of the series in VTKHDF/Steps, for VTK, which allows no

@@ -18,7 +18,7 @@ from supple.scene.stitches.stitch import Stitch
 from supple.scene.values import float_array
 
 # The default rest distance, as a share of the mean edge at a pair. Two half bars, joined by stitches as stiff as they
-# are, then bend 0.3 % further than one bar (docs/stitches.md).
+# are, then bend 0.3 % further than one bar (docs/reference/stitches.md).
 _DISTANCE_SHARE = 0.01
 
 _MODULI = {"mu": "Pa", "lam": "Pa", "youngs": "Pa", "poisson": "-"}

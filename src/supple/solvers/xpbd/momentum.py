@@ -11,7 +11,7 @@ of x_n and x, r0 = x_n - c, r = x - c', and x* the predicted positions,
     P_err = sum m (x - x*),   L_err = sum m r0 x (x - x*),   A = sum m ((r0 . r) I - r r0^T),   A th = L_err,
     x  <-  x - P_err / M - th x r.
 
-Then sum m (x - x*) = 0 and sum m r0 x (x - x*) = 0 exactly: the substep changes neither momentum (docs/xpbd.md).
+Then sum m (x - x*) = 0 and sum m r0 x (x - x*) = 0 exactly: the substep changes neither momentum (docs/theory/xpbd.md).
 
 Sums run over blocks of vertices that depend on the mesh only, so that they have the same bits on any number of threads.
 """

@@ -6,9 +6,9 @@ what lies on them slides, whatever the contact.
 
 import numpy as np
 import pytest
+from tests.torture.meshes import mirrored_box
 
 import supple as sp
-from supple.app.demos.torture.meshes import mirrored_box
 
 SIDE, GAP, DHAT = 0.1, 1e-5, 1e-4
 # A cell of five tets: a half turn about each axis maps it to itself.

@@ -86,7 +86,7 @@ def test_a_thin_rod_is_twisted_by_a_whole_turn_in_one_step():
 
 @pytest.mark.parametrize("dt", [7.5, 3.75, 2.5])
 def test_a_bar_twisted_into_itself_converges_with_the_defaults(dt: float):
-    from supple.app.demos.torture.twist8 import scene
+    from tests.torture.twist8 import scene
 
     for frame in sp.simulate(scene((24, 1), 3.0), sp.Implicit(), dt, round(7.5 / dt)):
         assert frame.report.status == "converged", frame.report.message

@@ -24,9 +24,9 @@ def export(
     recording
         The recording (.vtkhdf), or the folder of its run.
     to
-        glb (Blender, three.js), obj (a folder, one file per frame), pvd (a folder for ParaView), vtu (the last frame),
-        vtkhdf (compressed, or repaired after a kill), usd (extra: usd), gif or mp4 (extra: video), html (a page),
-        csv or parquet (a table of the reports of all frames).
+        glb (Blender, three.js), obj (a folder, one file per frame), vtu (the last frame), vtkhdf (compressed, or
+        repaired after a kill), usd (extra: usd), gif or mp4 (extra: video), html (a page), csv (a table of the reports
+        of all frames).
     output
         File or folder to write, with a suffix of the format; without it, beside the recording and under its name.
     """

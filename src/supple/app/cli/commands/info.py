@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SCENE_FILES = (".yaml", ".yml", ".urdf")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
-PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic", "arro3-io")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 
@@ -293,7 +293,7 @@ _THIN_SHARE = 0.1
 
 
 def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
-    """A warning where nearly incompressible tets are too few across to deform (docs/locking.md)."""
+    """A warning where nearly incompressible tets are too few across to deform (docs/theory/locking.md)."""
     import numpy as np
 
     from supple.materials.material import Hyperelastic

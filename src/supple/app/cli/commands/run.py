@@ -39,7 +39,7 @@ def run(
     ----------
     scene
         The scene file (.yaml); `supple schema` describes it. Or a surface, which falls on a floor. Or a robot (.urdf);
-        docs/robots.md describes what is read.
+        see docs/learn/robots.md.
     output
         Run folder; it is created where it does not exist, and may not contain an earlier run.
     steps

@@ -28,7 +28,7 @@ def sweep(
     Parameters
     ----------
     study
-        The study file (.yaml): scene file, factors, design and measures; docs/studies.md describes it.
+        The study file (.yaml): scene file, factors, design and measures; docs/reference/studies.md describes it.
     output
         Folder for table.csv, plots, and a folder for each case.
     workers

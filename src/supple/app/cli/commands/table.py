@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -12,28 +12,23 @@ def table(
     run: Path,
     /,
     *,
-    to: Literal["csv", "parquet"] = "csv",
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
 ) -> None:
     """Write one row for each frame: energies, momenta, contact and reaction forces, sizes of recorded fields.
 
-    docs/forces_and_stresses.md lists the columns.
+    docs/reference/forces_and_stresses.md lists the columns.
 
     Parameters
     ----------
     run
         Run folder, or a recording (.vtkhdf).
-    to
-        csv or parquet.
     output
-        File to write; without it, report.csv or report.parquet in the run folder, or beside the recording and under its
-        name.
+        File to write (.csv); without it, report.csv in the run folder, or beside the recording and under its name.
     """
     from supple.app.runs.contents import RunPaths
     from supple.results.export.exporter import export
 
     if run.is_dir():
         paths = RunPaths(run)
-        run = paths.recording
-        output = output or next(path for path in paths.tables if path.suffix == f".{to}")
-    print(export(run, to, output))
+        run, output = paths.recording, output or paths.table
+    print(export(run, "csv", output))

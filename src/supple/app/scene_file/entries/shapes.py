@@ -120,7 +120,7 @@ class GummyBearSurfaceModel(Model):
 
     kind: Literal["gummy_bear"]
     height: Positive = Field(default=1.0, description="[m]")
-    resolution: Count = Field(default=64, description="cells along its height")
+    resolution: Count = Field(default=64, description="its height in mean edges")
 
     def build_surface(self) -> SurfaceMesh:
         return shapes.gummy_bear_surface(self.height, self.resolution)

@@ -25,7 +25,7 @@ from supple.solvers.implicit.newton.reduction import Reduction
 logger = logging.getLogger(__name__)
 
 # Where CG has not converged after this many iterations, a factorization is likely faster: usual systems take 10 to 60,
-# thin bodies of nearly incompressible material more than 500 (docs/implicit.md).
+# thin bodies of nearly incompressible material more than 500 (docs/theory/implicit.md).
 _STALLED = 400
 
 # After this many systems the slower number of threads is tried again (see `ThreadTuner`). The work of a system is

@@ -12,8 +12,8 @@ exceeds the converged one by at most
     FACTOR h^2 <2 V k (lam_L + mu / 2)>
 
 with the mean over the volume; it is within 15 % of this for the coarsest beams at nu = 0.45 and 0.49, and several times
-smaller for fine meshes at nu = 0.3 (docs/xpbd.md). For `EdgesAndVolume`, the mean of (w_1 + w_2) / compliance over the
-edges stands for the bracket; hard constraints and rigid bodies have no
+smaller for fine meshes at nu = 0.3 (docs/theory/xpbd.md). For `EdgesAndVolume`, the mean of (w_1 + w_2) / compliance
+over the edges stands for the bracket; hard constraints and rigid bodies have no
 stiffness that could be compared.
 """
 

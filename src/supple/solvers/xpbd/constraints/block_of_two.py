@@ -1,4 +1,4 @@
-"""The projection of one stable Neo-Hookean tet: both constraints in one step (docs/xpbd.md, "The block of two")."""
+"""The projection of one stable Neo-Hookean tet: both constraints at once (docs/theory/xpbd.md, "The block of two")."""
 
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.sweeps.compilation import FLAGS

@@ -3,7 +3,7 @@
 With alpha_D = 1 / (mu V), alpha_H = 1 / (lam V) their energy is V (mu/2 Ic + lam/2 (J - 1 - mu/lam)^2): that of
 `StableNeoHookean`, up to a constant. At rest neither constraint is zero; only the sum of their forces is. Projection
 of one after the other leaves a residual that depends on the substep and makes the body too soft. Here both are
-projected in one step, which is exactly zero at rest (derivation: docs/xpbd.md, "The block of two").
+projected in one step, which is exactly zero at rest (derivation: docs/theory/xpbd.md, "The block of two").
 
 Source of the constraints: Macklin and Müller, "A Constraint-based Formulation of Stable Neo-Hookean Materials" (2021).
 """

@@ -13,7 +13,8 @@ from types import FunctionType
 from typing import Any
 
 from supple.numerics.mat3 import cross, dot, row, subtract
-from supple.runtime.kernel_cache import njit, reached_code
+from supple.runtime.kernel_cache import njit
+from supple.runtime.reached_code import reached_code
 from supple.solvers.xpbd.contact.friction import along_surface, friction_total
 from supple.solvers.xpbd.contact.movers import place, place_before, push_body, softness
 from supple.solvers.xpbd.contact.response_rates import kept_share
@@ -180,7 +181,7 @@ def _project_shapes(
 def kernels_of(function: Callable[..., Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """`_find_candidates` and `_project_shapes` with `contact` replaced by a shape's element function, compiled.
 
-    Numba's cache distinguishes kernels of one file by their names, so that the name contains a digest of the code.
+    Numba names symbols of machine code by the kernel's name, so that it contains a digest of the code.
     """
     compiled = []
     for kernel in (_find_candidates, _project_shapes):

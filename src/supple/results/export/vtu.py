@@ -1,0 +1,45 @@
+"""The last frame as a VTK unstructured grid. ParaView opens recordings themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from supple.results.recording.reader import Recording
+from supple.runtime.replacing import whole_file
+
+
+def write_last_vtu(recording: Recording, output: Path) -> None:
+    """Write the last frame: tets, velocities, J and body numbers; rigid bodies as their surfaces."""
+    import meshio
+
+    frame = recording[-1]
+    positions, velocities = list(frame.positions.values()), list(frame.velocities.values())
+    starts = np.cumsum([0, *map(len, positions)])
+    triangles = [np.zeros((0, 3), np.int32)]
+    of_point, of_triangle = np.zeros(starts[-1], np.int32), []
+    parts = []
+    for i, body in enumerate(recording.bodies):
+        of_point[starts[i] : starts[i + 1]] = i
+        if body.rigid and body.skin is not None:
+            triangles.append(body.skin.triangles + starts[i])
+            of_triangle += [i] * len(body.skin.triangles)
+        else:
+            nodes = recording.nodes_of(body) - body.vertices.start + starts[i]
+            kind = "tetra" if nodes.shape[1] == 4 else "tetra10"
+            parts.append((kind, nodes, frame.det_F[body.tets], np.full(len(nodes), i, dtype=np.int32)))
+    rigid = np.array([frame.det_F[body.tets.start] if body.rigid else 1.0 for body in recording.bodies])
+    if of_triangle:
+        parts.append(("triangle", np.concatenate(triangles), rigid[of_triangle], np.array(of_triangle, dtype=np.int32)))
+    mesh = meshio.Mesh(
+        np.concatenate(positions),
+        [(kind, cells) for kind, cells, _, _ in parts],
+        point_data={"velocities": np.concatenate(velocities), "body": of_point},
+        cell_data={
+            "det_F": [values for _, _, values, _ in parts],
+            "body": [numbers for _, _, _, numbers in parts],
+        },
+    )
+    with whole_file(output) as fresh:
+        mesh.write(fresh, file_format="vtu")

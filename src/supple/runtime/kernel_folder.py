@@ -1,0 +1,86 @@
+"""The folder of a user's compiled kernels: one file per kernel, named by a digest of what it was compiled from."""
+
+from __future__ import annotations
+
+import os
+import zlib
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from time import monotonic, sleep, time
+
+from numba.core import config
+from numba.misc.appdirs import AppDirs
+
+from supple.runtime.lock import FileLock
+
+# How long a process waits for another one that compiles the same kernel, and how long between two looks [s].
+_LONGEST_WAIT, _PAUSE = 60.0, 0.02
+# Ten states of the code, with the kernels of all tests each; those that were not used for longest go.
+_MOST_BYTES = 1 << 30
+_DAY = 86400.0  # a use is noted at most once a day: a note is a write
+
+
+def kernel_folder() -> Path:
+    """Numba's `NUMBA_CACHE_DIR` where it is set, otherwise the cache folder of the platform."""
+    chosen: str = config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
+    return Path(chosen, "supple") if chosen else Path(AppDirs("supple", appauthor=False).user_cache_dir, "kernels")
+
+
+def read(path: Path) -> bytes | None:
+    """The content of an entry; None where there is none, or it is damaged."""
+    try:
+        content = path.read_bytes()
+        if zlib.crc32(content[4:]).to_bytes(4, "little") != content[:4]:
+            return None
+        if path.stat().st_mtime < time() - _DAY:
+            os.utime(path)
+    except OSError:
+        return None
+    return content[4:]
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write an entry, whole or not at all.
+
+    Raises
+    ------
+    OSError : where it cannot be written.
+    """
+    _remove_unused(path.parent)
+    part = path.with_suffix(f".{os.getpid()}")
+    try:
+        part.write_bytes(zlib.crc32(content).to_bytes(4, "little") + content)
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def lock(path: Path) -> tuple[FileLock | None, bool]:
+    """Lock an entry, to compile it here, and say whether another process had it locked until then.
+
+    The lock is None where nothing can be written, or another process takes too long.
+    """
+    waited, end = False, monotonic() + _LONGEST_WAIT
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        while (held := FileLock.acquired(path.with_suffix(".lock"))) is None and monotonic() < end:
+            waited = True
+            sleep(_PAUSE)
+    except OSError:
+        return None, waited
+    return held, waited
+
+
+@cache  # once per process
+def _remove_unused(folder: Path) -> None:
+    """Delete the entries that were not used for longest, and what killed processes left, above `_MOST_BYTES`."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        files = sorted((entry.stat().st_mtime, entry.stat().st_size, entry.path) for entry in entries)
+        size = sum(bytes_ for _, bytes_, _ in files)
+        for _, bytes_, path in files:
+            if size <= _MOST_BYTES:
+                break
+            os.unlink(path)
+            size -= bytes_
