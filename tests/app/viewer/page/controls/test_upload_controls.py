@@ -1,4 +1,4 @@
-"""Uploads to the server: only files for the button are accepted."""
+"""Uploads on the page: files become commands, or messages."""
 
 import html
 import threading
@@ -8,14 +8,13 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.controls import upload_controls
-from supple.app.viewer.controls.upload_controls import body_name
+from supple.app.viewer.controls.plain_markdown import plain
+from supple.app.viewer.controls.upload_controls import body_name, printable_name
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import AddMesh
-from supple.app.viewer.server.plain_markdown import plain
-from supple.app.viewer.server.uploads.transfers import printable_name
 from supple.errors import MeshError
 
-PART = limits.UPLOAD_PART
+PART = 512 * 1024  # of viser's client
 
 
 @pytest.fixture
@@ -110,73 +109,23 @@ def test_an_error_in_a_file_is_displayed_and_the_page_continues(live, fake, visi
 
 
 REFUSED = {
-    "another format": ({"filename": "ball.exe"}, "give a surface as"),
-    "no format": ({"filename": "ball"}, "give a surface as"),
-    "nothing": ({"size_bytes": 0, "part_count": 0}, "empty"),
-    "less than nothing": ({"size_bytes": -5, "part_count": 0}, "empty"),
-    "too large": ({"size_bytes": limits.LARGEST_UPLOAD + 1, "part_count": 33}, "the limit is 16 MiB"),
-    "other parts": ({"part_count": 2}, "parts"),
-    "parts without end": ({"part_count": 2**40}, "parts"),
+    "another format": ("ball.exe", b"abc", "give a surface as"),
+    "no format": ("ball", b"abc", "give a surface as"),
+    "nothing": ("ball.stl", b"", "empty"),
+    "too large": ("ball.stl", bytes(limits.LARGEST_UPLOAD + 1), "the limit is 16 MiB"),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_announcements_are_checked(live, fake, visitor, meshed, heard, until, name):
-    changes, text = REFUSED[name]
-    announce(visitor, live, b"abc", **changes)
+def test_files_are_checked(live, fake, visitor, meshed, heard, until, name):
+    file, content, text = REFUSED[name]
+    announce(visitor, live, content, file)
+    for k in range(-(-len(content) // PART)):
+        give(visitor, live, content, k)
     until(lambda: heard and text in heard[0])
-    give(visitor, live, b"abc")  # further parts are ignored
     visitor.press(live.panel.time.play)
     until(lambda: fake.received)
     assert meshed == []
-
-
-@pytest.mark.parametrize("changes", [{"part_index": 1}, {"content": b"abcd"}, {"content": b""}, {"part_index": -1}])
-def test_invalid_parts_end_the_transfer(live, fake, visitor, meshed, heard, until, changes):
-    announce(visitor, live, b"abc")
-    give(visitor, live, **{"content": b"abc"} | changes)
-    until(lambda: heard and "damaged" in heard[0])
-    give(visitor, live, b"abc")
-    visitor.press(live.panel.time.play)
-    until(lambda: fake.received)
-    assert meshed == []
-
-
-def test_other_inputs_accept_no_files_and_nothing_is_kept(live, server, fake, visitor, meshed, until):
-    speed = live.panel.time.speed.handle
-    announce(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
-    give(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
-    for k in range(100):
-        announce(visitor, live, b"abc", transfer_uuid=f"{k}")
-    visitor.press(live.panel.time.play)
-    until(lambda: fake.received)
-    assert speed.value == 0.0  # a power of ten
-    assert server.gui._current_file_upload_states == {}
-    assert len(live.panel.upload.transfers._running) == 1
-    # It ends with its visitor.
-    visitor.leave()
-    until(lambda: not live.panel.upload.transfers._running)
-    assert meshed == []
-
-
-def test_the_number_of_simultaneous_uploads_is_limited(live, server, visit, meshed, until, monkeypatch):
-    monkeypatch.setattr(limits, "MOST_UPLOADS", 2)
-    visitors = [visit(server.get_port()) for _ in range(3)]
-    until(lambda: len(server.get_clients()) == 3)
-    texts = []
-    for client in server.get_clients().values():
-        monkeypatch.setattr(client, "add_notification", lambda title, text, **_: texts.append(text))
-    for visitor in visitors:
-        announce(visitor, live, b"abc")
-    until(lambda: texts)
-    assert "2 files are being uploaded already" in texts[0]
-    # A transfer without progress is given up.
-    monkeypatch.setattr(limits, "UPLOAD_TIMEOUT", -1.0)
-    announce(visitors[2], live, b"abc")
-    give(visitors[2], live, b"abc")
-    until(lambda: meshed)
-    for visitor in visitors:
-        visitor.leave()
 
 
 def test_closing_the_page_stops_an_upload(live, visitor, until, monkeypatch):

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, sequential
-from supple.app.viewer.controls.inputs.pending import PendingValue
-from supple.app.viewer.controls.inputs.unit_slider import Scale, UnitSlider
+from supple.app.viewer.controls.pending import PendingValue
+from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
 from supple.app.viewer.protocol.commands import SetParameter
 from supple.app.viewer.protocol.parameters import PARAMETERS, Parameter, Value
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.app.viewer import upload_worker as worker
 from supple.app.viewer.protocol import limits
-from supple.app.viewer.server.uploads import worker
-from supple.app.viewer.server.uploads.meshing import Upload, mesh_of_upload
+from supple.app.viewer.uploads import Upload, mesh_of_upload
 from supple.errors import MeshError, MeshingError, SuppleError
 from supple.mesh.primitives.surfaces import sphere_surface
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.viewer.protocol import limits
-from supple.app.viewer.server.uploads.worker import ANSWER, JOB, MESH
+from supple.app.viewer.upload_worker import ANSWER, JOB, MESH
 from supple.errors import MeshError, MeshingError
 
 # Time between two checks of the child [s].
@@ -92,7 +92,7 @@ def _run(folder: Path, progress: Callable[[float], None], stop: threading.Event)
     }
     with (folder / "output.txt").open("wb") as output:
         child = subprocess.Popen(
-            [sys.executable, "-P", "-m", "supple.app.viewer.server.uploads.worker"],
+            [sys.executable, "-P", "-m", "supple.app.viewer.upload_worker"],
             cwd=folder,
             env=environment,
             stdin=subprocess.PIPE,

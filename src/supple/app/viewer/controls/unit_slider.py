@@ -1,7 +1,8 @@
-"""A slider for a value with a unit, which is also displayed as text, and can be typed: "30 kPa"."""
+"""A slider for a value with a unit, and the value as text, which can be typed: "30 kPa"."""
 
 from __future__ import annotations
 
+import asyncio
 import math
 import threading
 from collections.abc import Callable
@@ -10,11 +11,12 @@ from typing import Any
 
 from supple.app.viewer.controls.controller import notify, sequential
 from supple.app.viewer.protocol.quantities import WITH_PREFIX, typed, written
-from supple.app.viewer.server.browser_values import number
 from supple.errors import CommandError
 
 # The smallest power of ten of a slider whose left end is zero.
 _LEAST_POWER = -12.0
+# A browser sends every letter that is typed: a text counts when no other one follows within this time [s].
+_TYPING = 0.8
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,8 @@ class Scale:
             return int(value) if self.whole else value
         return max(_LEAST_POWER, math.log10(value)) if value > 0.0 else _LEAST_POWER
 
-    def value(self, position: object) -> float:
-        """The value at a position, from the browser."""
-        left, right = self.position(self.low), self.position(self.high)
-        at = number(position, left, right)
+    def value(self, at: float) -> float:
+        """The value at a position."""
         if not self.logarithmic:
             return round(at) if self.whole else at
         if self.low == 0.0 and at <= _LEAST_POWER:
@@ -64,7 +64,7 @@ class Scale:
 
 
 class UnitSlider:
-    """A slider, and its value as text, which `server/page/page.js` draws in place of the slider's number.
+    """A slider, and below it its value as text.
 
     Parameters
     ----------
@@ -80,12 +80,14 @@ class UnitSlider:
         value: float,
         *,
         hint: str,
-        changed: Callable[[Any, float], object],
+        changed: Callable[[Any, float], object] = lambda client, value: None,
         visible: bool = True,
     ) -> None:
-        self._name, self.scale, self.value, self._changed = label, scale, value, changed
+        self._name, self.scale, self._value, self._changed = label, scale, value, changed
         self._lock, self._removed = threading.RLock(), False
-        # There is little space below a slider: units that take no prefix are only beside it.
+        self._typing: asyncio.TimerHandle | None = None
+        self._who: Any = None  # types
+        # There is little space below a slider: units that take no prefix are only in the text.
         unit = scale.unit if scale.unit in WITH_PREFIX else ""
         ends = tuple(
             (
@@ -104,17 +106,32 @@ class UnitSlider:
             hint=hint,
             visible=visible,
         )
-        self.text = gui.add_text(f"beside {self.handle._impl.uuid}", written(value, scale.unit), visible=False)
+        self.text = gui.add_text("", written(value, scale.unit), hint=hint, visible=visible)
         self.handle.on_update(sequential(self._moved))
         self.text.on_update(sequential(self._typed))
 
+    @property
+    def value(self) -> float:
+        """The value; a text that is being typed counts."""
+        self._settle()
+        return self._value
+
     def show(self, value: float) -> None:
-        """Set slider and text."""
+        """Set slider and text, unless a visitor is typing."""
         with self._lock:
-            if not self._removed:
-                self.value = value
+            if not self._removed and self._typing is None:
+                self._value = value
                 self.handle.value = self.scale.position(value)
                 self._write()
+
+    @property
+    def visible(self) -> bool:
+        """Whether the panel displays both."""
+        return self.handle.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        self.handle.visible = self.text.visible = visible
 
     def remove(self) -> None:
         """Remove both from the panel."""
@@ -129,7 +146,7 @@ class UnitSlider:
         with self._lock:
             if self._removed:
                 return
-            self.value = value = self.scale.value(self.handle.value)
+            self._value = value = self.scale.value(self.handle.value)
             self._write()
         # Without the lock: what reacts has locks of its own.
         self._changed(event.client, value)
@@ -137,14 +154,26 @@ class UnitSlider:
     def _typed(self, event: Any) -> None:
         if event.client is None:
             return
-        try:
-            value = self._value_of(str(self.text.value))
-        except CommandError as error:
-            notify(event.client, "Not done", str(error))
-            self.show(self.value)
-        else:
-            self.show(value)
-            self._changed(event.client, value)
+        with self._lock:
+            if self._typing is not None:
+                self._typing.cancel()
+            self._typing, self._who = asyncio.get_running_loop().call_later(_TYPING, self._settle), event.client
+
+    def _settle(self) -> None:
+        """A text that was being typed is complete."""
+        with self._lock:
+            typing, self._typing = self._typing, None
+            if typing is None or self._removed:
+                return
+            typing.cancel()
+            try:
+                value = self._value_of(str(self.text.value))
+            except CommandError as error:
+                notify(self._who, "Not done", str(error))
+                value = None
+            self.show(self._value if value is None else value)
+        if value is not None:
+            self._changed(self._who, value)
 
     def _value_of(self, text: str) -> float:
         scale = self.scale
@@ -157,6 +186,6 @@ class UnitSlider:
         return int(value) if scale.whole else value
 
     def _write(self) -> None:
-        text = written(self.value, self.scale.unit)
+        text = written(self._value, self.scale.unit)
         if self.text.value != text:
             self.text.value = text
