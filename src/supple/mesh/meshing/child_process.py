@@ -167,7 +167,7 @@ def _run_child(mesher: str, folder: Path, limits: Limits) -> tuple[int, int]:
                     raise MesherFailure(
                         "time",
                         f"{mesher} was stopped at the time limit of {limits.time:g} s; ask for fewer tets "
-                        f"({option('tets', DEFAULT_TETS)}, which also reduces the surface; a larger "
+                        f"({option('tets')}, which also reduces the surface; a larger "
                         f"{option('quality')}, no {option('min_dihedral')}) or raise {option('time_limit')}",
                     )
         finally:

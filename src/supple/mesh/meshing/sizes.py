@@ -88,9 +88,7 @@ def fill_with_count(
     volume : of the surface, about [m^3]
     """
     fewest = max(_FEWEST_TRIANGLES, count // TETS_OF_TRIANGLE)
-    used, best = surface, None
-    if reduce is not None and _LEAST_OF_TRIANGLE * len(surface.triangles) > (1.0 + COUNT_TOLERANCE) * count:
-        used = _reduced(surface, fewest, reduce)
+    used, best = surface if reduce is None else coarse_enough(surface, count, reduce), None
     for left in reversed(range(_MOST_SURFACES)):
         filled, now = used, len(used.triangles)
         logger.info("filling %d triangles with about %d tets", now, count)
@@ -124,6 +122,13 @@ def fill_with_count(
     numbers = len(mesh.tets), count, len(used.triangles)
     logger.warning("%d tets instead of %d: the surface of %d triangles needs so many%s", *numbers, remedy)
     return best
+
+
+def coarse_enough(surface: SurfaceMesh, count: int, reduce: Callable[[SurfaceMesh, int], SurfaceMesh]) -> SurfaceMesh:
+    """The surface, reduced where its triangles certainly need more tets than `count`."""
+    if _LEAST_OF_TRIANGLE * len(surface.triangles) <= (1.0 + COUNT_TOLERANCE) * count:
+        return surface
+    return _reduced(surface, max(_FEWEST_TRIANGLES, count // TETS_OF_TRIANGLE), reduce)
 
 
 def _reduced(surface: SurfaceMesh, triangles: int, reduce: Callable[[SurfaceMesh, int], SurfaceMesh]) -> SurfaceMesh:

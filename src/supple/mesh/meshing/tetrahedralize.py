@@ -231,12 +231,13 @@ def tetrahedralize_reported(
         volume = max(enclosed, 1e-3 * float(np.prod(high - low)))
         if chosen == "tetgen" or reducing is None:
             return fill_with_count(surface, tets, make, reducing, volume)
-        logger.info("filling %d triangles with about %d tets by fTetWild", len(surface.triangles), tets)
-        mesh = mesh_with_count(lambda bound: make(surface, bound), tets, volume)
+        coarse = coarse_enough(surface, tets, reducing)
+        logger.info("filling %d triangles with about %d tets by fTetWild", len(coarse.triangles), tets)
+        mesh = make(coarse, 2.0 * volume / tets)
         boundary = mesh.surface.compact()
-        if len(mesh.tets) <= (1.0 + COUNT_TOLERANCE) * tets or not boundary.check().ok:
-            return mesh, surface
-        # fTetWild resolves what it moves the surface by. Its boundary is clean, and can be reduced.
+        if abs(len(mesh.tets) - tets) <= COUNT_TOLERANCE * tets or not boundary.check().ok:
+            return mesh, coarse
+        # A run of fTetWild can take a minute, and it resolves how far it moves the surface. Its boundary is clean.
         logger.info("%d tets instead of %d by fTetWild; filling its boundary again", len(mesh.tets), tets)
         chosen = "tetgen"
         return fill_with_count(boundary, tets, make, reducing, volume)
