@@ -98,7 +98,10 @@ def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> N
         (["ball.stl", "-o", "b.node", "--max-volume", "-1"], "--max-volume must be"),
         (["ball.stl", "-o", "b.node", "--tets", "0"], "tets must be"),
         (["ball.stl", "-o", "b.node", "--edge", "nan"], "edge must be"),
-        (["ball.stl", "-o", "b.node", "--edge", "0.1", "--tets", "9"], "give only one of --max-volume, --edge and --tets"),
+        (
+            ["ball.stl", "-o", "b.node", "--edge", "0.1", "--tets", "9"],
+            "give only one of --max-volume, --edge and --tets",
+        ),
         (["ball.stl", "-o", "b.node", "--scale", "0"], "scale must be"),
         (["ball.stl", "-o", "b.node", "--memory-limit", "0"], "memory limit must be"),
         (["ball.stl", "-o", "b.node", "--time-limit", "nan"], "--time-limit must be"),

@@ -16,8 +16,8 @@ from supple.mesh.meshing.repair import RepairReport, repair_surface
 from supple.mesh.meshing.sizes import (
     COUNT_TOLERANCE,
     TETS_OF_BOUND,
+    coarse_enough,
     fill_with_count,
-    mesh_with_count,
     refuse_too_many,
     volume_of_edge,
     warn_of_many,
