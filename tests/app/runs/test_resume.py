@@ -222,7 +222,7 @@ def test_a_folder_without_a_run_is_refused(tmp_path):
         ("[]", "is damaged"),
         ("{}", "is damaged"),
         ('{"format": 1}', "is damaged"),
-        ('{"format": 2}', "newer Supple"),
+        ('{"format": 2}', "another version; simulate it again"),
         ("[" * 100_000, "is damaged"),
         ("\0\xff", "is damaged"),
     ],
