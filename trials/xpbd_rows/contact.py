@@ -14,16 +14,16 @@ from supple.solvers.xpbd.assessment.findings import tangled_bodies
 from supple.solvers.xpbd.contact.response_rates import response_rates
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.integration import update_velocities
-from supple.solvers.xpbd.rows import admit as guarantee
-from supple.solvers.xpbd.rows import tets as volumes
-from supple.solvers.xpbd.rows.admit import Cuts, Marks
-from supple.solvers.xpbd.rows.lists import Lists
-from supple.solvers.xpbd.rows.rows import Rows, detect, is_last_shape, no_walls
-from supple.solvers.xpbd.rows.shapes import RowShapes, Walls
-from supple.solvers.xpbd.rows.solve import keep_impulses, push_kept, solve
-from supple.solvers.xpbd.rows.surface import row_surface
-from supple.solvers.xpbd.rows.tets import Tets
 from supple.solvers.xpbd.workspace import XPBDWorkspace
+from trials.xpbd_rows import admit as guarantee
+from trials.xpbd_rows import tets as volumes
+from trials.xpbd_rows.admit import Cuts, Marks
+from trials.xpbd_rows.lists import Lists
+from trials.xpbd_rows.rows import Rows, detect, is_last_shape, no_walls
+from trials.xpbd_rows.shapes import RowShapes, Walls
+from trials.xpbd_rows.solve import keep_impulses, push_kept, solve
+from trials.xpbd_rows.surface import row_surface
+from trials.xpbd_rows.tets import Tets
 
 # Of the mean edge: the gap between surfaces; of the gap: that from simple shapes, and how far nodes may go beyond what
 # was expected of them when rows were found.

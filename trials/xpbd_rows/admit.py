@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.rigid.motion import solve_symmetric
-from supple.solvers.xpbd.rows.pairs import POINT, SHAPE, along
-from supple.solvers.xpbd.rows.tets import determinant, least_J, share_of_tet
+from trials.xpbd_rows.pairs import POINT, SHAPE, along
+from trials.xpbd_rows.tets import determinant, least_J, share_of_tet
 
 # Of the gap: a distance below this may not become smaller in a substep.
 NEAREST = 0.02

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from supple.numerics.mat3 import dot, row
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.rows.pairs import SHAPE, Pairs, along, is_loaded, room_between, weights_of
-from supple.solvers.xpbd.rows.shapes import Walls
+from trials.xpbd_rows.pairs import SHAPE, Pairs, along, is_loaded, room_between, weights_of
+from trials.xpbd_rows.shapes import Walls
 
 
 class Rows(NamedTuple):

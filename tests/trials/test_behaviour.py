@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from trials.xpbd_rows.solver import RowsXPBD
 
 import supple as sp
 from supple.mesh import shapes
 from supple.solvers.xpbd.assessment.surfaces import SurfaceCheck, crossings
 from supple.solvers.xpbd.contact.collisions import mean_edge_length
-from supple.solvers.xpbd.rows.solver import RowsXPBD
 
 SLOPE = np.arctan(0.5)
 

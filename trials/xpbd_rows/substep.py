@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
 from supple.solvers.xpbd.integration import hold, predict, update_velocities
-from supple.solvers.xpbd.rows.contact import RowContact
 from supple.solvers.xpbd.workspace import XPBDWorkspace
+from trials.xpbd_rows.contact import RowContact
 
 
 def substep(ws: XPBDWorkspace, contact: RowContact, damping: Damping | None, targets, time: float, h: float) -> None:

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.rows.pairs import SHAPE, Pairs, describe_pairs, near_pairs
-from supple.solvers.xpbd.rows.search import PatchSearch
-from supple.solvers.xpbd.rows.shapes import RowShapes
-from supple.solvers.xpbd.rows.surface import RowSurface
+from trials.xpbd_rows.pairs import SHAPE, Pairs, describe_pairs, near_pairs
+from trials.xpbd_rows.search import PatchSearch
+from trials.xpbd_rows.shapes import RowShapes
+from trials.xpbd_rows.surface import RowSurface
 
 # Of the mean edge: how far nodes may leave their expected places; and the share of it from which lists are renewed
 # before a substep rather than after it, and from which a node is searched together with those that must be.

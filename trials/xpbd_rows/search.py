@@ -16,7 +16,7 @@ from supple.contact.mesh.distances import edge_edge_square, point_triangle_squar
 from supple.numerics.adjacency import in_list
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.rows.surface import RowSurface
+from trials.xpbd_rows.surface import RowSurface
 
 # Points and edges of a patch of 16 triangles, at most.
 _SCRATCH = 64

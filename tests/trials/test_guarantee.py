@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from trials.xpbd_rows import contact as rows_contact
+from trials.xpbd_rows.contact import RowContact
+from trials.xpbd_rows.solver import RowsXPBD
 
 import supple as sp
 from supple.mesh import shapes
-from supple.solvers.xpbd.rows import contact as rows_contact
-from supple.solvers.xpbd.rows.contact import RowContact
-from supple.solvers.xpbd.rows.solver import RowsXPBD
 
 FLOOR = sp.HalfSpace(name="floor", friction=0.5)
 

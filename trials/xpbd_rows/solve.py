@@ -13,7 +13,7 @@ import math
 
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.rows.pairs import SHAPE, is_loaded, weights_of
+from trials.xpbd_rows.pairs import SHAPE, is_loaded, weights_of
 
 
 @njit(error_model="numpy")
