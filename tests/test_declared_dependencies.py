@@ -25,7 +25,7 @@ IMPORT_NAMES = {
 }
 # Development tools that are run, or loaded by pytest; no test imports them.
 TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-xdist", "ruff"}
-OWN = {"supple", "tests", "benchmarks"}
+OWN = {"supple", "tests", "benchmarks", "trials"}
 
 
 def imported_packages(folder):
