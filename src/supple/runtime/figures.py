@@ -24,7 +24,7 @@ _LETTERS_OF_INCH, _LETTERS_OF_HANDLE, _LONGEST = 16.0, 5, 28
 _LEGEND_DROP = 31.0
 # An axis whose ends have at least this ratio is logarithmic.
 _LOGARITHMIC = 50.0
-_STYLE: dict[str, Any] = {
+_STYLE: Any = {  # of types that only the stubs of matplotlib have
     "font.family": ["STIXGeneral", "DejaVu Serif"],
     "mathtext.fontset": "stix",
     "font.size": 11.0,
