@@ -8,7 +8,6 @@ from benchmarks import (
     hanging_beam,
     implicit_scaling,
     live,
-    live_page,
     projections,
     quadratic_tets,
     reading_fields,
@@ -37,4 +36,3 @@ if __name__ == "__main__":
     rigid_bodies.run()
     rigid_heap.run()
     live.run()
-    live_page.run()

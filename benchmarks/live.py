@@ -20,7 +20,7 @@ from typing import Any
 import supple as sp
 from benchmarks.published import publish
 from benchmarks.table import circumstances
-from supple.app.viewer.app import Address, opened_page
+from supple.app.viewer.app import opened_page
 from supple.app.viewer.engine.engine import Engine
 from supple.app.viewer.protocol.commands import Play, Reset, Step
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -104,7 +104,7 @@ def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: 
     """Run all programs alternately and print their times [ms/frame]; returns the figures."""
     live = source(edge_length)
     at_start = circumstances()
-    with Engine(live) as engine, opened_page(live, Address(port=0)) as page, listening(page.url):
+    with Engine(live) as engine, opened_page(live, 0) as page, listening(page.url):
         behind_page = page.content.controller.simulation
         assert isinstance(behind_page, Engine)
         programs: dict[str, Callable[[], float]] = {

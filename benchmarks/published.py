@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.latency import live_page_text
 from benchmarks.measuring import ROOT
 from benchmarks.table import table_text
 from benchmarks.tables import live_text, reading_text, rigid_bodies_text
@@ -26,7 +25,6 @@ class Shown(NamedTuple):
 
 # By the name between the marks, which is that of the file.
 SHOWN = {
-    "live_page": Shown("reference/live_page.md", live_page_text),
     "live": Shown("validation/benchmarks.md", live_text),
     "rigid_bodies": Shown("validation/benchmarks.md", rigid_bodies_text),
     "reading_fields": Shown("reference/forces_and_stresses.md", reading_text),

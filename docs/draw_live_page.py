@@ -12,7 +12,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import supple as sp
-from supple.app.viewer.app import Address, opened_page
+from supple.app.viewer.app import opened_page
 from supple.app.viewer.protocol.commands import Grab, ReleaseGrab, Reset, SetParameter, Step
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.mesh.primitives.surfaces import torus_surface
@@ -121,7 +121,7 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS.split())
         for draw in (draw_live, draw_file):
-            with opened_page(scene(), Address(port=0)) as page:
+            with opened_page(scene(), 0) as page:
                 tab = browser.new_page(viewport=SIZE)
                 tab.set_default_timeout(120_000)
                 tab.goto(page.url)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from benchmarks import published
-from benchmarks.latency import PARTS, STAGES, summary
 from benchmarks.table import Table, table_text
 
 ROOT = Path(__file__).parents[1]
@@ -87,26 +86,16 @@ def test_rows_become_a_table(capsys):
 
 
 def test_figures_become_tables(monkeypatch, tmp_path):
-    both = {"median_ms": 1.25, "p95_ms": 2.5}
-    events = [dict.fromkeys(STAGES, 1.0), dict.fromkeys(STAGES, 1.0) | {"sent": 51.0}]
-    found = summary(events)
-    assert (found["median_ms"], found["slow"]) == (32.0, {"sent": 1})
-    assert sorted(name for _, names in PARTS.values() for name in names) == sorted(STAGES)  # each stage counts once
-    size = {"tets": 5760, "step_ms": 3.0, "paused_percent": 0.5, "unwatched_percent": 0.5, "stages": {}} | found
-    size["stages"] = dict.fromkeys(STAGES, both)
-    blocks = {"median_fps": 12.0, "tets": 2000, "contacts": 80.0}
-    figures: dict = {"date": "2026-01-31", "load": 0.1, "load_after": 1.2, "sizes": [size, size], "implicit": blocks}
     monkeypatch.setattr(published, "DOCS", tmp_path)
-    page = tmp_path / "reference" / "live_page.md"
+    page = tmp_path / "validation" / "benchmarks.md"
     page.parent.mkdir()
-    page.write_text("before\n<!-- figures: live_page -->\nold\n<!-- end of figures -->\nafter\n", encoding="utf-8")
-    published.publish("live_page", figures)
+    page.write_text("before\n<!-- figures: startup -->\nold\n<!-- end of figures -->\nafter\n", encoding="utf-8")
+    table = Table("startup", {"name": "", "s": ".2f"}, threads=1)
+    table.add("import", 0.5)
+    published.publish("startup", table.figures())
     text = page.read_text(encoding="utf-8")
-    assert "| a step | 3.0 ms | 3.0 ms |" in text
-    assert "load 0.1 before and 1.2 after" in text
-    assert "steps a second | 12 |  |" in text
-    assert "| ours: event at the server to mesh written to the browser | 4.0 / 4.0 | 4.0 / 4.0 |" in text
+    assert text.startswith("before\n")
+    assert text.endswith("after\n")
+    assert "| import | 0.50 |" in text
     assert "old" not in text
-    assert published.with_table(text, "live_page") == text
-    published.publish("live_page", figures | {"sizes": [size], "implicit": None})  # as where a part took too long
-    assert "| a step | 3.0 ms |\n" in page.read_text(encoding="utf-8")
+    assert published.with_table(text, "startup") == text

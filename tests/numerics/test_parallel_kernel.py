@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from supple.runtime import parallel_kernel
-from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import ROWS, njit, prange
 from supple.runtime.threads import numba_threads
 
 
@@ -28,8 +28,8 @@ def twice(x, out):
 
 @pytest.mark.parametrize("kernel", [squares, twice])
 def test_both_forms_have_the_same_bits(kernel):
-    x = np.random.default_rng(1).normal(size=1000)
-    results = [np.zeros(1000) for _ in range(3)]
+    x = np.random.default_rng(1).normal(size=ROWS)
+    results = [np.zeros(ROWS) for _ in range(3)]
     kernel(x, results[0])
     kernel.serial(x, results[1])
     kernel.parallel(x, results[2])
@@ -48,14 +48,16 @@ def calls_of(monkeypatch, kernel):
 
 def test_which_form_is_called(monkeypatch):
     called = calls_of(monkeypatch, squares)
-    squares()
+    large = np.zeros(ROWS)
+    squares(large, large)
     with numba_threads(1):
-        squares()
+        squares(large, large)
     with parallel_kernel._threads.lock:  # another Python thread is in a parallel kernel
-        squares()
-    squares()
+        squares(large, large)
+    squares(2, (large[1:], (large, 1.0)))
+    squares(large[1:], (large[1:], 1.0))  # too few rows
     usual = "parallel" if numba.get_num_threads() > 1 else "serial"
-    assert called == [usual, "serial", "serial", usual]
+    assert called == [usual, "serial", "serial", usual, "serial"]
 
 
 def test_the_lock_is_released_after_an_error(monkeypatch):

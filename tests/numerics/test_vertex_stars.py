@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from supple.mesh import shapes
-from supple.numerics.geometry.triangle_crossings import triangles_meet
+from supple.numerics.geometry.exact_crossings import triangles_meet
 from supple.numerics.geometry.vertex_stars import simple_stars
 
 

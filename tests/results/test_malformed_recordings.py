@@ -57,8 +57,11 @@ def _delete(path):
     return change
 
 
-def _newer(file):
-    file["supple"].attrs["format_version"] = 99
+def _of_format(version):
+    def change(file):
+        file["supple"].attrs["format_version"] = version
+
+    return change
 
 
 def _swap_bodies(file):
@@ -96,8 +99,9 @@ DAMAGES = {
     "points of text": (_set("VTKHDF/Points", "here"), "has shape"),
     "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),
     "times are not finite": (_set("supple/frames/time", np.full(25, np.nan)), "time is not finite"),
-    "unknown status": (_set("supple/frames/status", np.full(25, len(Status), dtype=np.uint8)), "newer Supple"),
-    "newer format": (_newer, "format 99, this one reads 2"),
+    "unknown status": (_set("supple/frames/status", np.full(25, len(Status), dtype=np.uint8)), "another version"),
+    "newer format": (_of_format(99), "another version (format 99, this one reads 3); simulate it again"),
+    "earlier format": (_of_format(2), "another version (format 2, this one reads 3); simulate it again"),
     "another program's": (_delete("supple"), "a VTKHDF UnstructuredGrid of another program"),
 }
 

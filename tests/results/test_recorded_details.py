@@ -129,7 +129,7 @@ def _retype(details):
 DAMAGES = {
     "unknown kind": (_described(lambda details: details.update(kind="os.system")), "are not described"),
     "no fields": (_described(lambda details: details.pop("fields")), "are not described"),
-    "unknown field": (_described(_rename), "newer Supple"),
+    "unknown field": (_described(_rename), "another version"),
     "unknown type": (_described(_retype), "are not described"),
     "no mapping": (lambda header: header.update(details=3), "are not described"),
 }
@@ -148,20 +148,3 @@ def test_a_damaged_description_is_one_line(tmp_path, tools, damage):
     with pytest.raises(OutputError, match=text) as caught:
         read_recording(path)
     assert "\n" not in str(caught.value)
-
-
-def test_recordings_without_details_and_messages_are_read(tmp_path, tools):
-    """As version 0.1 wrote them."""
-    path = tmp_path / "r.vtkhdf"
-    tools.record(path, 3, moved_by=tools.Prescribed(message="unseen"))
-    with h5py.File(path, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        del header["details"], file["supple/header"], file["supple/frames/details"], file["supple/frames/message"]
-        file["supple/header"] = json.dumps(header)
-        file["supple"].attrs["format_version"] = 1
-    copied = sp.export(path, "vtkhdf", tmp_path / "small.vtkhdf")
-    for opened in (path, copied):
-        with read_recording(opened) as recording:
-            assert recording[2].report.details == SolverDetails()
-            assert recording[2].report.message == ""
-            assert recording[2].report.min_distance == 0.5

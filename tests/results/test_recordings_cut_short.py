@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import h5py
 import numpy as np
 import pytest
 
@@ -86,26 +85,21 @@ def test_the_recording_of_a_killed_writer_holds_every_complete_frame(tmp_path, t
                 assert frame.report.status == Status.CONVERGED
             np.testing.assert_allclose(recording.times, np.arange(len(recording)) / 30, atol=1e-9)
             last = recording[-1].state.positions
+        # What `supple export --to vtkhdf` repairs, VTK reads with all frames.
+        copy = export(path, "vtkhdf", path.with_name(f"repaired-{path.name}"))
         reader = vtk.vtkHDFReader()
-        reader.SetFileName(str(path))
+        reader.SetFileName(str(copy))
         reader.UpdateInformation()
-        # NSteps is written after our count, and the lengths of the series after it: after a kill between them, VTK does
-        # not see the last frame.
-        assert reader.GetNumberOfSteps() in (counts[-1], counts[-1] - 1)
-        with h5py.File(path) as file:
-            length = min(len(file["VTKHDF/Steps"][name]) for name in ("PartOffsets", "PointOffsets", "NumberOfParts"))
-            length = min(length, len(file["VTKHDF/Steps/CellDataOffsets/det_F"]), len(file["VTKHDF/Steps/Values"]))
-        assert length in (counts[-1], counts[-1] - 1)
-        if reader.GetNumberOfSteps() == length == counts[-1]:
-            reader.SetStep(counts[-1] - 1)
-            reader.Update()
-            np.testing.assert_array_equal(to_numpy(reader.GetOutput().GetPoints().GetData()), last)
+        assert reader.GetNumberOfSteps() == counts[-1]
+        reader.SetStep(counts[-1] - 1)
+        reader.Update()
+        np.testing.assert_array_equal(to_numpy(reader.GetOutput().GetPoints().GetData()), last)
     assert len(counts) > 14
     assert max(counts) > 8  # some files were copied to larger ones twice
 
 
 def test_the_file_is_valid_before_every_single_write(tmp_path, tools, monkeypatch):
-    """Before each single write to the file, its contents are valid for us and for VTK."""
+    """Before each single write to the file, its contents are valid for us, and VTK can read the first frame."""
     path = tmp_path / "cut.vtkhdf"
     vtk, _ = tools.vtk()
     seen, plain = set(), RecordingFile._write
@@ -119,15 +113,15 @@ def test_the_file_is_valid_before_every_single_write(tmp_path, tools, monkeypatc
             reader = vtk.vtkHDFReader()
             reader.SetFileName(str(path))
             reader.UpdateInformation()
-            assert reader.GetNumberOfSteps() in (len(recording), len(recording) - 1)
-            reader.SetStep(len(recording) - 2 if len(recording) > 1 else 0)
+            assert reader.GetNumberOfSteps() == 1
             reader.Update()
             assert reader.GetOutput().GetNumberOfPoints() == 54
         plain(self, place, data)
 
     monkeypatch.setattr(RecordingFile, "_write", look_before_writing)
     tools.record(path, 3)
-    assert seen == {1, 2, 3, 4}
+    assert seen == {1, 2, 3}
+    assert len(read_recording(path)) == 4
 
 
 def test_a_full_disk_is_an_error_and_earlier_frames_stay(tmp_path, tools, monkeypatch):

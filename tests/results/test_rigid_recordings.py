@@ -96,7 +96,7 @@ def test_good_recordings_pass(recorded, tmp_path):
     assert 0.0 < report["rigidity"].worst < 1e-3
     free = tmp_path / "free.vtkhdf"
     body = sp.RigidBody("free", sp.shapes.torus_surface(0.5, 0.2, 0.2), density=100.0, angular_velocity=(1, 2, 3))
-    solver = sp.Implicit(integrator="newmark")
+    solver = sp.XPBD()
     list(sp.simulate(sp.Scene([body]), solver, 0.01, 20, sinks=[sp.Recorder(free, solver=solver)]))
     report = sp.check_recording(free)
     assert report.ok, report.failures

@@ -117,19 +117,6 @@ def test_the_plot_has_energy_and_stretch_of_stitches(recorded, tmp_path, monkeyp
     assert np.array_equal(lines[STITCH_LINE][1:], [report.largest_stitch_stretch for report in reports])
 
 
-def test_a_recording_of_an_earlier_version_has_no_stitches(recorded, tmp_path):
-    path = tmp_path / "old.vtkhdf"
-    path.write_bytes(recorded[0].read_bytes())
-    with h5py.File(path, "r+") as file:
-        for name in ("supple/stitches", "supple/frames/stitch_energy", "supple/frames/largest_stitch_stretch"):
-            del file[name]
-    with sp.read_recording(path) as recording:
-        assert len(recording.stitches) == 0
-        assert recording[3].report.stitch_energy == 0.0
-        assert recording[3].report.largest_stitch_stretch is None
-    plot_recording(path, tmp_path / "plot.png")
-
-
 def test_invalid_stitches_in_a_recording_are_an_error(recorded, tmp_path):
     path = tmp_path / "broken.vtkhdf"
     path.write_bytes(recorded[0].read_bytes())

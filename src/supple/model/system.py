@@ -204,15 +204,6 @@ class System:
         """The rigid ones among the bodies."""
         return tuple(part for part in self.bodies if isinstance(part.body, RigidBody))
 
-    @cached_property
-    def linked_bodies(self) -> tuple[BodyRange, ...]:
-        """The rigid bodies with a joint, a weld or a stitch."""
-        scene = self.scene
-        names = {joint.first for joint in scene.joints} | {joint.second for joint in scene.joints}
-        names |= {weld.rigid for weld in scene.welds}
-        names |= {stitch.first for stitch in scene.stitches} | {stitch.second for stitch in scene.stitches}
-        return tuple(part for part in self.rigid_bodies if part.name in names)
-
     def split(self, values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Positions or velocities of the points, of vectors (n, 3) of the vertices: one array per body, by name."""
         if not self.rigid_bodies:

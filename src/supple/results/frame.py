@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,9 @@ from supple.results.readings.frame_readings import FrameReadings
 from supple.results.readings.joint_readings import JointReading, joint_readings
 from supple.runtime.displayed import DisplayedReport
 from supple.scene.rigid.pose import Pose, pose_of
-from supple.solvers.solver import Solver
+
+if TYPE_CHECKING:
+    from supple.solvers.solver import Solver
 
 
 @dataclass(frozen=True, eq=False, repr=False)

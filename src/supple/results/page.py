@@ -24,7 +24,8 @@ from supple.results.drawing import (
 )
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
-from supple.results.viser_server import temporary_server
+from supple.results.view.gate import new_token
+from supple.results.view.server import gated_server
 from supple.runtime.replacing import whole_file
 
 # Bytes of moving vertices before compression, which at least halves them; pages of longer recordings have fewer frames.
@@ -49,7 +50,7 @@ def write_page(
     """
     output = Path(output)
     with opened(recording) as source, whole_file(output) as fresh:
-        with temporary_server() as server:
+        with gated_server(new_token()) as server:
             page = _serialize(server, source, frames or source)
         fresh.write_text(titled(page, ", ".join(body.name for body in source.bodies)), encoding="utf-8")
     return output

@@ -20,7 +20,7 @@ import llvmlite
 import numba
 import numpy as np
 from numba import prange
-from numba.core import config
+from numba.core import config, types
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
@@ -35,6 +35,8 @@ from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
 from supple.runtime.reached_code import reached_code
 
+# Below this many rows, a loop ends before a second thread has started.
+ROWS = 2_000
 # What decides on machine code besides the kernel, its signature and the processor.
 _SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "USING_SVML")
 _COMPILER = (
@@ -51,7 +53,14 @@ KERNELS: dict[str, Dispatcher] = {}  # all kernels that are kept on disk, by nam
 __all__ = ["KERNELS", "KernelCache", "njit", "prange", "read_only"]
 
 
-def njit(function: FunctionType | None = None, *, cache: bool = False, parallel: bool = False, **options: Any) -> Any:
+def njit(
+    function: FunctionType | None = None,
+    *,
+    cache: bool = False,
+    parallel: bool = False,
+    rows: int = ROWS,
+    **options: Any,
+) -> Any:
     """Compile a function in Numba's nopython mode: `numba.njit`, with the cache of this module.
 
     A kernel runs without Python's global lock, so that threads of one process can simulate at the same time. It must
@@ -62,16 +71,17 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, parallel:
     cache : whether the machine code is kept on disk, see `KernelCache`.
     parallel : whether loops over `prange` may use several threads. The kernel is then a `ParallelKernel`, as is every
         kernel that calls one.
+    rows : the least number of rows of an array among the arguments for several threads, where it is `parallel`.
     options : as of `numba.njit`; `nogil=False` for a kernel with parts in Python.
     """
     if function is None:
-        return partial(njit, cache=cache, parallel=parallel, **options)
+        return partial(njit, cache=cache, parallel=parallel, rows=rows, **options)
     if not parallel and not _called_kernels(function):
         return _compiled(function, cache, options)
     serial = _compiled(_form(function, "serial"), cache, options)
     several = _compiled(_form(function, "parallel"), cache, {**options, "parallel": True} if parallel else options)
     # Where NUMBA_DISABLE_JIT is set, both are plain functions.
-    return ParallelKernel(function, serial, several) if isinstance(several, Dispatcher) else several
+    return ParallelKernel(function, serial, several, rows) if isinstance(several, Dispatcher) else several
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -102,6 +112,10 @@ class InnerFunction(CPUDispatcher):
 
     def __init__(self, py_func: FunctionType, locals: dict[str, Any], targetoptions: dict[str, Any]) -> None:
         super().__init__(py_func, locals, {**targetoptions, "no_cpython_wrapper": True})
+
+    def get_call_template(self, args, kws):
+        """Numba would compile a function once more for each constant, such as True, that a call passes."""
+        return super().get_call_template(tuple(map(types.unliteral, args)), kws)
 
     def __call__(self, *values: Any) -> Any:
         return self._from_python(*values)

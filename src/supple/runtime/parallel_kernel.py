@@ -9,6 +9,7 @@ from types import FunctionType
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core.dispatcher import Dispatcher
 from numba.np.ufunc.parallel import threading_layer
 
@@ -21,22 +22,25 @@ class ParallelKernel:
     The parallel form is not used
 
     - where one thread is allowed: a call into the threads costs some microseconds even then;
+    - where no argument has as many rows as pay for that. A small scene compiles no parallel form;
     - while another Python thread uses it: the layer `workqueue` of Numba ends the process that does so;
     - after a fork of a process that used GNU OpenMP: the layer `omp` ends the process.
 
     Parameters
     ----------
     function : in Python; serial, parallel : its two forms, each with a name of its own in the cache
+    rows : the least number of rows of an array among the arguments for the parallel form
 
     Source: Numba's manual, "The Threading Layers", on safety.
     """
 
-    def __init__(self, function: FunctionType, serial: Any, parallel: Any) -> None:
-        self.py_func, self.serial, self.parallel = function, serial, parallel
+    def __init__(self, function: FunctionType, serial: Any, parallel: Any, rows: int) -> None:
+        self.py_func, self.serial, self.parallel, self.rows = function, serial, parallel, rows
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        if is_alone() or not _threads.allowed() or not _threads.lock.acquire(blocking=False):
+        alone = is_alone() or not _has_rows(arguments, self.rows) or not _threads.allowed()
+        if alone or not _threads.lock.acquire(blocking=False):
             return self.serial(*arguments)
         try:
             return self.parallel(*arguments)
@@ -52,6 +56,17 @@ class ParallelKernel:
     def forms(self) -> tuple[Dispatcher, ...]:
         """The compiled functions; none where NUMBA_DISABLE_JIT is set."""
         return tuple(form for form in (self.serial, self.parallel) if isinstance(form, Dispatcher))
+
+
+def _has_rows(arguments: tuple[Any, ...], least: int) -> bool:
+    """Whether an array among some arguments, or in a tuple of them, has as many rows."""
+    for value in arguments:
+        if isinstance(value, np.ndarray):
+            if value.ndim and len(value) >= least:
+                return True
+        elif isinstance(value, tuple) and _has_rows(value, least):
+            return True
+    return False
 
 
 class _Threads:

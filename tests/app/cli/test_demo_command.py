@@ -59,7 +59,7 @@ class WithoutClaims(Measurement):
 
 
 def test_the_demos_of_the_readme_and_of_make_run_at_their_full_length():
-    """`make demo` and test_docs_programs.py run these commands and fail at an exit code above 0: all claims must hold."""
+    """`make demo` and test_docs_programs.py run these commands and fail at an exit code above 0: all claims hold."""
     root = Path(__file__).parents[3]
     text = (root / "README.md").read_text(encoding="utf-8") + (root / "Makefile").read_text(encoding="utf-8")
     commands = re.findall(r"^.*supple demo [a-z].*$", text, flags=re.M)

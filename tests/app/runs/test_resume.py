@@ -46,7 +46,7 @@ def rigid_scene():
     return sp.Scene([soft, stone.changed(position=(0, top + 0.104, 0), velocity=(0, -0.5, 0))], pins=[held])
 
 
-@pytest.mark.parametrize(("solver", "scene"), [*PAIRS, ("bdf2", "rigid"), ("newmark", "rigid")])
+@pytest.mark.parametrize(("solver", "scene"), [*PAIRS, ("bdf2", "rigid")])
 def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(out, solver, scene):
     made, used = (SCENES | {"rigid": rigid_scene})[scene], SOLVERS[solver]
     whole = list(sp.simulate(made(), used, DT, STEPS))
@@ -222,7 +222,7 @@ def test_a_folder_without_a_run_is_refused(tmp_path):
         ("[]", "is damaged"),
         ("{}", "is damaged"),
         ('{"format": 1}', "is damaged"),
-        ('{"format": 2}', "newer Supple"),
+        ('{"format": 2}', "another version; simulate it again"),
         ("[" * 100_000, "is damaged"),
         ("\0\xff", "is damaged"),
     ],

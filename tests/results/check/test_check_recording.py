@@ -71,24 +71,13 @@ def test_without_works_energy_is_judged_only_where_nothing_does_work(free, aroun
     assert report["energy"].message == "obstacles move, which does work"
 
 
-def test_a_recording_without_physics_is_read_and_unknown_checks_are_skipped(free, corrupted):
-    def age(file, n):
-        set_header(file, lambda header: header.pop("physics"))
-        del file["supple/physics"]
-
-    report = sp.check_recording(corrupted(free, age))
-    assert report.ok
-    skipped = {result.name for result in report.results if result.verdict == "skipped"}
-    assert skipped == {"obstacles", "rigidity", "welds", "joints", "momentum", "spin", "energy", "works"}
-    assert "older version" in report["energy"].message
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda header: header["physics"].update(untouching=[[0, 7]]), "does not exist"),
         (lambda header: header["physics"].update(untouching=3), "not described"),
         (lambda header: header["physics"].pop("laws"), "not described"),
+        (lambda header: header.pop("physics"), "not the expected JSON"),
         (lambda header: header["physics"].update(compliances=[]), "another number of bodies"),
     ],
 )

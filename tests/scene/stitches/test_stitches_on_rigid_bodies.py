@@ -106,13 +106,9 @@ def test_both_solvers_hang_a_cube_equally_far():
     assert ends[1] == pytest.approx(ends[0], rel=0.03)
 
 
-SOLVERS = {"xpbd": sp.XPBD(), "newmark": sp.Implicit(integrator="newmark")}
-
-
 @pytest.mark.parametrize(("rigid", "damping"), [(False, 0.0), (False, 0.02), (True, 0.01)])
 @pytest.mark.parametrize("kind", ["tets", "vertices"])
-@pytest.mark.parametrize("solver", list(SOLVERS))
-def test_a_spinning_pair_keeps_its_momenta_and_gains_no_energy(solver, kind, rigid, damping):
+def test_a_spinning_pair_keeps_its_momenta_and_gains_no_energy(kind, rigid, damping):
     first = cube(gap=-0.1, name="bar") if rigid else bar(damping=damping)
     other = cube()
     spin, center = np.array([1.0, 2.0, 5.0]), np.array([0.05, 0, 0])
@@ -120,7 +116,7 @@ def test_a_spinning_pair_keeps_its_momenta_and_gains_no_energy(solver, kind, rig
     placed = initial_state(scene)
     x = build_system(scene).split(placed.positions)
     velocities = {name: np.array([0.1, 0.0, 0.0]) + np.cross(spin, points - center) for name, points in x.items()}
-    frames = sp.simulate(scene, SOLVERS[solver], 1 / 60, 20, initial_velocities=velocities)
+    frames = sp.simulate(scene, sp.XPBD(), 1 / 60, 20, initial_velocities=velocities)
     reports = [frame.report for frame in frames]
     assert {str(report.status) for report in reports} == {"converged"}
     energies = [each.kinetic_energy + each.elastic_energy + each.stitch_energy for each in reports]

@@ -5,7 +5,6 @@ import pytest
 
 import supple as sp
 from supple.solvers.implicit.stepping import substep
-from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors
 
 
 def drop(rigid, dt, steps=40):
@@ -46,33 +45,3 @@ def test_a_smooth_motion_repeats_no_step(monkeypatch):
     scene = sp.Scene([body], pins=[sp.Pin("beam", sp.InBox((-1, -1, -1), (-0.199, 1, 1)))])
     list(sp.simulate(scene, sp.Implicit(integrator="bdf2"), 0.01, 60))
     assert judged == [False] * 59
-
-
-def test_a_rigid_body_that_surfaces_keep_from_its_rigid_pose_takes_shorter_steps():
-    """At the end of a midpoint step of 1/30 s it was strained by 7 %, with 60 times the energy of the motion."""
-    mesh = sp.shapes.box((0.025511861154691815,) * 3, (2, 2, 2))
-    material = sp.StableNeoHookean(youngs=19919.90917864041, poisson=0.3, density=2587.8943445285554)
-    rigid = sp.RigidBody(
-        "rigid",
-        mesh,
-        2587.8943,
-        position=(-0.00023395, 0.02551186, 0),
-        rotation=(-0.27749313, 0.06205159, -0.11223088),
-        velocity=(-0.59898204, -2.68087771, 0),
-        friction=0.4,
-    )
-    soft = sp.Body(
-        "soft",
-        mesh,
-        material,
-        position=(0.00368663, 0.07653558, 0),
-        rotation=(0.10182345, -0.2123844, 0.28276047),
-        velocity=(0.37375859, -2.68087771, 0),
-        friction=0.4,
-    )
-    scene = sp.Scene([rigid, soft], obstacles=[sp.HalfSpace(friction=0.3)])
-    frames = list(sp.simulate(scene, sp.Implicit(integrator="newmark"), 1 / 30, 4))
-    assert {frame.report.status for frame in frames} == {"converged"}
-    errors = [orthogonality_errors(frame.system, frame.state.positions)["rigid"] for frame in frames]
-    assert max(errors) < 1e-12
-    assert max(frame.report.elastic_energy for frame in frames) < max(frame.report.kinetic_energy for frame in frames)

@@ -5,6 +5,7 @@ import pytest
 
 import supple as sp
 from supple.contact.start.separation import separate
+from supple.errors import SolverError
 from supple.scene.rotation import rotation_matrix
 
 G = 9.81
@@ -39,59 +40,6 @@ def test_free_fall_of_backward_euler_is_exact():
     np.testing.assert_allclose(pose.translation, [0.2, -G * 1e-4 * n * (n + 1) / 2, 0.0], atol=1e-13)
     np.testing.assert_allclose(pose.velocity, [1.0, -G * 0.2, 0.0], atol=1e-11)
     assert error_of(frames) < 1e-12
-
-
-def test_a_free_body_keeps_its_momenta():
-    """The midpoint rule, in a motion that tumbles."""
-    scene = sp.Scene([rigid(shape=BOX, velocity=(1, 2, 3), angular_velocity=(1, 4, 2))], gravity=(0, 0, 0))
-    frames = run(scene, 2e-3, 250, "newmark")
-    P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
-    assert np.abs(P - P[0]).max() <= 1e-11 * np.linalg.norm(P[0])
-    assert np.abs(L - L[0]).max() <= 1e-10 * np.linalg.norm(L[0])
-    energies = np.array([f.report.kinetic_energy + f.report.elastic_energy for f in frames])
-    assert np.ptp(energies) < 1e-4 * energies[0]
-    assert error_of(frames) < 1e-13  # the ends of steps are projected
-
-
-SPIN = np.array([0.5, 10.0, 0.5])
-
-
-def changes_of_sign(times, values):
-    k = np.flatnonzero(values[1:] * values[:-1] < 0.0)
-    return times[k] + (times[k + 1] - times[k]) * values[k] / (values[k] - values[k + 1])
-
-
-def flips_of_eulers_equations(inertia, end, dt=1e-3):
-    """Runge-Kutta's method of fourth order."""
-    a, b, c = inertia
-
-    def rate(w):
-        return np.array([(b - c) * w[1] * w[2] / a, (c - a) * w[2] * w[0] / b, (a - b) * w[0] * w[1] / c])
-
-    path = [SPIN]
-    for _ in range(round(end / dt)):
-        w = path[-1]
-        k1 = rate(w)
-        k2 = rate(w + 0.5 * dt * k1)
-        k3 = rate(w + 0.5 * dt * k2)
-        path.append(w + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rate(w + dt * k3)))
-    return changes_of_sign(dt * np.arange(len(path)), np.array(path)[:, 1])
-
-
-def test_the_intermediate_axis_turns_over_when_eulers_equations_say():
-    """The Dzhanibekov effect, twice. Ends of midpoint steps mirror their beginnings: the energy does not drift."""
-    body = rigid(shape=BOX, angular_velocity=SPIN)
-    exact = flips_of_eulers_equations(np.diag(body.properties.inertia), 2.8)
-    assert len(exact) == 2
-    for dt, late, drift in ((0.02, 0.02, 5e-3), (0.01, 1e-3, 1e-4)):
-        frames = run(sp.Scene([body], gravity=(0, 0, 0)), dt, round(2.8 / dt), "newmark")
-        poses = [frame.poses["rigid"] for frame in frames]
-        along = np.array([10.0, *((pose.rotation.T @ pose.angular_velocity)[1] for pose in poses)])
-        found = changes_of_sign(dt * np.arange(len(along)), along)
-        np.testing.assert_allclose(found, exact, rtol=late)
-        energies = np.array([frame.report.kinetic_energy for frame in frames])
-        assert np.abs(energies / energies[0] - 1.0).max() < drift
-        assert error_of(frames) < 1e-13
 
 
 def test_a_dropped_cube_comes_to_rest_and_presses_with_its_weight():
@@ -192,12 +140,12 @@ def test_a_collision_keeps_momentum(other):
     """Off the center, with friction. Contact acts where bodies are at the end of a step: L is not kept exactly."""
     hit = {"position": (0.13, 0.03, 0.02), "velocity": (-1.0, 0.0, 0.0), "friction": 0.5}
     bodies = [rigid("a", friction=0.5), rigid("b", **hit) if other == "rigid" else soft("b", **hit)]
-    frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 0.005, 24, "newmark")
+    frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 0.001, 120, "bdf2")
     P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
     pushes = [np.linalg.norm(f.report.details.contact_forces["a"]) for f in frames]
     assert max(pushes) > 10.0
     assert np.abs(P - P[0]).max() <= 1e-10 * np.linalg.norm(P[0])
-    assert np.abs(L - L[0]).max() <= 5e-3 * np.linalg.norm(L[0])
+    assert np.abs(L - L[0]).max() <= 1e-2 * np.linalg.norm(L[0])
     assert frames[-1].poses["a"].velocity[0] < -0.2
 
 
@@ -289,3 +237,8 @@ def test_a_plate_pressed_on_a_soft_cube_in_equilibrium():
     np.testing.assert_allclose(details.contact_forces["plate"], up, atol=1e-6 * up[1])
     strain = (0.1 - np.ptp(frame.positions["soft"][:, 1])) / 0.1
     assert 1.0 < up[1] / (1e5 * 0.01 * strain) < 1.3
+
+
+def test_newmark_refuses_rigid_bodies():
+    with pytest.raises(SolverError, match=r"^body 'rigid': Implicit\(integrator='newmark'\) .* use 'bdf2'$"):
+        run(sp.Scene([rigid()]), 0.01, 1, "newmark")

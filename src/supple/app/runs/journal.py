@@ -96,7 +96,7 @@ def read_journal(path: Path) -> Journal:
 
     Raises
     ------
-    OutputError : where it is missing, damaged, or of a newer version.
+    OutputError : where it is missing, damaged, or of another version.
     """
     if not path.exists():
         folder, inside = path.parent.parent, f"{path.parent.name}/{path.name}"
@@ -104,7 +104,7 @@ def read_journal(path: Path) -> Journal:
     try:
         text = path.read_bytes()
         if json.loads(text)["format"] != _FORMAT:
-            raise OutputError(f"{path}: was written by a newer Supple; update this one")
+            raise OutputError(f"{path}: was written by another version; simulate it again")
         return TypeAdapter(Journal).validate_json(text, strict=True)
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {error.strerror or error}") from None

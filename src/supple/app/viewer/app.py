@@ -1,14 +1,13 @@
-"""The page: a server that displays a live simulation, or a recording, in browsers."""
+"""The page: a server that displays a live simulation, or a recording, in browsers of this machine."""
 
 from __future__ import annotations
 
 import html
-import socket
 import threading
 import webbrowser
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,27 +17,12 @@ from supple.app.viewer.engine.engine import Engine
 from supple.app.viewer.live_page import LivePage
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.app.viewer.replay import Replay
-from supple.app.viewer.server.gate import gate, new_token, require_free_port
-from supple.app.viewer.server.input_check import guard_inputs
-from supple.app.viewer.server.page.served_page import ServedPage
-from supple.app.viewer.server.uploads.transfers import refuse_transfers
+from supple.app.viewer.theme import set_theme
 from supple.results.recording.reader import read_recording
-from supple.results.viser_server import start_server, stop_server
+from supple.results.view.gate import new_token
+from supple.results.view.server import gated_server, require_free_port
 
-
-@dataclass(frozen=True)
-class Address:
-    """Where the page is served.
-
-    Attributes
-    ----------
-    host, port : of the server; port 0 selects any free port
-    token : the address must contain it (`?token=...`); None where every program of this machine may use the page
-    """
-
-    host: str = "127.0.0.1"
-    port: int = 8080
-    token: str | None = field(default_factory=new_token)
+DEFAULT_PORT = 8080
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +41,19 @@ class OpenPage:
 
 
 @contextmanager
-def opened_page(source: LiveSource | str | Path, address: Address | None = None) -> Iterator[OpenPage]:
+def opened_page(source: LiveSource | str | Path, port: int | None = None) -> Iterator[OpenPage]:
     """Serve a live scene, or the recording at a path, within a block.
+
+    Parameters
+    ----------
+    port : 0 takes any free port; None takes 8080, or the next free one
 
     Raises
     ------
     SceneError, SolverError, OutputError : where the source cannot be simulated or read, or the port is not free.
     """
-    address = Address() if address is None else address
+    if port is not None:
+        require_free_port(port)
     with ExitStack() as ends:
         if isinstance(source, LiveSource):
             engine = ends.enter_context(Engine(source))
@@ -73,16 +62,12 @@ def opened_page(source: LiveSource | str | Path, address: Address | None = None)
             draw = partial(LivePage, simulation=engine, first=first)
         else:
             draw = partial(Replay, recording=ends.enter_context(read_recording(source)))
-        require_free_port(address.host, address.port)  # viser would silently use the next port
-        with gate(address.host, address.token, ServedPage(title_of(source))):
-            server = start_server(address.host, address.port)
-        ends.callback(stop_server, server)
-        configure_page(server)
+        token = new_token()
+        server = ends.enter_context(gated_server(token, DEFAULT_PORT if port is None else port))
+        configure_page(server, title_of(source))
         content = draw(server)
         ends.callback(content.stop)
-        host = socket.gethostname() if address.host in ("", "0.0.0.0", "::") else address.host
-        query = f"/?token={address.token}" if address.token else ""
-        yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, content)
+        yield OpenPage(f"http://localhost:{server.get_port()}/?token={token}", server, content)
 
 
 def title_of(source: LiveSource | str | Path) -> str:
@@ -93,14 +78,14 @@ def title_of(source: LiveSource | str | Path) -> str:
     return path.name if path.is_dir() or path.stem != "recording" else path.parent.name
 
 
-def serve(source: LiveSource | str | Path, address: Address | None = None, *, open_browser: bool = True) -> None:
+def serve(source: LiveSource | str | Path, port: int | None = None, *, open_browser: bool = True) -> None:
     """Serve a live scene, or the recording at a path, until interrupted.
 
     Raises
     ------
     SceneError, SolverError, OutputError : see `opened_page`.
     """
-    with opened_page(source, address) as page:
+    with opened_page(source, port) as page:
         print(f"{page.url}  (press Ctrl+C to end)", flush=True)
         with browser_at(page.url) if open_browser else nullcontext(), suppress(KeyboardInterrupt):
             threading.Event().wait()
@@ -123,9 +108,8 @@ def browser_at(url: str) -> Iterator[None]:
         yield
 
 
-def configure_page(server: Any) -> None:
-    """Configure the page of viser: the panel is beside the picture; links and the share button are removed."""
-    server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(36, 108, 168))
+def configure_page(server: Any, title: str) -> None:
+    """Configure the page of viser: the panel has the title and is beside the picture, without links of viser."""
+    set_theme(server, dark=False)
+    server.gui.set_panel_label(title)
     server.gui.main_panel.dock_right()
-    guard_inputs(server)
-    refuse_transfers(server)

@@ -32,7 +32,7 @@ class LivePage:
 
     Parameters
     ----------
-    server : see `supple.results.viser_server`; simulation : see `Simulation`; first : its first snapshot
+    server : of viser; simulation : see `Simulation`; first : its first snapshot
     """
 
     def __init__(self, server: Any, simulation: Simulation, first: Snapshot) -> None:
@@ -43,7 +43,7 @@ class LivePage:
         self.controller = Controller(simulation, first)
         self.panel = Panel(server, self.controller)
         moment = self._moment_builder.moment(first)
-        self.stage = Stage(server, moment, ViewOptions(), self.panel.mouse.add_handlers)
+        self.stage = Stage(server, moment, ViewOptions())
         self.panel.attach(self.stage)
         self._frame_rate = FrameRate(server)
         self._end = threading.Event()

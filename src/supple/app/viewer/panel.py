@@ -26,6 +26,8 @@ from supple.app.viewer.protocol.snapshots import Snapshot
 
 _NUMBERS_EVERY = 0.15  # [s]; numbers that change faster cannot be read
 _PLOTS_EVERY = 0.5  # [s]
+# Positions of sliders with a unit: their values are texts below them.
+NO_NUMBERS = ".mantine-Slider-root + .mantine-NumberInput-root { display: none; }"
 TABS = ("Bodies", "View", "Solver")
 
 
@@ -40,7 +42,7 @@ class Panel:
     def __init__(self, server: Any, controller: Controller) -> None:
         self._server, self._controller = server, controller
         gui, snapshot = server.gui, controller.snapshot
-        self.overlay = Overlay(gui)
+        self.overlay = Overlay(gui, NO_NUMBERS)
         self.time = TimeControls(gui, controller, self.overlay)
         tabs = gui.add_tab_group()
         self._bodies_tab, self._view_tab, self._solver_tab = (tabs.add_tab(name) for name in TABS)
@@ -60,7 +62,7 @@ class Panel:
         with self._bodies_tab:
             self.bodies = bodies = BodyControls(gui, self._controller)
             with bodies.new:
-                self.upload = UploadControls(self._server, self._controller, bodies.new_size, bodies.new_youngs)
+                self.upload = UploadControls(gui, self._controller, bodies.new_size, bodies.new_youngs)
         with self._view_tab:
             self.views = ViewControls(self._server, stage, self.overlay, self.request_view)
             self.record = RecordControls(self._server, stage)
@@ -75,7 +77,7 @@ class Panel:
             stage,
             {
                 "space": ("Play or pause", self.time.toggle),
-                "arrowright": ("One frame", lambda client: send(client, Step)),
+                "N": ("One frame", lambda client: send(client, Step)),
                 "R": ("Back to the start", lambda client: send(client, Reset)),
             },
         )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from supple.app.viewer.controls.view.keys import add_keys
-from supple.app.viewer.controls.view.overlay import Overlay, button
+from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.controls.view.record_controls import RecordControls
 from supple.app.viewer.controls.view.view_controls import ViewControls
 from supple.app.viewer.drawing.frame_rate import FrameRate
@@ -21,7 +21,6 @@ from supple.app.viewer.drawing.moments.model import Moment
 from supple.app.viewer.drawing.options import ViewOptions
 from supple.app.viewer.drawing.page_of_moments import evenly, most_moments, page_of_moments
 from supple.app.viewer.drawing.stage import Stage
-from supple.app.viewer.server.browser_values import number
 from supple.results.recording.reader import Recording
 
 _SLOWEST, _FASTEST = 0.05, 4.0
@@ -35,7 +34,7 @@ class Replay:
 
     Parameters
     ----------
-    server : see `supple.results.viser_server`; recording : must stay open while this object is used
+    server : of viser; recording : must stay open while this object is used
     """
 
     def __init__(self, server: Any, recording: Recording) -> None:
@@ -61,7 +60,7 @@ class Replay:
                 step if step > 0.0 else 1.0,
                 initial_value=first,
                 disabled=last == first,
-                hint="The frame that is drawn (right arrow: the next one)",
+                hint="The frame that is drawn (N: the next one)",
             )
             self.speed = gui.add_slider(
                 "Speed", _SLOWEST, _FASTEST, 0.05, initial_value=1.0, hint="Recorded seconds in a second"
@@ -78,7 +77,7 @@ class Replay:
             self.stage,
             {
                 "space": ("Play or pause", lambda client: self._toggle()),
-                "arrowright": ("One frame", lambda client: self._go_to(self.frame_at(self._time) + 1)),
+                "N": ("One frame", lambda client: self._go_to(self.frame_at(self._time) + 1)),
                 "R": ("Back to the start", lambda client: self._go_to(0)),
             },
         )
@@ -91,7 +90,6 @@ class Replay:
         self.slider.on_update(self._seek)
         self.play.on_click(lambda _: self._toggle())
         self.export.on_click(self._send_page)
-        self._show_transport()
         self._frame_rate = FrameRate(server)
         self._thread = threading.Thread(target=self._run, name="supple replay", daemon=True)
         self._thread.start()
@@ -134,16 +132,11 @@ class Replay:
     def _toggle(self) -> None:
         self.playing = not self.playing
         self.play.label = "Pause" if self.playing else "Play"
-        self._show_transport()
-
-    def _show_transport(self) -> None:
-        self.overlay.show("transport", button("❚❚" if self.playing else "▶", self.play, label=self.play.label))
 
     def _seek(self, event: Any) -> None:
         """Handle slider input of a visitor; updates by playing have no client."""
         if event.client is not None:
-            times = self._recording.times
-            self._pause_at(number(self.slider.value, float(times[0]), float(times[-1])))
+            self._pause_at(self.slider.value)
 
     def _go_to(self, frame: int) -> None:
         seconds = float(self._recording.times[min(frame, len(self._recording) - 1)])
@@ -166,7 +159,7 @@ class Replay:
             times = self._recording.times
             with self._turn:
                 if self.playing and self.slider.value == self._put and self._frame_rate.may_send():
-                    following = self._time + passed * number(self.speed.value, _SLOWEST, _FASTEST)
+                    following = self._time + passed * self.speed.value
                     if following > times[-1]:
                         following = float(times[0])
                     with self._frame_rate.sending():

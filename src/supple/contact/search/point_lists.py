@@ -39,7 +39,7 @@ def _boxes_of_triangles(points, triangles, radii, out):
             out[t, 3 + j] = max(points[a, j], points[b, j], points[c, j]) + moves
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy")
 def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, scratch):
     """Append the triangles near the points of a group, of their own piece or of others; returns the number of all.
 

@@ -19,7 +19,7 @@ Source: Nocedal, Wright, "Numerical Optimization" (2006), section 17.4.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +35,7 @@ TURN = 2.0 * np.pi
 class Law(NamedTuple):
     """One law; see the module.
 
-    function : whose value is g; adapts : whether lambda is updated; rate : of g at the end of a step in which it is g0
+    function : whose value is g; adapts : whether lambda is updated
     """
 
     function: int
@@ -46,7 +46,6 @@ class Law(NamedTuple):
     multiplier: float = 0.0
     adapts: bool = True
     is_motor: bool = False
-    rate: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,39 +59,19 @@ class Laws:
     high: NDArray[np.float64]
     adapts: NDArray[np.bool_]
     is_motor: NDArray[np.bool_]
-    rate: NDArray[np.float64]
 
     @classmethod
     def of(cls, laws: Sequence[Law]) -> tuple[Laws, NDArray[np.float64]]:
         """The laws, and their multipliers (l,)."""
         columns = list(zip(*laws, strict=True)) if laws else [()] * len(Law._fields)
-        function, k, start, low, high, multipliers, adapts, is_motor, rate = columns
+        function, k, start, low, high, multipliers, adapts, is_motor = columns
         made = cls(
             np.array(function, dtype=np.int64),
             *(np.array(column, dtype=np.float64) for column in (k, start, low, high)),
             adapts=np.array(adapts, dtype=np.bool_),
             is_motor=np.array(is_motor, dtype=np.bool_),
-            rate=np.array(rate, dtype=np.float64),
         )
         return made, np.array(multipliers, dtype=np.float64)
-
-    def selected(self, chosen: NDArray[np.bool_]) -> Laws:
-        """Those where `chosen` (l,) is true."""
-        return Laws(*(getattr(self, each.name)[chosen] for each in fields(self)))
-
-    def and_those(self, others: Laws) -> Laws:
-        """These laws, then others."""
-        pairs = ((getattr(self, each.name), getattr(others, each.name)) for each in fields(self))
-        return Laws(*(np.concatenate(pair) for pair in pairs))
-
-    def parts(self, multipliers: NDArray[np.float64]) -> tuple[Laws, Laws]:
-        """These laws, with multipliers (l,), as the sum of two: of what changes with g, and of the multipliers.
-
-        The former has multipliers of zero.
-        """
-        endless = np.full_like(self.low, np.inf)
-        changing = replace(self, low=self.low - multipliers, high=self.high - multipliers)
-        return changing, replace(self, k=np.zeros_like(self.k), low=-endless, high=endless)
 
     def efforts(self, g: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
         """(l,) psi' at the values g (l,)."""
@@ -145,7 +124,6 @@ def laws_of(
     times: tuple[float, float],
     *,
     moving: bool,
-    mean: float | None = None,
 ) -> tuple[Laws, NDArray[np.float64]]:
     """The laws of a step, and their multipliers (l,) at its beginning.
 
@@ -154,7 +132,6 @@ def laws_of(
     stiffness : (j,) k of conditions, of each joint [N/m]; start : (s,) values at the beginning, see `followed`
     times : begin and end of the step [s]; moving : whether rates count; without them, as in equilibrium, motors do not
         damp
-    mean : when a velocity motor has the mean rate that it gives in a step [s]; None: at the end
     """
     laws = [Law(int(row), float(stiffness[geometry.arguments[0].joint[row]]), 0.0) for row in geometry.across]
     for j, joint in enumerate(geometry.joints):
@@ -169,16 +146,15 @@ def laws_of(
         k, here, (low, high) = float(scales[row]), float(start[row]), geometry.limits[row].tolist()
         if joint.max_velocity is not None and moving:
             reach = (times[1] - times[0]) * joint.max_velocity
-            fastest = float(joint.max_velocity)
-            laws.append(Law(row, k, here - reach, high=0.0, rate=-fastest))
-            laws.append(Law(row, k, here + reach, low=0.0, rate=fastest))
+            laws.append(Law(row, k, here - reach, high=0.0))
+            laws.append(Law(row, k, here + reach, low=0.0))
             low, high = max(low, here - reach), min(high, here + reach)
         if joint.damping > 0.0 and moving:
             laws.append(Law(row, joint.damping / (times[1] - times[0]), here, adapts=False))
         if joint.friction > 0.0 and moving:
             laws.append(Law(row, k, here, -joint.friction, joint.friction))
         if joint.motor is not None:
-            laws.append(_motor_law(joint.motor, row, k, here, times, (low, high), moving=moving, mean=mean))
+            laws.append(_motor_law(joint.motor, row, k, here, times, (low, high), moving=moving))
     return Laws.of(laws)
 
 
@@ -191,7 +167,6 @@ def _motor_law(
     limits: tuple[float, float],
     *,
     moving: bool,
-    mean: float | None,
 ) -> Law:
     h = times[1] - times[0]
     bound = np.inf if motor.max_force is None else float(motor.max_force)
@@ -199,10 +174,8 @@ def _motor_law(
         return Law(row, 0.0, start, multiplier=-motor.at(times[1]), adapts=False, is_motor=True)
     if isinstance(motor, VelocityMotor):
         # A limit of the coordinate or of its rate stops the motor, also one without a largest force.
-        end = start + h * motor.at(times[1] if mean is None else mean)
-        stopped = float(np.clip(end, *limits))
-        rate = motor.at(times[1]) if stopped == end else (stopped - start) / h
-        return Law(row, k, stopped, -bound, bound, is_motor=True, rate=rate)
+        stopped = float(np.clip(start + h * motor.at(times[1]), *limits))
+        return Law(row, k, stopped, -bound, bound, is_motor=True)
     assert isinstance(motor, PositionMotor)
     target = motor.at(times[1])
     rate = (target - motor.at(times[0])) / h if moving else 0.0

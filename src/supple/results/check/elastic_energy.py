@@ -39,8 +39,6 @@ def elastic_energy(
     internal : (k, 11) internal variables of the frame, see `State`; active : growths of the frame
     """
     physics = recording.physics
-    if physics is None:
-        return None
     grown, ratios = growth_of(active, len(J))
     rest_inverse, J, all_volumes = rest_inverse @ grown, J / ratios, recording.rest_volumes * ratios
     total = _flowing(recording, physics, x, rest_inverse, internal, (grown, ratios))
@@ -170,6 +168,4 @@ def _averaged(tets, volumes, F, J, laws, by_law: LawTets | None) -> float:
 def stiffness_scale(recording: Recording) -> float:
     """An energy [J] that round-off of the elastic energy is measured by: of strains of a few percent everywhere."""
     physics = recording.physics
-    if physics is None:
-        return 0.0
     return 1e-3 * float((np.abs(physics.mu) + np.abs(physics.lam)) @ recording.rest_volumes)

@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 from supple.results.recording.reader import Recording
 
 
-def stitch_energy(recording: Recording, x: NDArray[np.float64], poses: NDArray[np.float64]) -> float | None:
-    """[J], zero at rest; None where the recording does not contain the laws of its stitches.
+def stitch_energy(recording: Recording, x: NDArray[np.float64], poses: NDArray[np.float64]) -> float:
+    """[J], zero at rest.
 
     Parameters
     ----------
     x : (n, 3) positions [m]; poses : (obstacles, 3, 4) of the obstacles that bodies are stitched to
     """
     stitches, laws = recording.stitches, recording.stitches.laws
-    if laws is None:
-        return None if len(stitches) else 0.0
     corners = stitches.corners(x, poses)
     count = len(laws.moduli)
     edges = (corners[:count, 1:] - corners[:count, :1]).transpose(0, 2, 1)
@@ -38,8 +36,6 @@ def stitch_energy(recording: Recording, x: NDArray[np.float64], poses: NDArray[n
 def stitch_scale(recording: Recording) -> float:
     """An energy [J] that round-off of the stitch energy is measured by: of strains of a few percent everywhere."""
     laws = recording.stitches.laws
-    if laws is None:
-        return 0.0
     stiffness, rest = laws.springs.T
     return 1e-3 * float(np.abs(laws.moduli).sum(axis=1) @ _volumes(laws.rest_shape_inverse) + stiffness @ (rest * rest))
 

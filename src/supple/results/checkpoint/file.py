@@ -103,7 +103,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise OutputError(f"{path}: cannot be read: {error.strerror or error}") from None
     if not data.startswith(_FORMAT):
         if data.startswith(_FAMILY):
-            raise OutputError(f"{path}: was written by a newer Supple; update this one")
+            raise OutputError(f"{path}: was written by another version; simulate it again")
         raise OutputError(f"{path}: is no checkpoint; give one that a run folder of Supple holds")
     content = data[len(_FORMAT) + _DIGEST_LENGTH :]
     written = data[len(_FORMAT) : len(_FORMAT) + _DIGEST_LENGTH]

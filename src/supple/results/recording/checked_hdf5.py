@@ -58,9 +58,9 @@ class CheckedFile:
         """The error for contradictory contents."""
         return OutputError(f"{self.path}: is damaged: {what}; copy or record it again")
 
-    def newer(self, what: str) -> OutputError:
-        """The error for contents of a version that this one does not know."""
-        return OutputError(f"{self.path}: was written by a newer Supple ({what}); update this one")
+    def of_another_version(self, what: str) -> OutputError:
+        """The error for contents that this version does not write."""
+        return OutputError(f"{self.path}: was written by another version ({what}); simulate it again")
 
     def other(self, what: str) -> OutputError:
         """The error for a file of another kind."""

@@ -26,8 +26,6 @@ from supple.results.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_V
 from supple.results.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.results.recording.sensors import RecordedSensor, sensors_of_header
 
-# Recordings of earlier versions do not have these, but their values are known.
-_OF_EARLIER = {"stitch_energy": 0.0, "largest_stitch_stretch": np.nan}
 _MESSAGE = "supple/frames/message"
 _READ_BY_FRAME = ("VTKHDF/Points", "VTKHDF/PointData/velocities", "VTKHDF/CellData/det_F", "supple/frames/poses")
 
@@ -66,7 +64,7 @@ class RecordedContents:
         curved = np.zeros(m, dtype=bool)
         if self.quadratic is not None:
             curved[self.quadratic[0]] = True
-        self.physics: RecordedPhysics | None = read_physics(file, header, curved)
+        self.physics: RecordedPhysics = read_physics(file, header, curved)
         self.untouching = read_untouching(file, header)
         self.welds: tuple[RecordedWeld, ...] = read_welds(file, header, n)
         self.joints: tuple[RecordedJoint, ...] = read_joints(file, header)
@@ -86,7 +84,7 @@ class RecordedContents:
         layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors, flowing)
         self._series = {series.path: series for series in layout.series}
         own = [field_series(field, n, m).path for field in self.fields]
-        others = [_MESSAGE] * (_MESSAGE in file) + [INTERNAL] * (flowing > 0)
+        others = [_MESSAGE] + [INTERNAL] * (flowing > 0)
         for path in (*_READ_BY_FRAME, *own, *others):
             file.check_series(self._series[path], self._count)
         self.times: NDArray[np.float64] = self._values("supple/frames/time")
@@ -95,12 +93,12 @@ class RecordedContents:
         codes = self._values("supple/frames/status")
         names = header["statuses"]
         if codes.max() >= len(names) or not set(names) <= {str(status) for status in Status}:
-            raise file.newer("a frame has a status that this version does not know")
+            raise file.of_another_version("a frame has an unknown status")
         self.statuses: tuple[Status, ...] = tuple(Status(names[code]) for code in codes)
 
     @cached_property
     def laws(self) -> TetLaws:
-        """The elastic laws of all tets; unknown where an earlier version wrote the recording."""
+        """The elastic laws of all tets."""
         of_tets = self.rest_positions, self.tets, self.rest_volumes
         return recorded_laws(self.physics, self.bodies, *of_tets, self.quadratic)
 
@@ -116,7 +114,7 @@ class RecordedContents:
     @property
     def internal_rows(self) -> int:
         """How many rows of internal variables a frame has."""
-        return 0 if self.physics is None else self.physics.internal
+        return self.physics.internal
 
     def body(self, name: str) -> RecordedBody:
         """The body of that name.
@@ -135,10 +133,7 @@ class RecordedContents:
         known = REPORT_NUMBERS + REPORT_VECTORS
         if name not in known:
             raise OutputError(f"{self.path}: there is no series {name!r}; take one of {', '.join(known)}")
-        path = f"supple/frames/{name}"
-        if name in _OF_EARLIER and path not in self._file:
-            return np.full(self._count, _OF_EARLIER[name])
-        return self._values(path)
+        return self._values(f"supple/frames/{name}")
 
     @property
     def messages(self) -> list[str]:
@@ -160,8 +155,6 @@ class RecordedContents:
         return self._read_series[path]
 
     def _messages(self, begin: int, end: int) -> list[str]:
-        if _MESSAGE not in self._file:
-            return [""] * (end - begin)
         rows = self._file.rows(self._series[_MESSAGE], begin, end, "messages")
         return [row.tobytes().rstrip(b"\0").decode(errors="replace") for row in rows.reshape(end - begin, -1)]
 
@@ -171,9 +164,9 @@ class RecordedContents:
 
 
 def _recorded_fields(file: CheckedFile, header: dict[str, Any]) -> tuple[Field, ...]:
-    names = header.get("fields", [])
+    names = header.get("fields")
     if not isinstance(names, list):
         raise file.broken("its header does not list its fields")
     if not set(map(str, names)) <= FIELDS.keys():
-        raise file.newer("it has a field that this version does not know")
+        raise file.of_another_version("it has an unknown field")
     return tuple(FIELDS[name] for name in names)

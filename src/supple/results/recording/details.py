@@ -82,9 +82,7 @@ class RecordedDetails:
 
     @classmethod
     def from_header(cls, file: CheckedFile, header: dict[str, Any]) -> RecordedDetails:
-        """What the header of a recording describes; nothing where an earlier version wrote it."""
-        if "details" not in header:
-            return cls()
+        """What the header of a recording describes."""
         try:
             kind = _kinds()[header["details"]["kind"]]
             known = {field.name for field in fields(kind) if field.compare}
@@ -92,7 +90,7 @@ class RecordedDetails:
         except (KeyError, TypeError, ValueError):
             raise file.broken("the solver's details in its header are not described as they should be") from None
         if not {field.name for field in made.fields} <= known:
-            raise file.newer(f"{kind.__name__} has a field that this version does not know")
+            raise file.of_another_version(f"{kind.__name__} has an unknown field")
         return made
 
     def header(self) -> dict[str, Any]:

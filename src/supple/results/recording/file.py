@@ -1,22 +1,20 @@
-"""A VTKHDF file that is valid at every moment, also when its writer is killed.
+"""A VTKHDF file of which a killed writer loses at most the frame that it writes.
 
 The HDF5 library alone does not guarantee this (notes/decisions.md, 4). Therefore it first lays out the whole file, with
 room for many frames, and closes it. Every series of frames then has a fixed position ("contiguous" layout), and a frame
-is written there as plain bytes. The last writes of a frame are a few numbers of eight bytes: our count of frames, and
-the same number as the `NSteps` attribute and as the lengths of the series in VTKHDF/Steps, for VTK, which allows no
-more entries than steps. Room that is not used takes no disk space where the file system supports holes.
+is written there as plain bytes; the last write of a frame is the count of frames. Room that is not used takes no disk
+space where the file system supports holes.
 
-When the room is used up, the file is copied to a file with twice the room, which then replaces it.
+When the room is used up, the file is copied to a file with twice the room, which then replaces it. When the simulation
+ends, it is copied to a file without room, which has the steps of VTK: until then ParaView shows the first frame.
 
-Sources: VTKHDF file format 2.x (docs.vtk.org); HDF5 file format specification 3.0, sections IV.A.1.a (object header,
-version 1) and IV.A.2.b (dataspace message, version 1).
+Source: VTKHDF file format 2.x (docs.vtk.org).
 """
 
 from __future__ import annotations
 
 import copy
 import errno
-import mmap
 import os
 import shutil
 from collections.abc import Callable
@@ -25,16 +23,13 @@ from pathlib import Path
 from typing import BinaryIO
 
 import h5py
-import h5py.h5o
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supple.errors import OutputError
 from supple.runtime.replacing import put_in_place, temporary_name
 
 WRITTEN = "supple/frames_written"
-STEP_TIMES, _TIMES = "VTKHDF/Steps/Values", "supple/frames/time"
-_STEPS_MARK = 0x7375_7070_6C65_2121  # the value of NSteps until its position is known
+TIMES = "supple/frames/time"
 _COPY_BYTES = 1 << 20  # more would remain in the memory of the process
 _STEP_COLUMNS = 5  # different columns in VTKHDF/Steps
 _SPARE_ROOM = 1 << 16  # for what HDF5 writes beside the arrays
@@ -82,12 +77,8 @@ class RecordingFile:
         self.path, self.layout, self.capacity, self.written = path, layout, capacity, written
         with h5py.File(path, "r") as file:
             self._series = {s.path: (s, _place(file, s)) for s in layout.series}
-            self._counter = _dataset(file, WRITTEN).id.get_offset()
-            header = h5py.h5o.get_info(file["VTKHDF/Steps"].id).addr
-            lengths = {h5py.h5o.get_info(item.id).addr for item in _step_datasets(file)}
+            self._counter = int(_dataset(file, WRITTEN).id.get_offset())
         self._file: BinaryIO = open(path, "r+b", buffering=0)  # noqa: SIM115
-        self._steps = _place_of_mark(self._file, header)
-        self._lengths = sorted(_place_of_length(self._file, address, capacity) for address in lengths)
 
     def put(self, path: str, values: ArrayLike) -> None:
         """Write the next frame's rows of one series; readers see them after `commit`."""
@@ -109,11 +100,8 @@ class RecordingFile:
         self.write_count()
 
     def write_count(self) -> None:
-        """Write the number of frames to every position that stores it."""
-        number = self.written.to_bytes(8, "little")
-        # NSteps before the lengths: VTK can read series that are shorter than the number of steps, but not longer ones.
-        for place in (self._counter, self._steps, *self._lengths):
-            self._write(place, number)
+        """Write the number of frames."""
+        self._write(self._counter, self.written.to_bytes(8, "little"))
 
     @property
     def is_in_place(self) -> bool:
@@ -153,19 +141,16 @@ def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5
         write_static(draft)
         draft.flush()
         static_bytes = len(draft.id.get_file_image())
-    fixed = static_bytes + _STEP_COLUMNS * 8 * capacity
-    _require_room(path, fixed + layout.frame_bytes, length=fixed + layout.frame_bytes * capacity)
+    _require_room(path, static_bytes + layout.frame_bytes, length=static_bytes + layout.frame_bytes * capacity)
     with h5py.File(path, "w", libver=("earliest", "v110")) as file:
-        _write_step_count(file, _STEPS_MARK)
         write_static(file)
         file.create_dataset(WRITTEN, data=np.int64(0))
         for series in layout.series:
             _reserve(file, series, series.shape(capacity))
-        _write_steps(file, layout, capacity)
 
 
 def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *, compress: bool = False) -> None:
-    """Copy the complete frames of a recording to a file with another capacity; None leaves no room for more frames.
+    """Copy the complete frames of a recording to a file with another capacity; None: to one for ParaView, without room.
 
     With `compress`, the series are stored in gzip chunks, one per frame; nothing can be added to them then.
 
@@ -174,17 +159,13 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
     OSError : where there is no room.
     RuntimeError, TypeError, ValueError, KeyError : from HDF5, where the source is damaged.
     """
-    fixed = _STEP_COLUMNS * 8 * (capacity or 1)
-    _require_room(target, fixed, length=fixed + layout.frame_bytes * (capacity or 0))
+    _require_room(target, 0, length=layout.frame_bytes * (capacity or 0))
     with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
         written = int(_dataset(old, WRITTEN)[()])
-        present = [series for series in layout.series if series.path in old]  # earlier versions wrote fewer
-        _write_step_count(new, _STEPS_MARK if capacity else written)
-        _copy_static(old, new, "", {series.path for series in present})
+        _copy_static(old, new, "", {series.path for series in layout.series})
         new.create_dataset(WRITTEN, data=np.int64(written))
-        for series in present:
-            # Where the writer was killed between two writes, VTK's copy of the times can be one frame short.
-            source_data = _dataset(old, _TIMES if series.path == STEP_TIMES else series.path)
+        for series in layout.series:
+            source_data = _dataset(old, series.path)
             rows = written * series.rows
             shape = (max(rows, (capacity or 0) * series.rows), *series.row_shape)
             if compress and 0 not in shape:
@@ -198,7 +179,9 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
             for row in range(0, rows if 0 not in shape else 0, step):
                 _require_room(target, step * series.frame_bytes // max(1, series.rows))
                 data[row : min(row + step, rows)] = source_data[row : min(row + step, rows)]
-        _write_steps(new, layout, capacity or written)
+        if capacity is None:
+            _require_room(target, _STEP_COLUMNS * 8 * written)
+            _write_steps(new, layout, written)
 
 
 def _require_room(path: Path, size: int, *, length: int = 0) -> None:
@@ -247,17 +230,14 @@ def _reserve(file: h5py.File, series: Series, shape: tuple[int, ...]) -> h5py.Da
     return h5py.Dataset(made)
 
 
-def _write_step_count(file: h5py.File, value: int) -> None:
-    """Write NSteps, before everything else: HDF5 then stores its value near the header of the group."""
-    file.require_group("VTKHDF/Steps").attrs.create("NSteps", value, dtype="<i8")
-
-
-def _write_steps(file: h5py.File, layout: Layout, capacity: int) -> None:
+def _write_steps(file: h5py.File, layout: Layout, written: int) -> None:
     """Write VTKHDF/Steps: where each step's rows begin. Equal columns are one dataset under several names."""
-    steps = file.require_group("VTKHDF/Steps")
-    index = np.arange(capacity, dtype=np.int64)
-    steps["PartOffsets"] = np.zeros(capacity, dtype=np.int64)
-    steps["NumberOfParts"] = np.ones(capacity, dtype=np.int64)
+    steps = file.create_group("VTKHDF/Steps")
+    steps.attrs.create("NSteps", written, dtype="<i8")
+    steps["Values"] = file[TIMES]
+    index = np.arange(written, dtype=np.int64)
+    steps["PartOffsets"] = np.zeros(written, dtype=np.int64)
+    steps["NumberOfParts"] = np.ones(written, dtype=np.int64)
     steps["PointOffsets"] = index * layout.points
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = steps["PartOffsets"]
@@ -273,13 +253,6 @@ def _write_steps(file: h5py.File, layout: Layout, capacity: int) -> None:
             steps[f"CellDataOffsets/{name[0]}"] = steps["CellDataOffsets/det_F"]
 
 
-def _step_datasets(file: h5py.File) -> list[h5py.Dataset]:
-    found: list[h5py.Dataset] = []
-    file["VTKHDF/Steps"].visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset) else None)  # pyright: ignore[reportAttributeAccessIssue]
-    # An object with several hard links is visited once.
-    return found
-
-
 def _dataset(file: h5py.File, path: str) -> h5py.Dataset:
     item = file[path]
     assert isinstance(item, h5py.Dataset)
@@ -289,28 +262,3 @@ def _dataset(file: h5py.File, path: str) -> h5py.Dataset:
 def _place(file: h5py.File, series: Series) -> int:
     offset = _dataset(file, series.path).id.get_offset()
     return 0 if offset is None else int(offset)
-
-
-def _place_of_mark(file: BinaryIO, header: int) -> int:
-    """Where the value of NSteps is: near the object header of the group, or in a continuation of it elsewhere."""
-    mark = _STEPS_MARK.to_bytes(8, "little")
-    near = max(0, header - (1 << 20))
-    file.seek(near)
-    block = file.read(1 << 21)
-    if block.count(mark) == 1:
-        return near + block.index(mark)
-    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as whole:
-        place = whole.find(mark)
-        if place < 0 or whole.find(mark, place + 1) >= 0:
-            raise OutputError(f"{file.name}: HDF5 wrote NSteps in an unknown layout; install another version of h5py")
-    return place
-
-
-def _place_of_length(file: BinaryIO, header: int, length: int) -> int:
-    """Where the length of a one-dimensional dataset is: in the first message of its object header."""
-    file.seek(header)
-    block = file.read(40)
-    known = block[0] == 1 and block[16:18] == b"\x01\x00" and block[24:26] == b"\x01\x01"
-    if not known or int.from_bytes(block[32:40], "little") != length:
-        raise OutputError(f"{file.name}: HDF5 wrote a length in an unknown layout; install another version of h5py")
-    return header + 32

@@ -81,8 +81,7 @@ class RecordedFrame(TetReadings):
     @cached_property
     def active(self) -> tuple[ActiveTets, ...]:
         """Growths and muscles with their values in this frame."""
-        physics, values = self.recording.physics, self.report.details.active.values()
-        return () if physics is None else tuple(map(ActiveTets.at, physics.active, values))
+        return tuple(map(ActiveTets.at, self.recording.physics.active, self.report.details.active.values()))
 
     @property
     def _internal(self) -> NDArray[np.float64]:
@@ -145,7 +144,6 @@ class RecordedFrame(TetReadings):
         """How the step ended, and what was measured on its state.
 
         `details` contains the fields that a recording keeps (see `SolverDetails`); `message` is cut after 512 bytes.
-        Both are empty in recordings of version 0.1.
         """
         values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
         vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}

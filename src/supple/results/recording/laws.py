@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.quadratic import QuadraticTets
-from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, TetMaterial
+from supple.materials.per_tet import TetMaterial
 from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.physics import RecordedPhysics
 from supple.results.recording.scene import RecordedBody
@@ -32,14 +32,14 @@ def read_quadratic(
 
 
 def recorded_laws(
-    physics: RecordedPhysics | None,
+    physics: RecordedPhysics,
     bodies: Sequence[RecordedBody],
     rest_positions: NDArray[np.float64],
     tets: NDArray[np.int32],
     volumes: NDArray[np.float64],
     quadratic: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None,
 ) -> TetLaws:
-    """The laws of `tets` (m, 4); of none, where an earlier version wrote the recording and `physics` is None.
+    """The laws of `tets` (m, 4).
 
     Density and damping are not recorded: they are NaN.
 
@@ -57,10 +57,6 @@ def recorded_laws(
     with np.errstate(all="ignore"):
         Dm_inv = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1) / (6.0 * volumes)[:, None, None]
     tets, unknown = np.ascontiguousarray(tets, dtype=np.int32), np.full(m, np.nan)
-    if physics is None:
-        kind, region = np.full(m, NOT_ELASTIC, dtype=np.int32), np.full(m, NO_REGION, dtype=np.int32)
-        nothing = TetMaterial(unknown, unknown, kind, unknown, unknown, region)
-        return TetLaws(tets, Dm_inv, volumes, nothing, quadratic=curved)
     kind = physics.tet_kinds
     material = TetMaterial(unknown, unknown, kind, physics.mu, physics.lam, physics.region, physics.laws)
     springs = [

@@ -1,7 +1,4 @@
-"""What a recording keeps of its scene for `supple check`: laws of the bodies, loads, and pairs that may touch.
-
-Recordings from before version 0.1 do not have it; checks that need it are skipped.
-"""
+"""What a recording keeps of its scene for `supple check`: laws of the bodies, loads, and pairs that may touch."""
 
 from __future__ import annotations
 
@@ -34,7 +31,7 @@ from supple.scene.contact_pairs import pair_table
 from supple.scene.joints.axis_joint import AxisJoint
 
 NOT_KNOWN = 255
-GIVEN_BY_LAW = 254  # in a recording; earlier versions read it as `NOT_KNOWN`
+GIVEN_BY_LAW = 254
 _GROUP = "supple/physics"
 
 
@@ -103,8 +100,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
             kind[tets.rows] = NOT_KNOWN
     group = own.create_group("physics")
     group["kind"], group["mu"], group["lam"] = kind, mu, lam
-    if (region != NO_REGION).any():
-        group["region"] = region
+    group["region"] = region
     for k, tets in enumerate(known):
         group[f"law_{k}/rows"] = tets.rows.astype(np.int32)[:, None]
         group[f"law_{k}/parameters"] = tets.parameters
@@ -126,7 +122,6 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "stitches": len(system.stitching),
         "held_joints": sum(joint.second not in {part.name for part in system.bodies} for joint in system.scene.joints),
         "motors": sum(isinstance(joint, AxisJoint) and joint.motor is not None for joint in system.scene.joints),
-        "patches": bool((region != NO_REGION).any()),
         "untouching": _untouching(system),
         "welds": _welds(system),
         "loads": write_loads(group, system),
@@ -173,24 +168,22 @@ def _welds(system: System) -> list[tuple[int, int, list[int]]]:
     return [(number[weld.body], number[weld.rigid], vertices[weld_of == k].tolist()) for k, weld in welds]
 
 
-def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[np.bool_]) -> RecordedPhysics | None:
-    """The laws of a recording, or None where it does not contain them; quadratic : (m,) which tets are.
+def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[np.bool_]) -> RecordedPhysics:
+    """The laws of a recording; quadratic : (m,) which tets are.
 
     Raises
     ------
     OutputError : where the data are contradictory.
     """
-    physics = header.get("physics")
-    if physics is None:
-        return None
+    physics = header["physics"]
     try:
-        counts = [int(physics[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
-        counts += [int(physics.get(key, 0)) for key in ("held_joints", "motors")]
+        names = ("forces", "soft_targets", "scripted_pins", "stitches", "held_joints", "motors")
+        counts = [int(physics[key]) for key in names]
         laws = [str(law) for law in physics["laws"]]
-        laws_here = [_law_of(entry) for entry in physics.get("by_law", [])]
-        flows = list(physics.get("flows", [None] * len(laws_here)))
-        points = [int(number) for number in physics.get("points", [1] * len(laws_here))]
-        internal = int(physics.get("internal", 0))
+        laws_here = [_law_of(entry) for entry in physics["by_law"]]
+        flows = list(physics["flows"])
+        points = [int(number) for number in physics["points"]]
+        internal = int(physics["internal"])
         compliances = tuple(
             None if pair is None else (float(pair[0]), float(pair[1])) for pair in physics["compliances"]
         )
@@ -201,16 +194,13 @@ def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[n
     if len(compliances) != len(header["bodies"]):
         raise file.broken("its header describes the physics of another number of bodies")
     m = len(quadratic)
-    here = [law.__name__ for law in ELASTIC_MATERIALS]
-    number = np.full(256, NOT_KNOWN, dtype=np.uint8)
-    for k, law in enumerate(laws[:NOT_KNOWN]):
-        number[k] = here.index(law) if law in here else NOT_KNOWN
-    number[GIVEN_BY_LAW] = GIVEN_BY_LAW
-    kind = number[file.array(f"{_GROUP}/kind", "u", (m,)).astype(np.uint8)]
+    if laws != [law.__name__ for law in ELASTIC_MATERIALS]:
+        raise file.of_another_version("it has other materials")
+    kind = file.array(f"{_GROUP}/kind", "u", (m,)).astype(np.uint8)
+    if ((kind >= len(laws)) & (kind < GIVEN_BY_LAW)).any():
+        raise file.broken("a tet is of a material that does not exist")
     mu, lam = file.array(f"{_GROUP}/mu", "f", (m,)), file.array(f"{_GROUP}/lam", "f", (m,))
-    region = np.full(m, NO_REGION, dtype=np.int32)
-    if physics.get("patches", False):
-        region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
+    region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
     known = []
     for k, (law, flow, at) in enumerate(zip(laws_here, flows, points, strict=False)):
         tets = file.indices(f"{_GROUP}/law_{k}/rows", 1, m)[:, 0].astype(np.int64)
@@ -218,7 +208,7 @@ def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[n
         if at != (QUADRATURE_POINTS if quadratic[tets].all() else 1) or quadratic[tets].any() != quadratic[tets].all():
             raise file.broken("a law is not evaluated at the points of its tets")
         if flow is not None and flow not in RECORDED_FLOWS:
-            raise file.newer(f"a material flows by a law {flow!r} that this version does not know")
+            raise file.of_another_version(f"a material flows by a law {flow!r} that this version does not know")
         if law is not None and parameters.shape[1] in law.counts:
             parameters = np.ascontiguousarray(parameters)
             known.append(LawTets(law, tets, parameters, None if flow is None else RECORDED_FLOWS[flow], at))
@@ -233,13 +223,13 @@ def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[n
 
 def _read_active(file: CheckedFile, physics: dict[str, Any], m: int) -> tuple[ActiveTets, ...]:
     try:
-        described = [(str(kind), float(strength)) for kind, strength in physics.get("active", [])]
-    except (TypeError, ValueError):
+        described = [(str(kind), float(strength)) for kind, strength in physics["active"]]
+    except (KeyError, TypeError, ValueError):
         raise file.broken("its growths and muscles are not described as they should be") from None
     found = []
     for k, (kind, strength) in enumerate(described):
         if kind not in (GROWTH, MUSCLE):
-            raise file.newer(f"tets act by a {kind!r} that this version does not know")
+            raise file.of_another_version(f"tets act by a {kind!r} that this version does not know")
         rows = file.indices(f"{_GROUP}/active_{k}/rows", 1, m)[:, 0].astype(np.int64)
         directions = file.array(f"{_GROUP}/active_{k}/directions", "f", (None, 3))
         curve = file.array(f"{_GROUP}/active_{k}/curve", "f", (None, 2))
@@ -256,8 +246,6 @@ def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[in
     ------
     OutputError : where a body or obstacle does not exist.
     """
-    if header.get("physics") is None:
-        return ()
     try:
         pairs = tuple((int(i), int(j)) for i, j in header["physics"]["untouching"])
     except (KeyError, TypeError, ValueError):
@@ -278,17 +266,17 @@ class RecordedWeld:
 
 
 def read_welds(file: CheckedFile, header: dict[str, Any], n: int) -> tuple[RecordedWeld, ...]:
-    """The welds of a recording with n vertices; none in recordings of older versions.
+    """The welds of a recording with n vertices.
 
     Raises
     ------
     OutputError : where a body or a vertex does not exist.
     """
-    described = (header.get("physics") or {}).get("welds", [])
     bodies = len(header["bodies"])
     try:
+        described = header["physics"]["welds"]
         welds = tuple(RecordedWeld(int(a), int(b), np.array(rows, dtype=np.int64)) for a, b, rows in described)
-    except (TypeError, ValueError, OverflowError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise file.broken("its welds are not described as they should be") from None
     for weld in welds:
         numbers = weld.vertices

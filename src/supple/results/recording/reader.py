@@ -21,13 +21,13 @@ class Recording(RecordedContents, Showable, Sequence[RecordedFrame]):
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
     quadratic : rows (k,) and nodes (k, 10) of the quadratic tets, whose corners `tets` has; None without such
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
-    physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
+    physics : the bodies' laws and what acts on them
     details : which fields of the solver's details are kept; fields : of tets and vertices that were recorded
     sensors : of the scene
     untouching : pairs that may pass through each other: numbers of bodies, then obstacles
     welds : vertices of soft bodies that are points of rigid ones; joints : of the scene
     loads : those whose forces follow from one value, by its name in the details; other_loads : names of works of others
-    cavities, cables : of the scene; none where an older version wrote the recording
+    cavities, cables : of the scene
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -83,7 +83,7 @@ def read_recording(path: str | Path) -> Recording:
 
     Raises
     ------
-    OutputError : where the file is missing, a folder, cut off, of another kind, of a newer version, or contradictory;
+    OutputError : where the file is missing, a folder, cut off, of another kind, of another version, or contradictory;
         the text starts with the path.
     """
     return Recording(path)

@@ -20,7 +20,7 @@ from supple.model.system import System
 from supple.results.frame import Frame
 from supple.results.readings.fields import Field, checked_fields, cost
 from supple.results.recording.details import RecordedDetails
-from supple.results.recording.file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
+from supple.results.recording.file import TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.results.recording.scene import write_scene
 from supple.results.recording.sensors import RecordedSensor, recorded_sensors
 from supple.runtime.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
@@ -61,8 +61,7 @@ def frame_layout(
         Series("VTKHDF/Points", points, (3,)),
         Series("VTKHDF/PointData/velocities", points, (3,)),
         Series("VTKHDF/CellData/det_F", tets),
-        Series(STEP_TIMES, 1),
-        Series("supple/frames/time", 1),
+        Series(TIMES, 1),
         Series("supple/frames/index", 1, (), "<i8"),
         Series("supple/frames/status", 1, (), "|u1"),
         Series("supple/frames/iterations", 1, (), "<i8"),
@@ -88,8 +87,9 @@ def field_series(field: Field, points: int, tets: int) -> Series:
 class Recorder:
     """Records a simulation: `simulate(scene, solver, dt, steps, sinks=[Recorder("out/recording.vtkhdf")])`.
 
-    The file replaces an older one when it contains the first frame. From then on it contains every complete frame, also
-    while it is being written and when the writer is killed.
+    The file replaces an older one when it contains the first frame. From then on `read_recording` finds every complete
+    frame in it, also while it is being written and when the writer is killed; ParaView does when the simulation has
+    ended, and else after `supple resume` or in an export to vtkhdf.
 
     Parameters
     ----------
@@ -194,20 +194,18 @@ class Recorder:
                 raise output_error(self.path, error) from None
 
     def end(self) -> None:
-        """Release room that was not used, and close the file."""
+        """Release room that was not used, add the steps of VTK, and close the file."""
         file, self._file = self._file, None
         if file is None:
             return
         file.close()
-        if file.written == file.capacity and not self._compress:
-            return
         fresh = temporary_name(self.path)
         try:
             rewrite(self.path, fresh, file.layout, None, compress=self._compress)
             put_in_place(fresh, self.path)
         except (OSError, RuntimeError) as error:
-            # The recording is complete; it only contains unused room.
-            logger.warning("%s: is larger than necessary: %s", self.path, " ".join(str(error).split()))
+            # The recording is complete for `read_recording`.
+            logger.warning("%s: has no steps for ParaView: %s", self.path, " ".join(str(error).split()))
         finally:
             fresh.unlink(missing_ok=True)
 
@@ -240,9 +238,7 @@ class Recorder:
         file.put("VTKHDF/Points", frame.state.positions)
         file.put("VTKHDF/PointData/velocities", frame.state.velocities)
         file.put("VTKHDF/CellData/det_F", frame.det_F)
-        file.put(STEP_TIMES, frame.time)
-        # The length of VTK's copy of the times changes after the count of frames; this one has no length to change.
-        file.put("supple/frames/time", frame.time)
+        file.put(TIMES, frame.time)
         file.put("supple/frames/index", frame.index)
         file.put("supple/frames/status", list(Status).index(report.status))
         file.put("supple/frames/iterations", report.iterations)

@@ -26,7 +26,7 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS, restored_obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 VTK_TETRA, VTK_QUADRATIC_TETRA = 10, 24
 
 
@@ -210,17 +210,20 @@ def read_header(file: CheckedFile) -> dict[str, Any]:
             else "an HDF5 file of another kind"
         )
         raise file.other(other)
-    if not isinstance(version, (int, np.integer)) or version < 1:
-        raise file.broken(f"its format version is {version!r}")
-    if version > FORMAT_VERSION:
-        raise file.newer(f"format {version}, this one reads {FORMAT_VERSION}")
+    if not isinstance(version, (int, np.integer)):
+        raise file.broken(f"its format version is {str(version)[:20]!r}")
+    if version != FORMAT_VERSION:
+        raise file.of_another_version(f"format {version}, this one reads {FORMAT_VERSION}")
     try:
         header = json.loads(file.text("supple/header"))
-        dt, lists = float(header["dt"]), [header[key] for key in ("statuses", "bodies", "obstacles")]
+        dt, lists = float(header["dt"]), [header[key] for key in ("statuses", "bodies", "obstacles", "sensors")]
+        acting = [header["physics"][key] for key in ("loads", "actuators", "joints", "welds", "untouching")]
     except (ValueError, TypeError, KeyError):
         raise file.broken("its header is not the expected JSON") from None
     if not all(isinstance(item, list) for item in lists) or not header["bodies"] or not dt > 0.0:
         raise file.broken("its header has no bodies, or no time step")
+    if not all(isinstance(item, list) for item in acting):
+        raise file.broken("the physics in its header is not described as it should be")
     return header
 
 
@@ -241,10 +244,10 @@ def read_bodies(
             skin = _read_skin(file, f"supple/skins/{i}", v1 - v0) if described["skin"] else None
             rows = slice(v0, v1), slice(t0, t1)
             names = str(described["name"]), str(described["material"])
-            rigid = bool(described.get("rigid", False))
+            rigid = bool(described["rigid"])
             if rigid and (skin is None or v1 - v0 != 4 or t1 - t0 != 1):
                 raise file.broken(f"rigid body {described['name']!r} does not have four vertices and a surface")
-            touches = skin is not None and (rigid or described.get("collide") == "skin")
+            touches = skin is not None and (rigid or described["collide"] == "skin")
             bodies.append(RecordedBody(*names, *rows, np.ascontiguousarray(own), skin, rigid, touches))
     except (KeyError, TypeError, ValueError):
         raise file.broken("the bodies in its header are not described as they should be") from None

@@ -45,7 +45,7 @@ def recorded_sensors(scene: Scene) -> tuple[RecordedSensor, ...]:
 
 
 def sensors_of_header(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedSensor, ...]:
-    """The sensors of a recording; none where an earlier version wrote it.
+    """The sensors of a recording.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def sensors_of_header(file: CheckedFile, header: dict[str, Any]) -> tuple[Record
     """
     try:
         found = []
-        for k, given in enumerate(header.get("sensors", [])):
+        for k, given in enumerate(header["sensors"]):
             cells = None if given["cells"] is None else [int(count) for count in given["cells"]]
             if cells is not None and (len(cells) != 2 or min(cells) < 1):
                 raise ValueError

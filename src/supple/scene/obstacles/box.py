@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,15 +34,6 @@ class Box(Obstacle):
     inside: bool = field(default=False, metadata=parameter("flag", "true where bodies live inside"))
 
     file_kind: ClassVar[str] = "box"
-
-    @classmethod
-    def restored(cls, values: dict[str, Any]) -> Self:
-        if "orientation" in values:  # recordings of version 0.1 keep the matrix
-            from scipy.spatial.transform import Rotation
-
-            values = dict(values)
-            values["rotation"] = Rotation.from_matrix(values.pop("orientation")).as_rotvec()
-        return cls(**values)
 
     @property
     def orientation(self) -> NDArray[np.float64]:

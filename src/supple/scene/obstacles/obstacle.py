@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,11 +57,6 @@ class Obstacle(ABC):
     def parameters(cls) -> dict[str, Parameter]:
         """The declared parameters, by name."""
         return {f.name: f.metadata["parameter"] for f in fields(cls) if "parameter" in f.metadata}
-
-    @classmethod
-    def restored(cls, values: dict[str, Any]) -> Self:
-        """The obstacle of recorded values: those of `values()`, name and friction, and the surface if it has one."""
-        return cls(**values)
 
     @property
     def label(self) -> str:

@@ -30,7 +30,7 @@ def restored_obstacle(kind: str, values: dict[str, Any]) -> Obstacle:
     ------
     KeyError, TypeError, SceneError : where the kind is unknown, or the values are not those of the kind.
     """
-    return KINDS[kind].restored(values)
+    return KINDS[kind](**values)
 
 
 for _kind in (HalfSpace, Box, Sphere, Capsule, Cylinder, TriangleObstacle):

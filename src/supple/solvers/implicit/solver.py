@@ -33,13 +33,11 @@ from supple.solvers.implicit.energies.regularization import regularization_of
 from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
 from supple.solvers.implicit.energies.stitches import StitchEnergy
 from supple.solvers.implicit.inversion_guard import refuse_inverted
-from supple.solvers.implicit.joints.rigidity import Rigidity
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.linear_solver import LinearSolver
 from supple.solvers.implicit.newton.trace import NewtonRow
-from supple.solvers.implicit.stepping.integrators import Integrator, Newmark, Static, integrator_of
-from supple.solvers.implicit.stepping.joint_support import refuse_joints
+from supple.solvers.implicit.stepping.integrators import Integrator, Static, integrator_of
 from supple.solvers.implicit.stepping.reactions import reaction_forces, weld_forces
 from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors
 from supple.solvers.implicit.stepping.substep import StepSettings, Substep, take_substep
@@ -68,7 +66,7 @@ class Implicit(Solver):
 
     Parameters
     ----------
-    integrator : "backward_euler", "bdf2", "newmark" (midpoint), "static", or an `Integrator`.
+    integrator : "backward_euler", "bdf2", "newmark" (midpoint; without rigid bodies), "static", or an `Integrator`.
     tolerance : Newton stops when no vertex's step is longer than this share of the (smallest) body's diagonal, per
         second of the step [1/s]; for "static", than this share of the diagonal [-]. None: 1e-3 1/s or 1e-9, and where
         there is contact no longer than a tenth of `dhat`, with friction than a hundredth of `friction_velocity`.
@@ -144,27 +142,22 @@ class Implicit(Solver):
         Raises
         ------
         SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, free bodies
-            with the static integrator, and joints with integrators that do not hold them.
+            with the static integrator, and what an integrator refuses.
         """
         method, system = integrator_of(self.integrator), with_stitched_points(system)
-        # In a step of the midpoint rule, the rigidity of what joints hold is a condition at its end.
-        midpoint = isinstance(method, Newmark) and bool(system.linked_bodies)
-        elasticity = elasticity_of(system, not midpoint)
+        if refusal := method.refusal(system):
+            raise SolverError(refusal)
+        elasticity = elasticity_of(system)
         contact = None
         if self.contact is not None:
             contact = contact_model(system, self.contact, elasticity.material.mu)
             if contact.system is not system:
                 system = contact.system
-                elasticity = elasticity_of(system, not midpoint)
+                elasticity = elasticity_of(system)
         elif system.obstacles:
             raise SolverError(
                 f"{system.obstacles[0].label}: with contact=None obstacles have no effect; give contact=IPCContact(), "
                 "or remove them"
-            )
-        if isinstance(method, Newmark) and system.laws.material.flowing_laws:
-            raise SolverError(
-                "Implicit: integrator='newmark' cannot simulate Viscoelastic and J2Plastic, which flow to the end of a "
-                "step; use 'backward_euler', 'bdf2' or 'static'"
             )
         free_motion = FreeMotion.of(system)
         if isinstance(method, Static) and len(free_motion.totals):
@@ -173,7 +166,6 @@ class Implicit(Solver):
                 f"body {body.name!r}: nothing holds it, so that it has no static equilibrium; pin some of its "
                 "vertices, or use another integrator"
             )
-        refuse_joints(method, system.scene)
         tools = Tools(
             LinearSolver.of(system, self.linear_solver),
             HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching)),
@@ -194,8 +186,7 @@ class Implicit(Solver):
             stitches,
             damped,
             quadratic_viscosity_of(elasticity),
-            JointGeometry.of(system) if system.scene.joints or midpoint else None,
-            Rigidity.of(system) if midpoint else None,
+            JointGeometry.of(system) if system.scene.joints else None,
         )
 
     def check(self, system: System, state: State, workspace: Workspace) -> None:

@@ -19,6 +19,7 @@ from supple.model.joints.at_state import refuse_moved_welds
 from supple.model.state import State, Status, StepReport
 from supple.model.system import System
 from supple.runtime.thread_tuning import ThreadTuner
+from supple.runtime.threads import numba_threads
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.assessment.assessment import Assessment
 from supple.solvers.xpbd.assessment.softening import enough
@@ -136,11 +137,12 @@ class XPBD(Solver):
         sets = [*build_constraint_sets(inner, layout), *stitch_constraints(inner, extended[:, 3])]
         threads = self.threads or numba.get_num_threads()
         collisions = Collisions(inner, self.contact)
-        assessment = Assessment(inner, self.contact, collisions.edge_length)
         rigid = RigidBodies(inner)
         work = sum(made.work for made in sets) + RIGID_POINT * collisions.rigid_points
         large = work >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
+        with numba_threads(self.threads or (None if large else 1)):
+            assessment = Assessment(inner, self.contact, collisions.edge_length)
         return XPBDWorkspace(
             system=inner,
             layout=layout,
@@ -179,7 +181,8 @@ class XPBD(Solver):
         workspace.joints.check(workspace.welded.inner(state))
         if self.start == "refuse":
             edge_length = workspace.collisions.edge_length
-            raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
+            with numba_threads(workspace.threads):
+                raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
 
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
         """Advance by `dt` [s]. The returned state has its own arrays.

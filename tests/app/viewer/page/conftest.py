@@ -16,6 +16,8 @@ from supple.app.viewer.protocol.snapshots import BodyDescription, Measures, Scen
 from supple.results.recording.actions.stitches import no_stitches
 from supple.results.recording.scene import RecordedObstacle
 
+TOKEN = "the-token-of-the-tests"
+
 
 class FakeSimulation:
     """The interface of a simulation. `received` are the commands, `snapshot` is the newest one."""
@@ -127,7 +129,7 @@ def fake():
 class Visitor:
     """A websocket client that sends the messages of a page, and may read or not."""
 
-    def __init__(self, port: int, query: str = "", reads: bool = True) -> None:
+    def __init__(self, port: int, query: str = f"?token={TOKEN}", reads: bool = True) -> None:
         import viser
         from websockets.sync.client import connect
 
@@ -181,7 +183,7 @@ class Visitor:
             owner="",
         )
 
-    def click(self, handle, origin, direction) -> None:
+    def click(self, handle, origin, direction, modifier=None) -> None:
         self.send(
             "SceneNodeClickMessage",
             name=handle.name,
@@ -189,7 +191,7 @@ class Visitor:
             ray_origin=_plain(origin),
             ray_direction=_plain(direction),
             screen_pos=(0.5, 0.5),
-            modifier=None,
+            modifier=modifier,
             owner="",
         )
 
@@ -231,14 +233,13 @@ def until():
 
 @pytest.fixture
 def server():
-    """A server without access control: all messages of visitors are handled."""
+    """A server of pages."""
     from supple.app.viewer.app import configure_page
-    from supple.results.viser_server import start_server, stop_server
+    from supple.results.view.server import gated_server
 
-    made = start_server("127.0.0.1", 0)
-    configure_page(made)
-    yield made
-    stop_server(made)
+    with gated_server(TOKEN) as made:
+        configure_page(made, "boxes")
+        yield made
 
 
 @pytest.fixture
@@ -338,6 +339,13 @@ class Screen:
     def choose(self, handle, option: str) -> None:
         self.tab.locator(f'[id="{handle._impl.uuid}"]').click()
         self.tab.get_by_role("option", name=option, exact=True).click()
+
+    def write(self, name: str, text: str) -> None:
+        """Type the value of the slider with this label, in the text below it."""
+        label = self.tab.get_by_text(name, exact=True).first
+        box = label.locator("xpath=following::input[contains(@class, 'TextInput')]").first
+        box.fill("")
+        box.press_sequentially(text, delay=20)
 
     def slide(self, handle, key: str, times: int = 1) -> None:
         thumb = self._thumb(handle)

@@ -1,44 +1,39 @@
 """A page displays that its server has ended, and reconnects to a new one."""
 
-import os
+from contextlib import contextmanager
 
 import pytest
+from tests.app.viewer.page.conftest import TOKEN
 
 from supple.app.viewer.app import configure_page
 from supple.app.viewer.live_page import LivePage
-from supple.app.viewer.server.gate import first_free_port
-from supple.results.viser_server import start_server, stop_server
+from supple.results.view.server import gated_server
 
 
-def serve(port, simulation):
-    server = start_server("127.0.0.1", port)
-    configure_page(server)
-    return server, LivePage(server, simulation, simulation.snapshot)
+@contextmanager
+def served(port, simulation):
+    with gated_server(TOKEN, port) as server:
+        configure_page(server, "boxes")
+        page = LivePage(server, simulation, simulation.snapshot)
+        try:
+            yield server
+        finally:
+            page.stop()
 
 
 @pytest.mark.slow
 def test_the_page_reconnects_to_a_restarted_server(fake, look, spot):
-    # Not a port that the system selects: another process may use it before the server restarts.
-    server, page = serve(first_free_port("127.0.0.1", 20_000 + 50 * (os.getpid() % 200)), fake)
-    screen = look(f"http://127.0.0.1:{server.get_port()}", server)
-    connected = screen.tab.get_by_text("Connected", exact=True)
-    screen.wait(lambda: connected.count() == 1 and spot(screen.shot(), "red")[0] > 100, "the page")
-    port = server.get_port()
-    page.stop()
-    stop_server(server)
+    with served(0, fake) as server:
+        port = server.get_port()
+        screen = look(f"http://127.0.0.1:{port}/?token={TOKEN}", server)
+        screen.wait(lambda: spot(screen.shot(), "red")[0] > 100, "the page")
     screen.wait(lambda: screen.tab.get_by_text("Connecting...").count() == 1, "word that the server is gone")
-    assert connected.count() == 0
     # The last picture stays.
-    assert spot(screen.shot(), "red")[0] > 100
-    before = spot(screen.shot(), "red")[1]
+    before = spot(screen.shot(), "red")
+    assert before[0] > 100
     fake.show(positions=fake.snapshot.positions[::-1].copy())  # the bodies exchange their positions
-    server, page = serve(port, fake)
-    try:
+    with served(port, fake) as server:
         assert server.get_port() == port
-        screen.wait(lambda: connected.count() == 1, "the connection")
-        screen.wait(lambda: spot(screen.shot(), "red")[1][0] > before[0] + 50, "the new state in the picture")
-    finally:
+        screen.wait(lambda: spot(screen.shot(), "red")[1][0] > before[1][0] + 50, "the new state in the picture")
         screen.close()
-        page.stop()
-        stop_server(server)
     assert [error for error in screen.errors if "WebSocket" not in error] == []

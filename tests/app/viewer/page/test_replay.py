@@ -1,17 +1,15 @@
 """Recordings on the page, and their exports."""
 
-import io
 import time
 
 import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.app import Address, opened_page
+from supple.app.viewer.app import opened_page
 from supple.app.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
 from supple.app.viewer.drawing.options import ViewOptions
 from supple.app.viewer.drawing.page_of_moments import evenly, page_of_moments
-from supple.app.viewer.drawing.video_capture import gif_of, video_formats
 from supple.app.viewer.replay import Replay
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
@@ -99,22 +97,9 @@ def test_exported_pages_keep_times_and_drop_frames_above_the_limit(recorded, mon
     assert evenly(3, 9) == [0, 1, 2]
 
 
-def test_a_gif_contains_all_pictures():
-    image = pytest.importorskip("PIL.Image")
-    frames = [np.full((20, 30, 3), shade, dtype=np.uint8) for shade in (0, 100, 200)]
-    with image.open(io.BytesIO(gif_of(frames, 10.0))) as capture:
-        assert (capture.n_frames, capture.size, capture.info["duration"]) == (3, (30, 20), 100)
-    assert video_formats()["gif"] == ""
-
-
-def test_the_missing_encoder_is_named(monkeypatch):
-    monkeypatch.setattr("supple.app.viewer.drawing.video_capture.find_spec", lambda name: None)
-    assert "pip install 'supple[video]'" in video_formats()["mp4"]
-
-
 def test_a_recording_in_the_browser(recorded, look, browser, pixels, spot, tmp_path):
     """Pause, the slider, colors with their legend, a screenshot, and a page with stress from the export button."""
-    with opened_page(recorded, Address(port=0)) as page:
+    with opened_page(recorded, 0) as page:
         screen, replay = look(page.url + "&fixedDpr=0.5", page.server), page.content
         where = lambda: spot(screen.shot()[:330], "red")  # noqa: E731 - above the legend
         agree = lambda: screen.reads(replay.slider) == pytest.approx(replay.slider.value, abs=1e-9)  # noqa: E731

@@ -56,13 +56,10 @@ def test_the_reaction_of_a_pin_is_what_changes_the_momentum_of_a_step():
 
 
 def turning(max_substeps):
-    """A damped centimetre of rubber on a rigid cube, so stiff that a turn of 5 degrees in a step strains it."""
+    """Damped rubber of 4 mm, so stiff that a turn of 50 degrees in a step strains it."""
     law = sp.StableNeoHookean(youngs=2e5, poisson=0.3, damping=0.02)
-    soft = sp.Body("soft", sp.shapes.box((0.004, 0.001, 0.001), (8, 2, 2)), law, angular_velocity=(1, 2, 5))
-    cube = sp.shapes.box_surface((0.001, 0.001, 0.001), (1, 1, 1))
-    rigid = sp.RigidBody("rigid", cube, density=1000.0, position=(0.0025, 0, 0), velocity=(0, 0.0125, -0.005))
-    rigid = rigid.changed(angular_velocity=(1, 2, 5))
-    scene = sp.Scene([soft, rigid], welds=[sp.Weld("soft", "rigid", max_distance=1e-6)], gravity=(0, 0, 0))
+    soft = sp.Body("soft", sp.shapes.box((0.004, 0.001, 0.001), (8, 2, 2)), law, angular_velocity=(10, 20, 50))
+    scene = sp.Scene([soft], gravity=(0, 0, 0))
     solver = sp.Implicit(integrator="newmark", max_substeps=max_substeps)
     return [frame.report for frame in sp.simulate(scene, solver, 1 / 60, 4)]
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from supple.app.cli.checkpoints import CheckpointEvery, Overwrite, interval
 from supple.app.cli.exit_codes import ExitCode
-from supple.app.cli.live import Host, Open, Port, UseToken
+from supple.app.cli.live import Open, Port
 from supple.app.cli.numbers import Steps
 
 
@@ -28,10 +28,8 @@ def demo(
     overwrite: Overwrite = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
     live: Annotated[bool, Parameter(name="--live", negative="")] = False,
-    host: Host = "127.0.0.1",
     port: Port = None,
     open_: Open = True,
-    token: UseToken = True,
 ) -> int:
     """Run a named demo, record it, and measure what it claims. Exit code 0: all claims hold, 1: one does not.
 
@@ -62,14 +60,10 @@ def demo(
     live
         Show the scene in a browser while it runs, until Ctrl-C, so that it can be dragged and tuned. Nothing is
         recorded.
-    host
-        With --live: address to serve at; 0.0.0.0 is all addresses of this machine.
     port
         With --live: port to serve at; without it, 8080 or the next free one.
     open_
         With --live: open the page in a browser.
-    token
-        With --live: let in only browsers that have the page's secret; --no-token lets in all of this machine.
     """
     from rich.markup import escape
 
@@ -90,7 +84,7 @@ def demo(
         from supple.app.cli.live import serve_page
         from supple.app.viewer.protocol.live_source import LiveSource
 
-        serve_page(LiveSource(chosen.name, chosen.scene(), chosen.solver(solver), chosen.dt), host, port, open_, token)
+        serve_page(LiveSource(chosen.name, chosen.scene(), chosen.solver(solver), chosen.dt), port, open_)
         return ExitCode.OK
 
     from supple.app.cli.session import Products, run_session

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from supple.app.cli.live import Host, Open, Port, UseToken
+from supple.app.cli.live import Open, Port
 from supple.app.cli.recordings import recording_at
 
 SCENE_FILES = (".yaml", ".yml", ".urdf")
@@ -16,15 +16,13 @@ def view(
     /,
     *,
     solver: str | None = None,
-    host: Host = "127.0.0.1",
     port: Port = None,
     open_: Open = True,
-    token: UseToken = True,
 ) -> None:
     """Show a recording, or a scene that is simulated live and can be dragged and tuned, in a browser.
 
-    Runs until Ctrl-C. Without --host, only this machine can open the page. Its address contains a secret, and only
-    browsers with that address are accepted. A scene's meshes must be in the folder of its file.
+    Runs until Ctrl-C. Only this machine can open the page, at an address that contains a secret; from another one, use
+    `ssh -L`. A scene's meshes must be in the folder of its file.
 
     Parameters
     ----------
@@ -32,14 +30,10 @@ def view(
         A scene file (.yaml), a robot (.urdf), or a recording (.vtkhdf, or the folder that holds it).
     solver
         Kind of solver, instead of the file's, with its default parameters.
-    host
-        Address to serve at; 0.0.0.0 is all addresses of this machine.
     port
         Port to serve at; without it, 8080 or the next free one.
     open_
         Open the page in a browser.
-    token
-        Let in only browsers that have the page's secret; --no-token lets in all of this machine.
     """
     from supple.app.cli.live import serve_page
 
@@ -49,7 +43,7 @@ def view(
             from supple.errors import OutputError
 
             raise OutputError(f"{found} is a recording, which uses no solver; remove --solver")
-        serve_page(found, host, port, open_, token)
+        serve_page(found, port, open_)
         return
 
     from supple.app.scene_file.confined import ConfinedMeshStore
@@ -60,7 +54,7 @@ def view(
     run = load_run(found, ConfinedMeshStore)
     used = run.solver if solver is None else solver_of_kind(solver)
     live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions)
-    serve_page(live, host, port, open_, token)
+    serve_page(live, port, open_)
 
 
 def find_source(path: Path) -> Path:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, sequential
-from supple.app.viewer.controls.inputs.parameter_input import ParameterInput
-from supple.app.viewer.controls.inputs.unit_slider import Scale, UnitSlider
+from supple.app.viewer.controls.parameter_input import ParameterInput
+from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import AddBody, CopyBody, RemoveBody, Squash
 from supple.app.viewer.protocol.parameters import PARAMETERS, Value
 from supple.app.viewer.protocol.snapshots import SceneDescription, Snapshot
-from supple.app.viewer.server.browser_values import one_of
 
 ALL = "all bodies"
 _SQUASH, _STRETCH = 0.5, 1.5
@@ -47,7 +46,6 @@ class BodyControls:
                 Scale(0.03 * size, 3.0 * size, 1e-3, 100.0, "m", logarithmic=True),
                 0.3 * size,
                 hint="Largest side of the new body",
-                changed=_nothing,
             )
             self.resolution = UnitSlider(
                 gui,
@@ -55,7 +53,6 @@ class BodyControls:
                 Scale(limits.COARSEST, 16, limits.COARSEST, limits.FINEST, whole=True),
                 6,
                 hint="Edges of the mesh across the new body",
-                changed=_nothing,
             )
             self.youngs = UnitSlider(
                 gui,
@@ -63,7 +60,6 @@ class BodyControls:
                 Scale(1e3, 1e8, 1e2, 1e11, "Pa", logarithmic=True),
                 1e5,
                 hint="Stiffness of the new body",
-                changed=_nothing,
             )
             self.add = gui.add_button("Add", hint="Add this shape above all bodies")
         self.squash.on_click(sequential(self._squash))
@@ -109,20 +105,20 @@ class BodyControls:
         return {name: found[name] for name in PARAMETERS if name in found}
 
     def _squash(self, event: Any) -> None:
-        factor = _SQUASH if one_of(self.squash.value, ("squash", "stretch")) == "squash" else _STRETCH
+        factor = _SQUASH if self.squash.value == "squash" else _STRETCH
         self._controller.send(event.client, lambda: Squash(factor))
 
     def _change(self, event: Any) -> None:
         whose = self._whose()
         if whose is not None:
-            kind = CopyBody if one_of(self.change.value, ("copy", "remove")) == "copy" else RemoveBody
+            kind = CopyBody if self.change.value == "copy" else RemoveBody
             self._controller.send(event.client, lambda: kind(whose))
 
     def _add(self, event: Any) -> None:
         self._controller.send(
             event.client,
             lambda: AddBody(
-                one_of(self.shape.value, limits.SHAPES),
+                self.shape.value,
                 size=self.new_size(),
                 resolution=round(self.resolution.value),
                 youngs=self.new_youngs(),
@@ -136,7 +132,3 @@ class BodyControls:
     def new_youngs(self) -> float:
         """Young's modulus of a new body [Pa]."""
         return self.youngs.value
-
-
-def _nothing(client: Any, value: float) -> None:
-    """The value is read when a body is added."""

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.app.viewer.controls.plain_markdown import plain
 from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.protocol.quantities import written
 from supple.app.viewer.protocol.snapshots import Snapshot
-from supple.app.viewer.server.plain_markdown import plain
 from supple.results.readings.joint_readings import JointReading
 
 _SECONDS = 10.0  # of simulated time in a plot

@@ -60,8 +60,9 @@ class Mouse:
         server.on_client_disconnect(lambda client: self.release(client.client_id))
 
     def attach(self, stage: Stage) -> None:
-        """Use the bodies of this stage; the stage passes their meshes to `add_handlers`."""
+        """Use the bodies of this stage; and those that it draws later."""
         self._stage = stage
+        stage.prepare_bodies(self.add_handlers)
         self.switch()
 
     def add_handlers(self, handles: list[Any]) -> None:

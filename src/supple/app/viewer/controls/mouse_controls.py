@@ -6,10 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, sequential
-from supple.app.viewer.controls.inputs.unit_slider import Scale, UnitSlider
+from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import RemovePusher, Unpin
-from supple.app.viewer.server.browser_values import one_of
 
 DRAG, PUSH = "drag and pin", "push"
 MODES = (DRAG, PUSH)
@@ -38,7 +37,6 @@ class MouseControls:
                 Scale(0.03, 30.0, limits.WEAKEST_GRAB, limits.STRONGEST_GRAB, logarithmic=True),
                 1.0,
                 hint="Stiffness of the spring, as a factor of one with which the body oscillates at 4 Hz",
-                changed=lambda client, value: None,
             )
             self.radius_input = UnitSlider(
                 gui,
@@ -46,7 +44,6 @@ class MouseControls:
                 Scale(*self._radii, *self._radii, "m"),
                 0.15 * size,
                 hint="Radius of the ball that pushes",
-                changed=lambda client, value: None,
                 visible=False,
             )
             self.unpin = gui.add_button("Unpin all", hint="Release all vertices that were pinned on the page")
@@ -57,7 +54,7 @@ class MouseControls:
     @property
     def pushes(self) -> bool:
         """Whether the mouse moves the ball."""
-        return one_of(self.mode.value, MODES) == PUSH
+        return self.mode.value == PUSH
 
     @property
     def stiffness(self) -> float:
@@ -72,7 +69,7 @@ class MouseControls:
     def _switch(self, event: Any) -> None:
         pushes = self.pushes
         self._hint.content = _HINTS[PUSH if pushes else DRAG]
-        self.strength.handle.visible, self.radius_input.handle.visible = not pushes, pushes
+        self.strength.visible, self.radius_input.visible = not pushes, pushes
         if not pushes:
             self._controller.send(event.client, RemovePusher)
         self._changed()

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, sequential
-from supple.app.viewer.controls.inputs.parameter_input import ParameterInput
-from supple.app.viewer.controls.inputs.pending import PendingValue
+from supple.app.viewer.controls.parameter_input import ParameterInput
+from supple.app.viewer.controls.pending import PendingValue
 from supple.app.viewer.protocol.commands import SetSolver
 from supple.app.viewer.protocol.parameters import PARAMETERS
 from supple.app.viewer.protocol.snapshots import Snapshot
-from supple.app.viewer.server.browser_values import one_of
 
 _KINDS = ("xpbd", "implicit")
 
@@ -55,5 +54,5 @@ class SolverControls:
     def _switch(self, event: Any) -> None:
         if event.client is not None:
             with self._controller.lock:
-                self._kind = one_of(self.kind.value, _KINDS)
+                self._kind = self.kind.value
                 self._pending.requested(self._controller.send(event.client, lambda: SetSolver(self._kind)))

@@ -8,13 +8,12 @@ from typing import Any
 
 from supple.app.viewer.controls.bottleneck import bottleneck
 from supple.app.viewer.controls.controller import Controller, notify, sequential
-from supple.app.viewer.controls.inputs.unit_slider import Scale, UnitSlider
+from supple.app.viewer.controls.plain_markdown import plain
+from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
 from supple.app.viewer.controls.view.overlay import Overlay, button
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import Pause, Play, Reset, SetSpeed, Step
 from supple.app.viewer.protocol.snapshots import Progress, Snapshot
-from supple.app.viewer.server.browser_values import one_of
-from supple.app.viewer.server.plain_markdown import plain
 from supple.errors import SuppleError
 
 _SPEEDS = limits.SLOWEST_MOTION, limits.FASTEST_MOTION
@@ -32,9 +31,7 @@ class TimeControls:
             self._message = gui.add_markdown("")
             self._time_text = ""
             self.play = gui.add_button("Play", hint="Start or stop the time (space bar)")
-            self.frames = gui.add_button_group(
-                "Frames", _FRAME_ACTIONS, hint="One frame (right arrow), or back to the start (R)"
-            )
+            self.frames = gui.add_button_group("Frames", _FRAME_ACTIONS, hint="One frame (N), or back to the start (R)")
             self.speed = UnitSlider(
                 gui,
                 "Slow motion",
@@ -43,7 +40,6 @@ class TimeControls:
                 hint="Simulated seconds in a second; the time step of the solver does not change",
                 changed=lambda client, factor: controller.send(client, lambda: SetSpeed(factor)),
             )
-            # Pressed above the picture.
             self.remedy = gui.add_button("Remedy", visible=False, hint="Make the simulation as fast as time")
             self.restart = gui.add_button("Restart", visible=False, hint="Start the simulation again")
         self.play.on_click(sequential(lambda event: self.toggle(event.client)))
@@ -55,13 +51,12 @@ class TimeControls:
         """Display time, speed and state."""
         self.play.label = "Play" if snapshot.paused else "Pause"
         self._overlay.show("start", self._start(snapshot))
-        start = button("▶" if snapshot.paused else "❚❚", self.play, label=self.play.label)
-        step, reset = (button(text, self.frames, value, value) for text, value in (("+1", "step"), ("⟲", "reset")))
-        self._overlay.show("transport", start + step + reset)
         self._time_text = time_text(snapshot)
         self._show_message(self._time_text)
         slow = bottleneck(snapshot)
-        chosen = "" if slow is None or slow.remedy is None else button(slow.label, self.remedy)
+        self.remedy.visible = slow is not None and slow.remedy is not None
+        self.remedy.label = slow.label if slow is not None and slow.label else "Remedy"
+        chosen = button(slow.label, self.remedy) if slow is not None and slow.remedy is not None else ""
         self._overlay.show("warning", "" if slow is None else f"Too slow: {html.escape(slow.cause)} {chosen}")
 
     def _start(self, snapshot: Snapshot) -> str:
@@ -91,6 +86,7 @@ class TimeControls:
     def show_error(self, error: str) -> None:
         """Display that the simulation has ended, with a button that starts it again."""
         self._show_message(f"**The simulation has ended:** {plain(error)}")
+        self.restart.visible = True
         again = button("Restart the simulation", self.restart)
         self._overlay.show("warning", f"The simulation has ended: {html.escape(error)} {again}")
         self._overlay.show("start", "")
@@ -98,7 +94,7 @@ class TimeControls:
 
     def restarted(self) -> None:
         """The simulation runs again. Called by the thread that calls `show_error`: both set the same buttons."""
-        self.play.disabled = self.speed.handle.disabled = False
+        self.play.disabled = self.speed.handle.disabled = self.restart.visible = False
 
     def _restart(self, event: Any) -> None:
         """Called in a thread: a start takes seconds."""
@@ -129,7 +125,7 @@ class TimeControls:
         self._controller.send(client, Play if self._controller.snapshot.paused else Pause)
 
     def _change_frame(self, event: Any) -> None:
-        self._controller.send(event.client, Step if one_of(self.frames.value, _FRAME_ACTIONS) == "step" else Reset)
+        self._controller.send(event.client, Step if self.frames.value == "step" else Reset)
 
 
 def time_text(snapshot: Snapshot) -> str:

@@ -9,9 +9,8 @@ from typing import Any
 from supple.app.viewer.controls.controller import Controller, notify
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import AddMesh
-from supple.app.viewer.server.uploads.meshing import Upload, mesh_of_upload
-from supple.app.viewer.server.uploads.transfers import Transfers
-from supple.errors import SuppleError
+from supple.app.viewer.uploads import Upload, mesh_of_upload
+from supple.errors import CommandError, SuppleError
 
 _HINT = f"A closed surface, at most {limits.LARGEST_UPLOAD // 2**20} MiB and {limits.MOST_UPLOADED_TRIANGLES} triangles"
 # Characters that are not allowed in names of bodies, see `supple.scene.values.check_name`.
@@ -27,13 +26,13 @@ class UploadControls:
     """
 
     def __init__(
-        self, server: Any, controller: Controller, size: Callable[[], float], youngs: Callable[[], float]
+        self, gui: Any, controller: Controller, size: Callable[[], float], youngs: Callable[[], float]
     ) -> None:
         self._controller, self._size, self._youngs = controller, size, youngs
-        self.button = server.gui.add_upload_button("From a file", mime_type=",".join(limits.UPLOAD_FORMATS), hint=_HINT)
-        self._message = server.gui.add_markdown("", visible=False)
+        self.button = gui.add_upload_button("From a file", mime_type=",".join(limits.UPLOAD_FORMATS), hint=_HINT)
+        self._message = gui.add_markdown("", visible=False)
         self._busy, self._stop = threading.Lock(), threading.Event()
-        self.transfers = Transfers(server, self.button, self._take, self._refuse)
+        self.button.on_upload(self._take)
 
     def stop(self) -> None:
         """Stop the present file, and wait for its end."""
@@ -41,23 +40,22 @@ class UploadControls:
         with self._busy:
             pass
 
-    def _take(self, client: Any, name: str, suffix: str, content: bytes) -> None:
-        upload, youngs = Upload(name, suffix, content, self._size()), self._youngs()
+    def _take(self, event: Any) -> None:
+        """Called in a thread of viser, while page and simulation go on."""
+        file, youngs = self.button.value, self._youngs()
+        name = printable_name(file.name)
         if self._stop.is_set() or not self._busy.acquire(blocking=False):
-            self._refuse(client, f"{name}: another file is being meshed; try again when it is done")
+            self._refuse(event.client, f"{name}: another file is being meshed; try again when it is done")
             return
-        self._show_message(_progress(0.0))
-        threading.Thread(target=self._work, args=(client, upload, youngs), name="supple upload", daemon=True).start()
-
-    def _work(self, client: Any, upload: Upload, youngs: float) -> None:
-        """Runs in its own thread, while page and simulation go on."""
         try:
+            upload = checked_upload(name, file.content, self._size())
+            self._show_message(_progress(0.0))
             vertices, tets = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
-            self._controller.send(client, lambda: AddMesh(vertices, tets, youngs, body_name(upload.name)))
+            self._controller.send(event.client, lambda: AddMesh(vertices, tets, youngs, body_name(name)))
         except SuppleError as error:
-            self._refuse(client, str(error))
+            self._refuse(event.client, str(error))
         except OSError as error:
-            self._refuse(client, f"{upload.name}: it cannot be saved: {error.strerror or error}")
+            self._refuse(event.client, f"{name}: it cannot be saved: {error.strerror or error}")
         finally:
             self._show_message("")
             self._busy.release()
@@ -71,9 +69,26 @@ class UploadControls:
             self._message.content, self._message.visible = text, bool(text)
 
 
+def checked_upload(name: str, content: bytes, size: float) -> Upload:
+    """A file from a browser, of a format and a size that are accepted; raises `CommandError` otherwise."""
+    suffix = "." + name.rpartition(".")[2].lower()
+    if suffix not in limits.UPLOAD_FORMATS:
+        raise CommandError(f"{name}: give a surface as {', '.join(limits.UPLOAD_FORMATS)}")
+    if not 0 < len(content) <= limits.LARGEST_UPLOAD:
+        found = f"{len(content) / 2**20:.3g} MiB" if content else "empty"
+        raise CommandError(f"{name}: it is {found}; the limit is {limits.LARGEST_UPLOAD // 2**20} MiB")
+    return Upload(name, suffix, content, size)
+
+
 def _progress(seconds: float) -> str:
     # Without the name of the file, because this is Markdown.
     return f"The file is being meshed, {seconds:.0f} s."
+
+
+def printable_name(name: str) -> str:
+    """The last part of a path, in printable characters."""
+    last = name.replace("\\", "/").rpartition("/")[2]
+    return "".join(c if c.isprintable() else "?" for c in last)[-60:] or "file"
 
 
 def body_name(file: str) -> str:

@@ -12,7 +12,8 @@ from supple.app.viewer.drawing.moments.model import Model, Moment
 from supple.app.viewer.drawing.options import ViewOptions
 from supple.app.viewer.drawing.stage import Stage
 from supple.results.page import quantum_of, titled
-from supple.results.viser_server import temporary_server
+from supple.results.view.gate import new_token
+from supple.results.view.server import gated_server
 
 MOST_BYTES = 36_000_000  # of moving points before compression; longer sequences keep fewer moments
 
@@ -38,7 +39,7 @@ def page_of_moments(moments: Sequence[tuple[float, Moment]], options: ViewOption
     """
     first = moments[0][1].model
     moments = [moments[i] for i in evenly(len(moments), most_moments(first, options))]
-    with temporary_server() as server:
+    with gated_server(new_token()) as server:  # nobody knows the token
         stage = Stage(server, _rounded(moments[0][1]), options)
         serializer = server.get_scene_serializer()
         previous = moments[0][0]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from supple.app.viewer.drawing.camera import set_initial_camera
 from supple.app.viewer.drawing.coloring.fields import FIELDS, Field
@@ -38,12 +38,11 @@ class Stage:
     Parameters
     ----------
     server : of viser; moment : the first one; options : see `ViewOptions`
-    prepare : called with the meshes of bodies whenever they are created
     """
 
-    def __init__(self, server: Any, moment: Moment, options: ViewOptions, prepare: Prepare | None = None) -> None:
+    def __init__(self, server: Any, moment: Moment, options: ViewOptions) -> None:
         self._server, self._scene = server, server.scene
-        self._prepare = prepare
+        self._prepares: list[Prepare] = []
         # Options change in threads of the server; moments come from the drawing thread.
         self._lock = threading.RLock()
         self.options, self.moment = options, moment
@@ -71,14 +70,20 @@ class Stage:
         """The force of an arrow of half the size of the scene [N]; None where no forces are drawn."""
         return None if self._forces is None else self._forces.full
 
-    def value_on_ray(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[str, float] | None:
-        """The body that a ray meets first, and the value of the field there; None where there is none."""
-        bodies = self._bodies
-        found = bodies.value_on_ray(origin, direction) if isinstance(bodies, TetView) else None
-        if found is None:
-            return None
-        tet, value = found
-        return next(body.name for body in self.model.bodies if body.tets.start <= tet < body.tets.stop), value
+    def tet_on_ray(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
+        """The tet that a ray meets first; None where there is none, or where no tets are drawn."""
+        return self._bodies.tet_on_ray(origin, direction) if isinstance(self._bodies, TetView) else None
+
+    def value_at(self, tet: int) -> float | None:
+        """The value of the field in a tet; None where there is none."""
+        values = self._bodies.values if isinstance(self._bodies, TetView) else None
+        return None if values is None or tet >= len(values) else float(values[tet])
+
+    def prepare_bodies(self, prepare: Prepare) -> None:
+        """Call a function with the meshes of bodies, now and whenever they are made again."""
+        with self._lock:
+            self._prepares.append(prepare)
+            prepare(self._bodies.nodes)
 
     @property
     def body_handles(self) -> list[Any]:
@@ -120,8 +125,8 @@ class Stage:
             self._layers.append(Dots(scene, moment, "/contacts/points", _CONTACT_COLOR, 0.02, _contacts))
         if options.stitches:
             self._layers.append(StitchView(scene, moment))
-        if self._prepare is not None:
-            self._prepare(self._bodies.nodes)
+        for prepare in self._prepares:
+            prepare(self._bodies.nodes)
 
     def _make_bodies(self) -> Layer:
         options, field = self.options, self.field

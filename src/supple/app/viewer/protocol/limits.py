@@ -1,4 +1,4 @@
-"""All limits of the viewer: what a page may request from the simulation, and what a browser may send."""
+"""The limits of what a page may request from the simulation."""
 
 # Lengths and coordinates in a command [m].
 SMALLEST_LENGTH, LARGEST_LENGTH = 1e-4, 1e3
@@ -31,27 +31,13 @@ LONGEST_GRAB = 3.0
 
 # Commands that wait for the simulation; further commands are dropped.
 MOST_WAITING = 512
-# Messages of one browser: rate, and number at once (token bucket). A pointer moves 60 to 240 times a second.
-MESSAGES_PER_SECOND, MESSAGES_AT_ONCE = 600.0, 1_200.0
-# One message of a browser [bytes], and one message with a picture that the server requested.
-LARGEST_MESSAGE, LARGEST_PICTURE = 64 * 1024, 32 * 1024 * 1024
-# Rate of large messages of one browser [bytes/s].
-LARGE_MESSAGES_PER_SECOND = 64 * 1024 * 1024
 
-# Upload of a surface: size of the file and of its parts, as viser sends them [bytes]; number of triangles; time [s] and
-# memory [bytes] for reading and meshing it; number of files at the same time; a transfer that makes no progress for
-# UPLOAD_TIMEOUT [s] is given up.
+# Upload of a surface: size of the file [bytes]; number of triangles; time [s] and memory [bytes] for reading and
+# meshing it.
 UPLOAD_FORMATS = (".stl", ".obj", ".ply", ".off", ".vtp", ".vtk")
-LARGEST_UPLOAD, UPLOAD_PART = 16 * 1024 * 1024, 512 * 1024
+LARGEST_UPLOAD = 16 * 1024 * 1024
 MOST_UPLOADED_TRIANGLES = 20_000
 LONGEST_UPLOAD, UPLOAD_MEMORY = 60.0, 3 * 2**30
-MOST_UPLOADS, UPLOAD_TIMEOUT = 4, 60.0
-
-# Connections of any kind, also without a token; and browsers with an open page.
-MOST_CONNECTIONS = 256
-MOST_CLIENTS = 32
-# In which time a browser sends its first message [s]; a page sends its camera as soon as it is drawn.
-FIRST_MESSAGE = 60.0
 
 # Contact points, and forces of contacts, in a snapshot.
 MOST_CONTACT_POINTS, MOST_CONTACT_FORCES = 2_000, 400

@@ -11,8 +11,6 @@ from supple.results.check.report import CheckResult
 from supple.results.check.snapshot import Scene, Snapshot
 from supple.results.recording.reader import Recording
 
-_NO_STITCHES = "the recording does not contain the laws of its stitches: an older version wrote it"
-_UNKNOWN = "the recording does not contain what acts on its bodies: an older version wrote it"
 # Motion slower than this share of a body's size per step, and energy of the same share, is round-off.
 _FLOOR = 1e-9
 # Energies are recorded and computed here in double precision, each up to round-off of the energies of its elements.
@@ -24,8 +22,6 @@ _PASSIVE = ("contact", "friction", "damping")
 def external_action(recording: Recording) -> str | None:
     """What may act on the scene from outside besides gravity, or None."""
     physics = recording.physics
-    if physics is None:
-        return _UNKNOWN
     if len(recording.pinned_vertices):
         return "pins hold bodies"
     if recording.obstacles:
@@ -118,20 +114,15 @@ class Energy(FrameCheck):
 
     def begin(self) -> None:
         recording = self.scene.recording
-        physics = recording.physics
         self._works = recorded_works(recording)
-        if physics is None:
-            self.why_not = _UNKNOWN
-        elif physics.stitches and recording.stitches.laws is None:
-            self.why_not = _NO_STITCHES
-        elif self._works is None:
+        if self._works is None:
             self.why_not = self._unrecorded()
         self._first: Snapshot | None = None
         self._rows: list[tuple[int, float, float]] = []
 
     def _unrecorded(self) -> str | None:
         physics = self.scene.recording.physics
-        if physics is None or physics.forces or physics.soft_targets:
+        if physics.forces or physics.soft_targets:
             return "forces or soft targets do work"
         if physics.scripted_pins:
             return "scripted pins do work"

@@ -84,8 +84,6 @@ class Volume(FrameCheck):
             return self.settings.max_volume_change
         recording = self.scene.recording
         physics, tets = recording.physics, recording.bodies[number].tets
-        if physics is None:
-            return np.inf
         known = physics.kind[tets] < len(ELASTIC_MATERIALS)
         if not known.all():
             return np.inf

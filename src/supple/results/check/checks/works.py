@@ -93,12 +93,9 @@ class Works(FrameCheck):
         """The works that are not judged, and why: what recordings do not contain."""
         recording = self.scene.recording
         reasons = {name: why for name, why in _NOT_RECORDED.items() if name in recording.other_loads}
-        for name, found in (("cavities", recording.cavities), ("cables", recording.cables)):
-            if not found:
-                reasons[name] = "an older version wrote the recording"
         reasons |= _NEVER_RECORDED
         physics = recording.physics
-        if recording.quadratic is not None and physics is not None:
+        if recording.quadratic is not None:
             fibres = [each.rows for each in physics.active if each.kind == MUSCLE]
             if fibres and np.isin(np.concatenate(fibres), recording.quadratic[0]).any():
                 reasons["muscles"] = "they act in quadratic tets"
@@ -112,10 +109,8 @@ class Works(FrameCheck):
             rigid[body.vertices] = body.rigid
         if "pins" not in self._works:
             return "nothing is pinned"
-        if physics is None or not all(physics.knows_law(k, body.tets) for k, body in enumerate(recording.bodies)):
+        if not all(physics.knows_law(k, body.tets) for k, body in enumerate(recording.bodies)):
             return "the recording does not contain the law of a body"
-        if physics.stitches and recording.stitches.laws is None:
-            return "the recording does not contain the laws of its stitches"
         if rigid[recording.pinned_vertices].any():
             return "a pinned body is rigid"
         if others:

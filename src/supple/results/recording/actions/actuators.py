@@ -49,14 +49,14 @@ def write_actuators(group: h5py.Group, system: System) -> list[dict[str, str]]:
 def read_actuators(
     file: CheckedFile, header: dict[str, Any], vertices: int
 ) -> tuple[tuple[RecordedCavity, ...], tuple[RecordedCable, ...]]:
-    """The cavities and the cables; none in recordings of older versions.
+    """The cavities and the cables.
 
     Raises
     ------
     OutputError : where the data are contradictory.
     """
     cavities, cables = [], []
-    for k, entry in enumerate((header.get("physics") or {}).get("actuators", [])):
+    for k, entry in enumerate(header["physics"]["actuators"]):
         try:
             kind, name = entry["kind"], str(entry["name"])
         except (KeyError, TypeError):
@@ -72,5 +72,5 @@ def read_actuators(
                 raise file.broken("a cable has no span, or a number of it is not finite")
             cables.append(RecordedCable(name, rows, weights, offsets))
         else:
-            raise file.newer(f"an actuator has the kind {kind!r} that this version does not know")
+            raise file.of_another_version(f"an actuator has the unknown kind {kind!r}")
     return tuple(cavities), tuple(cables)

@@ -102,7 +102,7 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
 
 
 def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoint, ...]:
-    """The joints of a recording; none in recordings of older versions.
+    """The joints of a recording.
 
     Raises
     ------
@@ -111,10 +111,10 @@ def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoin
     jointed = [body.get("rigid") is True for body in header["bodies"]] + [True] * len(header["obstacles"])
     joints = []
     try:
-        for given in (header.get("physics") or {}).get("joints", []):
+        for given in header["physics"]["joints"]:
             first, second = int(given["sides"][0]), given["sides"][1]
             low, high = given["limits"]
-            least, most = given.get("twist_limits", (None, None))
+            least, most = given["twist_limits"]
             joint = RecordedJoint(
                 name=str(given["name"]),
                 kind=str(given["kind"]),
@@ -124,7 +124,7 @@ def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoin
                 axis=np.array(given["axis"], dtype=np.float64).reshape(3),
                 limits=(-np.inf if low is None else float(low), np.inf if high is None else float(high)),
                 max_force=np.inf if given["max_force"] is None else float(given["max_force"]),
-                max_velocity=np.inf if given.get("max_velocity") is None else float(given["max_velocity"]),
+                max_velocity=np.inf if given["max_velocity"] is None else float(given["max_velocity"]),
                 twist_limits=(-np.inf if least is None else float(least), np.inf if most is None else float(most)),
             )
             joints.append(joint)

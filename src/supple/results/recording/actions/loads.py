@@ -66,7 +66,7 @@ def read_loads(
     OutputError : where the data are contradictory.
     """
     patterns, others = {}, set()
-    for k, entry in enumerate((header.get("physics") or {}).get("loads", [])):
+    for k, entry in enumerate(header["physics"]["loads"]):
         try:
             kind, work = entry["kind"], str(entry["work"])
             if kind is None:
@@ -77,7 +77,7 @@ def read_loads(
         except (KeyError, TypeError, ValueError):
             raise file.broken("its loads are not described as they should be") from None
         if kind not in ("vector", "pressure", "spring"):
-            raise file.newer(f"a load has the kind {kind!r} that this version does not know")
+            raise file.of_another_version(f"a load has the unknown kind {kind!r}")
         rows = file.indices(f"{_GROUP}/load_{k}/vertices", 3 if kind == "pressure" else 1, vertices)
         weights = file.array(f"{_GROUP}/load_{k}/weights", "f", (len(rows),))
         if not np.isfinite([*weights, x, y, z, stiffness]).all():

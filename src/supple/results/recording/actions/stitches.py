@@ -39,7 +39,6 @@ class RecordedStitches:
     weights : (k, 3) of the corners
     rigid_control, rigid_weights : (r, 4) vertices, and the combination of these that each point of a rigid body is
     anchor_owners : (a,) which obstacle those vertices belong to; anchors : (a, 3) at time 0, before its pose [m]
-    laws : None in recordings of older versions
     """
 
     nodes: NDArray[np.int32]
@@ -48,7 +47,7 @@ class RecordedStitches:
     rigid_weights: NDArray[np.float64]
     anchor_owners: NDArray[np.int32]
     anchors: NDArray[np.float64]
-    laws: StitchLaws | None = None
+    laws: StitchLaws
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -103,22 +102,18 @@ def read_stitches(file: CheckedFile, n: int, obstacles: int) -> RecordedStitches
     owners = file.array("supple/stitches/anchor_owners", "i", (len(anchors),))
     if len(owners) and not 0 <= owners.min() <= owners.max() < obstacles:
         raise file.broken("a stitch is attached to an obstacle that does not exist")
-    control, on_rigid = np.zeros((0, 4), dtype=np.int32), np.zeros((0, 4))
-    if "supple/stitches/rigid_control" in file:  # not in recordings of older versions
-        control = file.indices("supple/stitches/rigid_control", 4, n)
-        on_rigid = file.array("supple/stitches/rigid_weights", "f", (len(control), 4))
+    control = file.indices("supple/stitches/rigid_control", 4, n)
+    on_rigid = file.array("supple/stitches/rigid_weights", "f", (len(control), 4))
     nodes = file.indices("supple/stitches/nodes", 4, n + len(control) + len(anchors))
     weights = file.array("supple/stitches/weights", "f", (len(nodes), 3))
-    laws = None
-    if "supple/stitches/moduli" in file:
-        moduli = file.array("supple/stitches/moduli", "f", (None, 2))
-        inverses = file.array("supple/stitches/rest_shape_inverse", "f", (len(moduli), 3, 3))
-        springs = file.array("supple/stitches/springs", "f", (len(nodes) - len(moduli), 2))
-        laws = StitchLaws(inverses, moduli, springs)
-    return RecordedStitches(nodes, weights, control, on_rigid, owners, anchors, laws)
+    moduli = file.array("supple/stitches/moduli", "f", (None, 2))
+    inverses = file.array("supple/stitches/rest_shape_inverse", "f", (len(moduli), 3, 3))
+    springs = file.array("supple/stitches/springs", "f", (len(nodes) - len(moduli), 2))
+    return RecordedStitches(nodes, weights, control, on_rigid, owners, anchors, StitchLaws(inverses, moduli, springs))
 
 
 def no_stitches() -> RecordedStitches:
     """Of a scene without stitches."""
     nothing, rows = np.zeros(0, dtype=np.int32), np.zeros((0, 4), dtype=np.int32)
-    return RecordedStitches(rows, np.zeros((0, 3)), rows, np.zeros((0, 4)), nothing, np.zeros((0, 3)))
+    laws = StitchLaws(np.zeros((0, 3, 3)), np.zeros((0, 2)), np.zeros((0, 2)))
+    return RecordedStitches(rows, np.zeros((0, 3)), rows, np.zeros((0, 4)), nothing, np.zeros((0, 3)), laws)

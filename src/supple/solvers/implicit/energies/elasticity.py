@@ -81,7 +81,6 @@ class Elasticity(JointlyEvaluated):
     patches : the energy of the tets that are averaged over patches, or None
     laws : the energies of tets that are given by laws, or None
     quadratic : the energy of the quadratic tets, or None
-    with_linked : whether rigid bodies with joints and welds have the energy that keeps them rigid
     """
 
     system: System
@@ -91,7 +90,6 @@ class Elasticity(JointlyEvaluated):
     patches: PatchElasticity | None = None
     laws: LawElasticity | None = None
     quadratic: QuadraticElasticity | None = None
-    with_linked: bool = True
     label = "elasticity"
     projection = Projection.RELEASED_FIRST
 
@@ -154,8 +152,6 @@ class Elasticity(JointlyEvaluated):
         own = (self.material.region == NO_REGION) & (self.material.kind != BY_LAW)
         if self.quadratic is not None:
             own[self.quadratic.rows] = False
-        for part in () if self.with_linked else self.system.linked_bodies:
-            own[part.tets] = False
         return own
 
     @cached_property
@@ -172,8 +168,8 @@ class Elasticity(JointlyEvaluated):
 _NO_HESSIANS = np.zeros((0, 12, 12))
 
 
-def elasticity_of(system: System, with_linked: bool = True) -> Elasticity:
-    """The elastic energy of a system, with or without that of its rigid bodies with joints and welds.
+def elasticity_of(system: System) -> Elasticity:
+    """The elastic energy of a system.
 
     Raises
     ------
@@ -193,7 +189,7 @@ def elasticity_of(system: System, with_linked: bool = True) -> Elasticity:
         quadratic = QuadraticElasticity.of(system.quadratic, material, len(system.rest_positions))
         own[system.quadratic.rows] = False
     laws = _law_elasticity(system, material, own)
-    return Elasticity(system, material, start, incidence, patches, laws, quadratic, with_linked)
+    return Elasticity(system, material, start, incidence, patches, laws, quadratic)
 
 
 def _law_elasticity(system: System, material: TetMaterial, own: NDArray[np.bool_]) -> LawElasticity | None:

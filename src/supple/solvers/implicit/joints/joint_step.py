@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +12,13 @@ from supple.model.joints.geometry import ANGLE, JointGeometry
 from supple.model.joints.laws import laws_of
 from supple.model.state import State, Status
 from supple.solvers.implicit.details import ImplicitDetails
-from supple.solvers.implicit.energies.potential import Potential
 from supple.solvers.implicit.joints.potential import JointPotential
 from supple.solvers.implicit.newton.minimize import Outcome
 
 # The stiffness of a joint in multiples of that of its bodies against strain, and of inertia in a step. Each update of
 # the multipliers divides the violation by about the latter.
 _BODIES = 100.0
-INERTIA = 100.0
+_INERTIA = 100.0
 
 # A joint holds where its violation is below this share of its size.
 _HELD = 1e-7
@@ -42,40 +40,32 @@ class JointStep:
     potential: JointPotential
     updates: int = 0
     last: float = field(default=np.inf)
-    held: ClassVar[float] = _HELD
 
     @classmethod
-    def of(
-        cls, geometry: JointGeometry, start: State, times: tuple[float, float], scale: float | None, weight: float
-    ) -> JointStep:
+    def of(cls, geometry: JointGeometry, start: State, times: tuple[float, float], scale: float | None) -> JointStep:
         """A step between two times [s] from a state.
 
         Parameters
         ----------
-        scale : s of the inertia term [s^2], or None; weight : factor of the energies
+        scale : s of the inertia term [s^2], or None
         """
         stiffness = _BODIES * geometry.stiffness
         if scale is not None:
-            stiffness = stiffness + INERTIA * geometry.masses / scale
+            stiffness = stiffness + _INERTIA * geometry.masses / scale
         g = coordinates_at(geometry, start)
         laws, multipliers = laws_of(geometry, stiffness, g, times, moving=scale is not None)
         zero = np.zeros((len(geometry.differences.joint), 3))
-        return cls(geometry, JointPotential(geometry, times[1], stiffness, laws, g, zero, multipliers, weight))
+        return cls(geometry, JointPotential(geometry, times[1], stiffness, laws, g, zero, multipliers))
 
     def update(self, x: NDArray[np.float64]) -> bool:
         """Whether to continue from x (n, 3) with the multipliers that this call has found there."""
         violation = self.largest_violation(x)
         stuck = violation > _GAIN * self.last and self.updates > 1
-        if violation <= self.held or self.updates == _MOST_UPDATES or stuck:
+        if violation <= _HELD or self.updates == _MOST_UPDATES or stuck:
             return False
         self.updates, self.last = self.updates + 1, violation
         self.renew(x)
         return True
-
-    @property
-    def terms(self) -> list[Potential]:
-        """What the joints add to the objective now."""
-        return [self.potential]
 
     def renew(self, x: NDArray[np.float64]) -> None:
         """Set the multipliers to what balances the forces at x (n, 3)."""
@@ -115,22 +105,12 @@ class JointStep:
             np.maximum.at(out, geometry.arguments[0].joint[function], missing / geometry.units[function])
         return out
 
-    def acting(self, x: NDArray[np.float64]) -> list[tuple[JointPotential, NDArray[np.float64]]]:
-        """Energies whose forces are those of the joints in a step to x (n, 3), and the positions where they act."""
-        return [(self.potential, x)]
-
     def measured(self, details: ImplicitDetails, x: NDArray[np.float64]) -> ImplicitDetails:
         """The details of a step that ended at x (n, 3), with what the joints do there."""
         geometry = self.geometry
-        forces, torques = np.zeros((2, len(geometry.joints), 3))
-        motors: dict[int, float] = {}
-        for potential, there in self.acting(x):
-            force, torque = potential.actions(there)
-            forces, torques = forces + force, torques + torque
-            efforts, laws = potential.efforts(there), potential.laws
-            for k in np.flatnonzero(laws.is_motor):
-                row = int(laws.function[k])
-                motors[row] = motors.get(row, 0.0) - float(efforts[k])
+        forces, torques = self.potential.actions(x)
+        efforts, laws = self.potential.efforts(x), self.potential.laws
+        motors = {int(laws.function[k]): -float(efforts[k]) for k in np.flatnonzero(laws.is_motor)}
         names = [str(joint.name) for joint in geometry.joints]
         along = {name: int(row) for name, row in zip(names, geometry.along, strict=True) if row >= 0}
         return replace(

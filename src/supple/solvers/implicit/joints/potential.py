@@ -24,7 +24,7 @@ _PAIRS_ALONE = (_PAIRS[0] < 4) & (_PAIRS[1] < 4)
 
 @dataclass(frozen=True, eq=False)
 class JointPotential(ContactPotential):
-    """The energy at the end of a step, times `weight`.
+    """The energy at the end of a step.
 
     Attributes
     ----------
@@ -44,19 +44,18 @@ class JointPotential(ContactPotential):
     start: NDArray[np.float64]
     multipliers: NDArray[np.float64]
     law_multipliers: NDArray[np.float64]
-    weight: float = 1.0
 
     def value(self, x: NDArray[np.float64]) -> float:
         q = self.differences(x)
         linear = np.einsum("fi,fi->", self.multipliers + 0.5 * self._k[:, None] * q, q)
-        return self.weight * float(linear + self.laws.energies(self._law_values(x), self.law_multipliers).sum())
+        return float(linear + self.laws.energies(self._law_values(x), self.law_multipliers).sum())
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         geometry = self.geometry
         forces, pulls, _ = self._forces(x)
-        _add(geometry, geometry.differences, self.weight * forces, out)
+        _add(geometry, geometry.differences, forces, out)
         for k, column in enumerate(geometry.arguments if len(pulls) else ()):
-            _add(geometry, column, self.weight * pulls[:, k], out)
+            _add(geometry, column, pulls[:, k], out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         """With `project`, of the functions the nearest positive semi-definite one by their vectors."""
@@ -75,7 +74,7 @@ class JointPotential(ContactPotential):
             eigenvalues, vectors = np.linalg.eigh(H)
             H = np.einsum("sij,sj,skj->sik", vectors, np.maximum(eigenvalues, 0.0), vectors)
         C = np.stack([column.coefficients for column in geometry.arguments], axis=1)
-        blocks = np.einsum("sap,saibj,sbq->spqij", C, self.weight * H.reshape(count, 4, 3, 4, 3), C, optimize=True)
+        blocks = np.einsum("sap,saibj,sbq->spqij", C, H.reshape(count, 4, 3, 4, 3), C, optimize=True)
         out.couplings.append(_couplings(geometry, geometry.arguments[0].joint, blocks))
 
     def differences(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -86,12 +85,6 @@ class JointPotential(ContactPotential):
         """(s,) values of the functions."""
         g = values(self.geometry.functions, self._arguments(x))
         return np.where(turns(self.geometry.functions), self.start + wrapped(g - self.start), g)
-
-    def gradients_of_functions(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(s, 8, 3) by the control points of their joints."""
-        gradients = derivatives(self.geometry.functions, self._arguments(x)).gradient
-        coefficients = np.stack([column.coefficients for column in self.geometry.arguments], axis=1)
-        return np.einsum("sap,sai->spi", coefficients, gradients)
 
     def renewed(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The multipliers (f, 3) and (l,) that balance the forces of this energy at x."""
@@ -136,7 +129,7 @@ class JointPotential(ContactPotential):
     @cached_property
     def _linear_couplings(self) -> Couplings:
         c = self.geometry.differences.coefficients
-        scalars = np.einsum("f,fp,fq->fpq", self.weight * self._k, c, c)
+        scalars = np.einsum("f,fp,fq->fpq", self._k, c, c)
         joint = self.geometry.differences.joint
         total = np.zeros((len(self.geometry.joints), 8, 8))
         np.add.at(total, joint, scalars)

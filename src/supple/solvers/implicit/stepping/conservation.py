@@ -104,19 +104,16 @@ class Conservation:
         return EnergyMade(made)
 
     def gained(self, end: State) -> tuple[float, str] | None:
-        """The share of its energy that a piece with soft bodies has from nowhere after `limit_energy`, and one of them.
+        """The share of its energy that a piece has from nowhere after `limit_energy`, and one of its bodies.
 
-        None where no share is too large. Free rigid bodies have it in their strain, which ends with the step.
+        None where no share is too large.
         """
         if not isinstance(end.memory, EnergyMade) or self.latest is None:
             return None
         m, v = self.system.masses, end.velocities
         kinetic = 0.5 * np.bincount(self.piece, weights=m * np.einsum("ij,ij->i", v, v))
         shares = end.memory.made / np.maximum(self.latest[1] + kinetic, np.finfo(np.float64).tiny)
-        soft = (part for part in self.system.bodies if not part.rigid)
-        share, name = max(
-            ((float(shares[self.piece[part.vertices]].max()), part.name) for part in soft), default=(0.0, "")
-        )
+        share, name = max((float(shares[self.piece[part.vertices]].max()), part.name) for part in self.system.bodies)
         return (share, name) if share > _MOST_MADE else None
 
     def _stored(self, x: NDArray[np.float64]) -> NDArray[np.float64]:

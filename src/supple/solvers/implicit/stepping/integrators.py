@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from supple.errors import SolverError
 from supple.model.state import State
 from supple.model.system import System
+from supple.scene.joints.axis_joint import AxisJoint
+from supple.scene.joints.motors import VelocityMotor
 from supple.solvers.implicit.energies.damping import QuadraticViscosity, StrainRate, Viscosity
 from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
 from supple.solvers.implicit.stepping.conservation import Conservation
@@ -74,6 +76,10 @@ class Integrator(ABC):
     @property
     def without_history(self) -> Integrator | None:
         """The method for a step whose history is not that of a smooth solution; None where a step needs no history."""
+        return None
+
+    def refusal(self, system: System) -> str | None:
+        """Why the method cannot simulate a system; None where it can."""
         return None
 
     @abstractmethod
@@ -160,6 +166,19 @@ class Newmark(Integrator):
 
     name = "newmark"
 
+    def refusal(self, system: System) -> str | None:
+        if system.rigid_bodies:
+            return (
+                f"body {system.rigid_bodies[0].name!r}: Implicit(integrator='newmark') cannot simulate rigid bodies; "
+                "use 'bdf2'"
+            )
+        if system.laws.material.flowing_laws:
+            return (
+                "Implicit: integrator='newmark' cannot simulate Viscoelastic and J2Plastic, which flow to the end of a "
+                "step; use 'backward_euler', 'bdf2' or 'static'"
+            )
+        return None
+
     def plan(self, system: System, state: State, h: float) -> Plan:
         x, v = state.positions, state.velocities
         half = x + 0.5 * h * v
@@ -189,6 +208,15 @@ class Static(Integrator):
     """No inertia, no damping: the step ends in equilibrium, at rest."""
 
     name = "static"
+
+    def refusal(self, system: System) -> str | None:
+        for joint in system.scene.joints:
+            if isinstance(joint, AxisJoint) and isinstance(joint.motor, VelocityMotor):
+                return (
+                    f"{joint.label}: in an equilibrium nothing moves, and its motor has a velocity; give a "
+                    "PositionMotor, or use another integrator"
+                )
+        return None
 
     def plan(self, system: System, state: State, h: float) -> Plan:
         x = state.positions

@@ -25,7 +25,6 @@ from supple.solvers.implicit.energies.potential import Potential
 from supple.solvers.implicit.energies.stitch_damping import StitchDamping
 from supple.solvers.implicit.inversion_guard import InversionGuard
 from supple.solvers.implicit.joints.joint_step import JointStep
-from supple.solvers.implicit.joints.midpoint_step import MidpointJoints, agreeing, joints_in_step
 from supple.solvers.implicit.newton.convergence import Convergence
 from supple.solvers.implicit.newton.minimize import Outcome, Problem, minimize
 from supple.solvers.implicit.newton.objective import Objective
@@ -35,7 +34,7 @@ from supple.solvers.implicit.stepping.contact_step import ContactStep
 from supple.solvers.implicit.stepping.dirichlet import move_pins
 from supple.solvers.implicit.stepping.integrators import Integrator, Plan, Static
 from supple.solvers.implicit.stepping.numerical_energy import makes_energy
-from supple.solvers.implicit.stepping.rigid_bodies import rigid_ends, strained, with_rigid_bodies
+from supple.solvers.implicit.stepping.rigid_bodies import with_rigid_bodies
 from supple.solvers.implicit.stepping.works import works_of_step
 from supple.solvers.implicit.stepping.workspace import Workspace
 
@@ -114,8 +113,6 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     if obstacles:
         # What a script moves has the script's velocity, so that its inertia plays no part.
         state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
-    if workspace.joints is not None and workspace.rigidity is not None and state.memory is None:
-        state = agreeing(workspace.joints, workspace.rigidity, state, h)
     plan = settings.integrator.plan(system, state, h)
     middle = end - (1.0 - plan.place) * h
     forces = total_forces(system, state.positions, middle)
@@ -130,7 +127,7 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     barriers = (inversion_barrier(workspace.elasticity, guard.guarded, onset), guard.quadratic_barrier(onset))
     base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
     times = state.time, end
-    joints = joints_in_step(workspace.joints, workspace.rigidity, state, times, plan.scale, plan.place)
+    joints = None if workspace.joints is None else JointStep.of(workspace.joints, state, times, plan.scale)
     contact = ContactStep(workspace.contact, state.positions, times, plan.contact_weight)
     problem = Problem(
         contact.with_contact(_with_joints(base, joints), state.positions),
@@ -167,30 +164,21 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     angles = {} if joints is None else joints.hinge_angles(x)
     after = State(end, x, plan.velocity(x), plan.memory, internal=internal, hinge_angles=angles)
     residual = plan.place * outcome.end.gradient
-    impact = 0.0
-    if isinstance(joints, MidpointJoints):
-        impact = joints.finish(x, after.velocities, residual, tools)
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     gained = workspace.conservation.gained(after)
     if gained is not None and outcome.status is Status.CONVERGED:
         share, name = gained
         text = f"{100.0 * share:.2g} % of the energy of body {name!r} came from nowhere; take a shorter step"
         outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
-    if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
-        after = rigid_ends(system, state, after, limits)
-        if text := strained(system, after):
-            outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
     acted = state.positions + plan.place * (x - state.positions)
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
     works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, end, workspace)
-    if impact:
-        works["joints"] += impact
     return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual)
 
 
 def _with_joints(objective: Objective, joints: JointStep | None) -> Objective:
     """The objective with the present energy of the joints."""
-    return objective if joints is None else replace(objective, terms=[*objective.terms, *joints.terms])
+    return objective if joints is None else replace(objective, terms=[*objective.terms, joints.potential])
 
 
 def _objective(
@@ -242,7 +230,7 @@ def _first_guess(
     if plan.scale is None:
         return x
     ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
-    ahead = with_rigid_bodies(system, x, ahead, plan.place)
+    ahead = with_rigid_bodies(system, ahead)
     ahead[pinned] = x[pinned]
     system.welding.follow(ahead)
     step = limits.largest_step(x, ahead - x).step

@@ -18,7 +18,6 @@ from supple.solvers.implicit.energies.elasticity import Elasticity, elasticity_o
 from supple.solvers.implicit.energies.regularization import Regularization
 from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
 from supple.solvers.implicit.energies.stitches import StitchEnergy
-from supple.solvers.implicit.joints.rigidity import Rigidity
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.stepping.conservation import Conservation
 
@@ -30,7 +29,6 @@ class Workspace:
     Attributes
     ----------
     system : with the stitched points of rigid bodies after the bodies' vertices, and then the obstacles' vertices
-    rigidity : conditions of rigid bodies, where these have no elastic energy
     diagonal : of the smallest body's bounding box at rest [m]
     checked : the state that `Implicit.check` has accepted, or that the latest step ended with
     grown : the latest growth, and the elastic energy with it
@@ -47,7 +45,6 @@ class Workspace:
     stitch_viscosity: StitchViscosity | None
     quadratic_viscosity: QuadraticViscosity | None
     joints: JointGeometry | None
-    rigidity: Rigidity | None
     checked: State | None = None
     grown: tuple[Growth, Elasticity] | None = None
     conservation: Conservation = field(init=False)
@@ -69,7 +66,7 @@ class Workspace:
         if self.grown is None or not laws.growth.equals(self.grown[0]):
             free = laws.stress_free
             shapes = {"rest_shape_inverse": free.Dm_inv, "rest_volumes": free.volumes, "quadratic": free.quadratic}
-            self.grown = laws.growth, elasticity_of(replace(self.system, **shapes), self.elasticity.with_linked)
+            self.grown = laws.growth, elasticity_of(replace(self.system, **shapes))
             self.conservation = replace(self.conservation, elasticity=self.grown[1], latest=None)
         return self.grown[1]
 

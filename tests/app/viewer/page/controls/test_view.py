@@ -1,4 +1,4 @@
-"""The legend and its range, the value at the pointer, and cameras that fit and follow."""
+"""The legend and its range, the value at a place, and cameras that fit and follow."""
 
 import numpy as np
 
@@ -28,21 +28,21 @@ def test_the_range_of_the_colors_is_chosen(live, fake, visitor, until):
     until(lambda: ">50 kPa<" in legend())
 
 
-def test_the_value_under_the_pointer(live, fake, server, visitor, until):
-    """The camera stands at z = -5 and looks along z."""
-    views = live.panel.views
+def test_the_value_at_a_place_that_is_clicked_with_shift(live, fake, server, visitor, until):
+    views, body = live.panel.views, live.stage.model.bodies[0]
+    middle = live.stage.moment.positions[body.vertices].mean(axis=0)
+    label = lambda: views.probe._label.text if views.probe._label else ""  # noqa: E731
     fake.show(tet_values=np.full(96, 1234.0), tet_quantity="von_mises")
     visitor.set(views.color_by, "von Mises stress")
-    visitor.set(views.probe.pointer, "0.05 0.05")
-    label = lambda: "".join(each.part("value") for each in views.probe._labels.values())  # noqa: E731
-    until(lambda: "1.234 kPa · body 0" in label())
-    fake.show(tet_values=np.full(96, 777.0), tet_quantity="von_mises")
-    until(lambda: "777 Pa · body 0" in label())
-    visitor.set(views.probe.pointer, "0.9 0.9")
-    until(lambda: label() == "")
-    visitor.set(views.probe.pointer, "not a place")
-    visitor.set(views.probe.pointer, "0.05 0.05")
-    until(lambda: "777 Pa" in label())
+    until(lambda: live.stage.value_at(0) is not None and len(live.stage.body_handles[0]._impl.click_cb) == 2)
+    visitor.click(live.stage.body_handles[0], middle + np.array([0.0, 0.0, 5.0]), [0.0, 0.0, -1.0], modifier="shift")
+    until(lambda: label() == "1.234 kPa · body 0")
+    assert fake.received[-1].tet_values == "von_mises"  # nothing is pinned
+    place = views.probe._label.position.copy()
+    assert np.linalg.norm(place - middle) < 0.8
+    fake.show(tet_values=np.full(96, 777.0), tet_quantity="von_mises", positions=fake.snapshot.positions + 1.0)
+    until(lambda: label() == "777 Pa · body 0")
+    np.testing.assert_allclose(views.probe._label.position, place + 1.0, atol=1e-6)
     visitor.set(views.color_by, "body")
     until(lambda: label() == "")
 

@@ -79,7 +79,8 @@ def test_a_new_generation_creates_new_layers(server, fake):
     old = fake.snapshot.description
     new = replace(old, generation=2, bodies=old.bodies[:1], n_vertices=27, n_tets=48)
     heard = []
-    stage._prepare = heard.append
+    stage.prepare_bodies(heard.append)
+    heard.clear()
     stage.show(translator.moment(fake.show(description=new, positions=fake.snapshot.positions[:27])))
     assert [handle.name for handle in stage.body_handles] == ["/bodies/0 body 0"]
     assert heard == [stage.body_handles]

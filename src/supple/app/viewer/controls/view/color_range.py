@@ -9,7 +9,6 @@ from supple.app.viewer.controls.controller import sequential
 from supple.app.viewer.drawing.coloring.color_scale import Range
 from supple.app.viewer.drawing.stage import Stage
 from supple.app.viewer.protocol.quantities import typed, written
-from supple.app.viewer.server.browser_values import one_of
 from supple.errors import CommandError
 
 _FIXED = "fixed"
@@ -42,7 +41,7 @@ class ColorRange:
     @property
     def ends(self) -> Range:
         """The choice."""
-        kind = one_of(self.kind.value, KINDS)
+        kind = self.kind.value
         return Range(fixed=self._fixed) if kind == _FIXED else Range(_SHARES[kind])
 
     def show(self) -> None:

@@ -1,4 +1,4 @@
-"""Keys of the page. "?" lists them, see `server/page/page.js`."""
+"""Keys of the page; viser lists them in its palette of commands (Ctrl+K)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What is drawn above the picture: the start, the state, the legend, and the buttons of a phone.
+"""What is above the picture: the start, the state, the legend, and warnings.
 
-It is the content of an HTML element of the panel that is not displayed there; `server/page/page.js` draws its parts
-above the picture. A button there names an input of the panel, which gets a value when it is pressed.
+They are parts of one HTML element of the panel, which a style sheet places above the picture. A button there is the
+label of a button of the panel: a click on it presses that one.
 """
 
 from __future__ import annotations
@@ -10,7 +10,34 @@ import html
 import threading
 from typing import Any
 
-_MARK = '<div class="supple-overlay">'
+_STYLE = """
+.supple { position: fixed; z-index: 5; left: 10px; font: 13px/1.4 system-ui, sans-serif; color: #24292f;
+  background: #fffd; border-radius: 8px; padding: 5px 10px;
+  --warning: #963c04; --energy: #755200; --smallest: #14663a; }
+[data-mantine-color-scheme="dark"] .supple { color: #e6e8eb; background: #1d1f22dd; --warning: #ffa94d;
+  --energy: #e0b040; --smallest: #6fcf97; }
+.supple label { cursor: pointer; border-radius: 6px; padding: 4px 12px; color: #fff; background: #12805c;
+  white-space: nowrap; }
+#supple-start { left: max(10px, calc(50% - 360px)); bottom: 12%; background: none; }
+#supple-start label { display: block; font-size: min(22px, 4.2vw); padding: 14px 28px; border-radius: 12px; }
+#supple-state { top: 6px; }
+#supple-state svg { display: block; width: 150px; height: 24px; fill: none; stroke: currentColor; }
+#supple-state .energy { color: var(--energy); }
+#supple-state .smallest { color: var(--smallest); }
+#supple-state .row { display: flex; gap: 12px; }
+#supple-warning, #supple-busy { top: 84px; max-width: min(360px, calc(100% - 40px)); color: var(--warning);
+  font-weight: 600; }
+#supple-busy { top: 40%; }
+#supple-legend { bottom: 12px; }
+#supple-legend .bar { height: 12px; width: min(220px, 60vw); border-radius: 3px; }
+#supple-legend .numbers { display: flex; justify-content: space-between; font-variant-numeric: tabular-nums; }
+#supple-arrows { bottom: 84px; }
+.mantine-Slider-markLabel { white-space: nowrap; }
+.mantine-Slider-markWrapper:first-child .mantine-Slider-markLabel { transform: translate(-4px, .05rem) !important; }
+.mantine-Slider-markWrapper:last-child .mantine-Slider-markLabel {
+  transform: translate(calc(4px - 100%), .05rem) !important; }
+.mantine-Notifications-root[data-position="top-left"] { top: 172px !important; }
+"""
 
 
 class Overlay:
@@ -18,36 +45,28 @@ class Overlay:
 
     Parameters
     ----------
-    gui : of viser: of the server for all visitors, of a client for one
+    gui : of viser; style : further rules
     """
 
-    def __init__(self, gui: Any) -> None:
+    def __init__(self, gui: Any, style: str = "") -> None:
         self._lock = threading.Lock()
         self._parts: dict[str, str] = {}
-        self._handle = gui.add_html(_MARK + "</div>", visible=False)
+        self._style = f"<style>{_STYLE}{style}</style>"
+        self._handle = gui.add_html(self._style)
 
-    def show(self, name: str, content: str, **data: str) -> None:
-        """Draw the HTML of a part; "" removes it. `data` are further attributes, `data-...`, of its element."""
+    def show(self, name: str, content: str) -> None:
+        """Draw the HTML of a part; "" removes it."""
         with self._lock:
-            attributes = "".join(f' data-{key}="{html.escape(value)}"' for key, value in data.items())
-            made = f'<div id="supple-{name}"{attributes}>{content}</div>' if content else ""
+            made = f'<div id="supple-{name}" class="supple">{content}</div>' if content else ""
             if self._parts.get(name, "") != made:
                 self._parts[name] = made
-                self._handle.content = f"{_MARK}{''.join(self._parts.values())}</div>"
+                self._handle.content = self._style + "".join(self._parts.values())
 
     def part(self, name: str) -> str:
         """The HTML of a part, or ""."""
         return self._parts.get(name, "")
 
 
-def button(text: str, handle: Any, value: str | None = None, label: str | None = None) -> str:
-    """A button above the picture that sets an input of the panel.
-
-    Parameters
-    ----------
-    handle : of the input, a button or a button group; value : of the group
-    label : for people who do not see it
-    """
-    chosen = "" if value is None else f' data-value="{html.escape(value)}"'
-    named = "" if label is None else f' aria-label="{html.escape(label)}"'
-    return f'<button data-press="{handle._impl.uuid}"{chosen}{named}>{html.escape(text)}</button>'
+def button(text: str, handle: Any) -> str:
+    """A button above the picture that presses a button of the panel."""
+    return f'<label for="{handle._impl.uuid}">{html.escape(text)}</label>'

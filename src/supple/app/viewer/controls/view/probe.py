@@ -1,80 +1,48 @@
-"""The value of the field under the pointer of each visitor."""
+"""The value of the field at a place of a body that a visitor has chosen."""
 
 from __future__ import annotations
 
-import html
-import threading
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.drawing.stage import Stage
 from supple.app.viewer.protocol.quantities import written
 
 
 class Probe:
-    """Draws a label at the pointer of a visitor, where it is over a body with colors.
+    """A label at the tet on which a visitor has clicked with Shift, which moves with it.
 
-    Attributes
+    Parameters
     ----------
-    pointer : a text input, which `server/page/page.js` sets to the place of the pointer
+    server : of viser; stage : draws the bodies
     """
 
     def __init__(self, server: Any, stage: Stage) -> None:
         self._server, self._stage = server, stage
-        self._lock = threading.Lock()
-        self._places: dict[int, tuple[float, float]] = {}  # by visitor
-        self._labels: dict[int, Overlay] = {}
-        self.pointer = server.gui.add_text("beside nothing", "", visible=False)
-        self.pointer.on_update(self._moved)
-        server.on_client_disconnect(self._forget)
+        self._tet: int | None = None
+        self._label: Any = None
+        stage.prepare_bodies(self._add_handlers)
 
     def refresh(self) -> None:
-        """Update all labels."""
-        for visitor, client in self._server.get_clients().items():
-            if visitor in self._places:
-                self._label(visitor, client)
-
-    def _moved(self, event: Any) -> None:
-        if event.client is None:
+        """Update the label; it goes where no field is drawn, or the tet is gone."""
+        stage, tet = self._stage, self._tet
+        value = None if tet is None else stage.value_at(tet)
+        if tet is None or value is None or stage.field is None:
+            if self._label is not None:
+                self._label.remove()
+            self._label = self._tet = None
             return
-        try:
-            x, y = (float(word) for word in str(self.pointer.value).split())
-            place = x, y
-        except ValueError:
-            place = None
-        with self._lock:
-            if place is None or not np.isfinite(place).all():
-                self._places.pop(event.client_id, None)
-            else:
-                self._places[event.client_id] = place
-        self._label(event.client_id, event.client)
+        body = next(body.name for body in stage.model.bodies if body.tets.start <= tet < body.tets.stop)
+        text = f"{written(value, stage.field.unit)} · {body}"
+        place = tuple(stage.moment.finite_positions[stage.model.tets[tet]].mean(axis=0))
+        if self._label is None:
+            self._label = self._server.scene.add_label("/probe", text, position=place)
+        else:
+            self._label.text, self._label.position = text, place
 
-    def _label(self, visitor: int, client: Any) -> None:
-        with self._lock:
-            place, text = self._places.get(visitor), ""
-            field = self._stage.field
-            if place is not None and field is not None:
-                found = self._stage.value_on_ray(np.asarray(client.camera.position), ray(client.camera, *place))
-                if found is not None:
-                    text = html.escape(f"{written(found[1], field.unit)} · {found[0]}")
-            if text and visitor not in self._labels:
-                self._labels[visitor] = Overlay(client.gui)
-            if visitor in self._labels:
-                self._labels[visitor].show("value", text)
+    def _add_handlers(self, handles: list[Any]) -> None:
+        for handle in handles:
+            handle.on_click(modifier="shift")(self._clicked)
 
-    def _forget(self, client: Any) -> None:
-        with self._lock:
-            self._places.pop(client.client_id, None)
-            self._labels.pop(client.client_id, None)
-
-
-def ray(camera: Any, x: float, y: float) -> NDArray[np.float64]:
-    """The direction (3,) in which a camera sees the place (x, y) of its picture, from -1 to 1, y upwards."""
-    from scipy.spatial.transform import Rotation
-
-    w, i, j, k = camera.wxyz
-    half = float(np.tan(0.5 * camera.fov))
-    return Rotation.from_quat([i, j, k, w]).apply([x * half * camera.aspect, -y * half, 1.0])
+    async def _clicked(self, event: Any) -> None:
+        self._tet = self._stage.tet_on_ray(event.ray_origin, event.ray_direction)
+        self.refresh()

@@ -20,7 +20,7 @@ from supple.app.viewer.drawing.layers.forces import COLOR
 from supple.app.viewer.drawing.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.app.viewer.drawing.stage import Stage
 from supple.app.viewer.protocol.quantities import written
-from supple.app.viewer.server.browser_values import number, one_of
+from supple.app.viewer.theme import set_theme
 
 _AXES = ("x", "y", "z")
 _NOTHING = "nothing"
@@ -72,6 +72,7 @@ class ViewControls:
             self.stitches = gui.add_checkbox(
                 "Stitches", initial_value=options.stitches, hint="Lines between stitched surfaces"
             )
+            self.dark = gui.add_checkbox("Dark", initial_value=False, hint="A dark page, for all who look at it")
             self._message = gui.add_markdown("", visible=False)
             self.camera = gui.add_button_group("Camera", PRESETS, hint="Keys 1 to 5; F fits the picture to the bodies")
             self.follow = gui.add_dropdown(
@@ -84,7 +85,9 @@ class ViewControls:
         shape = self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place
         for handle in (*shape, self.velocities, self.contacts, self.stitches):
             handle.on_update(lambda _: self.apply())
+        self.dark.on_update(lambda _: set_theme(server, self.dark.value))
         self.camera.on_click(self._look)
+        server.on_client_connect(self._welcome)
         self.follow.on_update(lambda _: self._begin_to_follow())
 
     def apply(self) -> None:
@@ -93,15 +96,15 @@ class ViewControls:
         with self._lock:
             options = replace(
                 self._stage.options,
-                surface=one_of(self.surface.value, SURFACES),
-                color_by=one_of(self.color_by.value, (COLOR_BY_BODY, *FIELDS)),
+                surface=self.surface.value,
+                color_by=self.color_by.value,
                 ends=self.range.ends,
-                explode=number(self.explode.value, 0.05, 1.5),
-                cut_axis=one_of(self.cut_axis.value, _AXES),
-                cut_place=number(self.cut_place.value, 0.0, 1.0),
-                velocities=bool(self.velocities.value),
-                contacts=bool(self.contacts.value),
-                stitches=bool(self.stitches.value),
+                explode=self.explode.value,
+                cut_axis=self.cut_axis.value,
+                cut_place=self.cut_place.value,
+                velocities=self.velocities.value,
+                contacts=self.contacts.value,
+                stitches=self.stitches.value,
             )
             self.explode.visible = options.surface == "exploded tets"
             self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
@@ -111,11 +114,11 @@ class ViewControls:
             self.refresh()
 
     def refresh(self) -> None:
-        """Update the legend, the labels at pointers, and the text about contacts."""
+        """Update the legend, the value at a chosen place, and the text about contacts."""
         stage = self._stage
         field = stage.field if stage.options.surface != "wireframe" else None
         legend = "" if field is None else bar_html(field, stage.color_range)
-        self._overlay.show("legend", legend, pointer=self.probe.pointer._impl.uuid)
+        self._overlay.show("legend", legend)
         self.probe.refresh()
         full = stage.force_scale
         self._overlay.show("arrows", "" if full is None else arrows_html(full))
@@ -161,9 +164,14 @@ class ViewControls:
             for client in self._server.get_clients().values():
                 follow(client, center - np.asarray(client.camera.look_at))
 
+    def _welcome(self, client: Any) -> None:
+        """In a narrow picture, the camera is farther away than in the one that all get at first."""
+        if client.camera.aspect < 1.0:
+            look_from(client, PRESETS[0], self._stage.model.view)
+
     def _look(self, event: Any) -> None:
         if event.client is not None:
-            look_from(event.client, one_of(self.camera.value, PRESETS), self._stage.model.view)
+            look_from(event.client, self.camera.value, self._stage.model.view)
 
 
 def found_some(points: NDArray[np.float64] | None) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from supple.app.viewer.drawing.coloring.color_scale import NOT_KNOWN_COLOR, Limits, Range, bin_of, palette
 from supple.app.viewer.drawing.coloring.fields import Field
@@ -30,6 +30,7 @@ class TetView(Layer):
     Attributes
     ----------
     range : ends of the color scale; None without a field, or where no value is known
+    values : of the tets (m,); None without a field
     """
 
     def __init__(
@@ -46,7 +47,7 @@ class TetView(Layer):
         self._body = np.empty(len(model.tets), dtype=np.int64)
         for i, body in enumerate(model.bodies):
             self._body[body.tets] = i
-        self._values: NDArray[np.float64] | None = None
+        self.values: NDArray[np.float64] | None = None
         self.update(moment)
 
     def update(self, moment: Moment) -> None:
@@ -57,18 +58,15 @@ class TetView(Layer):
         if self._field is None or self._limits is None:
             color = self._body
         else:
-            self._values = self._field.values(moment)
-            self.range = self._limits.follow(self._values)
-            color = bin_of(self._values, *(self.range or (0.0, 1.0)))
+            self.values = self._field.values(moment)
+            self.range = self._limits.follow(self.values)
+            color = bin_of(self.values, *(self.range or (0.0, 1.0)))
         self._drawn.update(x, color[self._triangles.owner])
 
-    def value_on_ray(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[int, float] | None:
-        """The tet that a ray from `origin` (3,) in `direction` (3,) meets first, and its value; None where none."""
-        hit = None if self._values is None else first_hit(self._corners, origin, direction)
-        if hit is None or self._values is None:
-            return None
-        tet = int(self._triangles.owner[hit[0]])
-        return tet, float(self._values[tet])
+    def tet_on_ray(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
+        """The tet that a ray from `origin` (3,) in `direction` (3,) meets first, or None."""
+        hit = first_hit(self._corners, origin, direction)
+        return None if hit is None else int(self._triangles.owner[hit[0]])
 
     def _offsets(self, moment: Moment) -> NDArray[np.float64]:
         """(m, 3) displacement of each tet from the center of its body [m]."""

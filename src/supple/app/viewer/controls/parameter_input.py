@@ -1,0 +1,81 @@
+"""Inputs of the panel for parameters of the simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from supple.app.viewer.controls.controller import Controller, sequential
+from supple.app.viewer.controls.pending import PendingValue
+from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
+from supple.app.viewer.protocol.commands import SetParameter
+from supple.app.viewer.protocol.parameters import PARAMETERS, Parameter, Value
+
+# Ends of sliders, where the allowed range is too wide for a slider.
+_SLIDER_ENDS = {"gravity": (-20.0, 20.0), "friction": (0.0, 2.0), "poisson": (0.0, 0.499), "youngs": (1e2, 1e9)}
+
+
+class ParameterInput:
+    """A slider or check box for one parameter.
+
+    Parameters
+    ----------
+    gui : of viser; name : of the parameter; value : initial value; whose : returns the name of its body, or None
+    """
+
+    def __init__(
+        self, gui: Any, controller: Controller, name: str, value: Value, whose: Callable[[], str | None] = lambda: None
+    ) -> None:
+        self.parameter: Parameter = PARAMETERS[name]
+        self._controller, self._whose = controller, whose
+        self._pending, self._removed = PendingValue(), False
+        self.value: Value = value
+        parameter = self.parameter
+        label = parameter.label[:1].upper() + parameter.label[1:]
+        if parameter.kind is bool:
+            self.slider = None
+            self.handle = gui.add_checkbox(label, initial_value=bool(value), hint=parameter.hint)
+            self.handle.on_update(sequential(lambda event: self._changed(event.client, bool(self.handle.value))))
+            return
+        low, high = _SLIDER_ENDS.get(name, (parameter.low, parameter.high))
+        scale = Scale(
+            min(low, float(value)),
+            max(high, float(value)),
+            parameter.low,
+            parameter.high,
+            parameter.unit,
+            parameter.logarithmic,
+            parameter.kind is int,
+        )
+        self.slider = UnitSlider(gui, label, scale, value, hint=parameter.hint, changed=self._changed)
+        self.handle = self.slider.handle
+
+    def show(self, value: Value, applied: int) -> None:
+        """Set the input to the value of the simulation, unless the value of a visitor is pending.
+
+        Parameters
+        ----------
+        applied : number of the newest command that the simulation has executed
+        """
+        if value != self.value and not self._pending.is_pending(applied):
+            self.value = value
+            if self.slider is None:
+                self.handle.value = bool(value)
+            else:
+                self.slider.show(float(value))
+
+    def remove(self) -> None:
+        """Remove it from the panel."""
+        self._removed = True
+        (self.slider or self.handle).remove()
+
+    def _changed(self, client: Any, value: Value) -> None:
+        if client is None:
+            return
+        with self._controller.lock:
+            if self._removed or value == self.value:
+                return
+            self.value = value
+            # Within the lock: otherwise `show` could set an old value between the two.
+            name, whose = self.parameter.name, self._whose()
+            self._pending.requested(self._controller.send(client, lambda: SetParameter(name, value, whose)))

@@ -1,0 +1,180 @@
+"""The solution of the rows: Gauss-Seidel sweeps with accumulated impulses, until what a sweep changes is small.
+
+Each row keeps its impulse f. A sweep sets the part along n to max(0, what makes n . r the target), and the part across
+n to what takes back the slip, not longer than the friction coefficient times the first. Both sides get opposite
+impulses. The part across acts at two places that are d n apart, and a couple on the nodes takes its moment back.
+
+Source: Catto, "Iterative Dynamics with Temporal Coherence" (2005), section 6.
+"""
+
+from __future__ import annotations
+
+import math
+
+from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.rows.pairs import SHAPE, is_loaded, weights_of
+
+
+@njit(error_model="numpy")
+def vector(x, rows, e):
+    """r of a row at places x."""
+    a, b, c, d = rows.weights[e, 0], rows.weights[e, 1], rows.weights[e, 2], rows.weights[e, 3]
+    p, q, r, s = row(x, rows.nodes[e, 0]), row(x, rows.nodes[e, 1]), row(x, rows.nodes[e, 2]), row(x, rows.nodes[e, 3])
+    o = row(rows.places, e)
+    return (
+        a * p[0] + b * q[0] + c * r[0] + d * s[0] - o[0],
+        a * p[1] + b * q[1] + c * r[1] + d * s[1] - o[1],
+        a * p[2] + b * q[2] + c * r[2] + d * s[2] - o[2],
+    )
+
+
+@njit(error_model="numpy")
+def displace(points, rows, e, f):
+    """Move the nodes of a row by the impulse f on its first side and its opposite on the second."""
+    for i in range(4):
+        v = rows.nodes[e, i]
+        g = points[v, 3] * rows.weights[e, i]
+        for j in range(3):
+            points[v, j] += g * f[j]
+
+
+@njit(error_model="numpy")
+def _turn(points, begin, rows, e, moment):
+    """Put a couple with this moment about x_n on the four nodes, if all of them can move."""
+    cx = cy = cz = 0.0
+    for i in range(4):
+        v = rows.nodes[e, i]
+        if points[v, 3] == 0.0:
+            return
+        cx, cy, cz = cx + 0.25 * begin[v, 0], cy + 0.25 * begin[v, 1], cz + 0.25 * begin[v, 2]
+    xx = yy = zz = xy = yz = zx = 0.0
+    for i in range(4):
+        v = rows.nodes[e, i]
+        a, b, d = begin[v, 0] - cx, begin[v, 1] - cy, begin[v, 2] - cz
+        xx += b * b + d * d
+        yy += a * a + d * d
+        zz += a * a + b * b
+        xy -= a * b
+        yz -= b * d
+        zx -= d * a
+    first, second, third = (xx, xy, zx), (xy, yy, yz), (zx, yz, zz)
+    one, two, three = cross(second, third), cross(third, first), cross(first, second)
+    det = dot(first, one)
+    # Nodes in a line have no moment about it.
+    if not det > 1e-9 * (0.5 * (xx + yy + zz)) ** 3:
+        return
+    th = (dot(one, moment) / det, dot(two, moment) / det, dot(three, moment) / det)
+    for i in range(4):
+        v = rows.nodes[e, i]
+        d = cross(th, (begin[v, 0] - cx, begin[v, 1] - cy, begin[v, 2] - cz))
+        for j in range(3):
+            points[v, j] += points[v, 3] * d[j]
+
+
+@njit(cache=True, error_model="numpy")
+def solve(points, begin, rows, count, tolerance, most):
+    """Sweep over the rows until no sweep changes an n . r by more than the tolerance [m], at most so many times.
+
+    Returns the number of sweeps, and the largest change in the last one [m].
+    """
+    sweeps, residual = 0, math.inf
+    while sweeps < most and residual > tolerance:
+        sweeps += 1
+        residual = 0.0
+        for e in range(count):
+            mass = rows.masses[e]
+            if mass == 0.0:
+                continue
+            n, f = row(rows.normals, e), row(rows.impulses, e)
+            r = vector(points, rows, e)
+            s, before = dot(n, r), dot(f, n)
+            push = max(0.0, before + (rows.targets[e] - s) * mass)
+            if push == 0.0 and before == 0.0:
+                continue
+            residual = max(residual, abs(push - before) / mass)
+            held = (f[0] - before * n[0], f[1] - before * n[1], f[2] - before * n[2])
+            t = (
+                held[0] - (r[0] - s * n[0]) * mass,
+                held[1] - (r[1] - s * n[1]) * mass,
+                held[2] - (r[2] - s * n[2]) * mass,
+            )
+            size, limit = math.sqrt(dot(t, t)), rows.friction[e] * push
+            share = limit / size if size > limit else 1.0
+            t = (share * t[0], share * t[1], share * t[2])
+            new = (push * n[0] + t[0], push * n[1] + t[1], push * n[2] + t[2])
+            displace(points, rows, e, subtract(new, f))
+            if rows.kinds[e] != SHAPE:
+                m, d = cross(n, subtract(t, held)), rows.distances[e]
+                if m[0] != 0.0 or m[1] != 0.0 or m[2] != 0.0:
+                    _turn(points, begin, rows, e, (-d * m[0], -d * m[1], -d * m[2]))
+            for j in range(3):
+                rows.impulses[e, j] = new[j]
+    return sweeps, residual
+
+
+@njit(cache=True, error_model="numpy")
+def push_kept(points, velocities, near, pairs, walls, gap, h):
+    """Begin a substep with the impulses that are kept, along the normals of now; those that no longer hold are zero."""
+    shape = len(near) - len(walls.gaps)
+    for m in range(len(near)):
+        k = near[m]
+        if not is_loaded(pairs.impulses, k):
+            continue
+        if pairs.kinds[k] == SHAPE:
+            d, n = walls.gaps[m - shape], row(walls.normals, m - shape)
+        else:
+            _, r = weights_of(points, pairs.nodes, k, pairs.kinds[k])
+            d = math.sqrt(dot(r, r))
+            n = (r[0] / d, r[1] / d, r[2] / d)
+        f, old = row(pairs.impulses, k), row(pairs.normals, k)
+        if d > 2.0 * gap or dot(n, old) < 0.5:
+            pairs.impulses[k, :] = 0.0
+            continue
+        push = dot(f, old)
+        t = (f[0] - push * old[0], f[1] - push * old[1], f[2] - push * old[2])
+        push -= dot(t, n)
+        for j in range(3):
+            pairs.impulses[k, j] = push * n[j] + t[j]
+            pairs.normals[k, j] = n[j]
+    # Velocities change only now; the places are those of x_n throughout.
+    for k in near:
+        if not is_loaded(pairs.impulses, k):
+            continue
+        c = (1.0, 0.0, 0.0, 0.0)
+        if pairs.kinds[k] != SHAPE:
+            c, _ = weights_of(points, pairs.nodes, k, pairs.kinds[k])
+        for i in range(4):
+            v = pairs.nodes[k, i]
+            g = points[v, 3] * c[i] / h
+            for j in range(3):
+                velocities[v, j] += g * pairs.impulses[k, j]
+
+
+@njit(cache=True, error_model="numpy")
+def keep_impulses(rows, count, velocities, h, rates, near, pairs):
+    """Keep what the next substep begins with: not what stopped the approach with which this one began.
+
+    Parameters
+    ----------
+    velocities : (N, 3) at the beginning of the substep; rates : (N,) see `response_rates`
+    """
+    for k in near:
+        pairs.impulses[k, :] = 0.0
+    for e in range(count):
+        if rows.masses[e] == 0.0:
+            continue
+        n, f = row(rows.normals, e), row(rows.impulses, e)
+        push = dot(f, n)
+        if not push > 0.0:
+            continue
+        speed, kappa, total = 0.0, 0.0, 0.0
+        for i in range(4):
+            v, c = rows.nodes[e, i], rows.weights[e, i]
+            speed += c * dot(n, row(velocities, v))
+            kappa += abs(c) * rates[v]
+            total += abs(c)
+        approach = max(0.0, -h * speed - max(0.0, rows.distances[e] - rows.targets[e]))
+        share = max(0.0, 1.0 - approach * rows.masses[e] / push) / (1.0 + h * h * kappa / total)
+        for j in range(3):
+            pairs.impulses[rows.pairs[e], j] = share * f[j]

@@ -1,0 +1,37 @@
+"""One substep of XPBD on rows: contact is found at x_n, where nothing crosses, and nothing can cross."""
+
+from __future__ import annotations
+
+from supple.solvers.xpbd.damping.kelvin_voigt import Damping
+from supple.solvers.xpbd.integration import hold, predict, update_velocities
+from supple.solvers.xpbd.rows.contact import RowContact
+from supple.solvers.xpbd.workspace import XPBDWorkspace
+
+
+def substep(ws: XPBDWorkspace, contact: RowContact, damping: Damping | None, targets, time: float, h: float) -> None:
+    """Advance the arrays of the workspace by h [s], to `time` [s].
+
+    Parameters
+    ----------
+    damping : whose cycle has begun, None where nothing is damped; targets : (k, 3) of the pinned vertices [m]
+    """
+    x_n, x, v = ws.previous, ws.points, ws.velocities
+    contact.begin(time, h)  # lists, and the impulses kept of the substep before
+    predict[False](x, x_n, v, ws.system.gravity, h)
+    if len(targets):
+        hold(x, ws.system.pinned_vertices, targets, ws.origins)
+    ws.anchors.place(ws.extended, ws.origins, time)
+    if damping is not None:
+        damping.push(x, h)
+    for constraints in ws.sets:
+        constraints.project(ws.extended, h, False)
+    if ws.momentum is None:
+        update_velocities(x, x_n, v, h)
+    else:
+        ws.momentum.apply(x, x_n, v, h, False)
+    rows = contact.detect()
+    contact.solve(rows)
+    low = contact.hold_volumes(rows)
+    update_velocities(x, x_n, v, h)
+    contact.keep(rows)
+    contact.admit(rows, low)
