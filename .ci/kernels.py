@@ -1,7 +1,8 @@
 """The kernels of the standard scenes: `python .ci/kernels.py` (`make kernels`).
 
-Runs each scene in a process of its own, with an empty cache, for a processor that most machines have. Writes the list
-of its kernels (`supple/runtime/kernels.json`), and the kernels to `build/kernels`, from where `make dist` packs them.
+Runs each scene in a process of its own, and writes the list of its kernels (`supple/runtime/kernels.json`). Then
+compiles them for a processor that most machines have, to `build/kernels`, from where `make dist` packs them. With
+`--list`, only the list is written.
 """
 
 from __future__ import annotations
@@ -58,32 +59,48 @@ def kernels_of(name: str) -> list[tuple[str, list]]:
     return list(used.values())
 
 
-def main() -> None:
-    from llvmlite.binding import get_process_triple
-
+def kernels_of_all(environment: dict[str, str]) -> dict[str, list]:
+    """The kernels of each standard scene, from processes that run in an environment."""
     from supple.app.demos.standard_scenes import STANDARD_SCENES
-    from supple.runtime.kernel_folder import TARGET
-    from supple.runtime.kernel_list import PATH, write_list
-
-    shutil.rmtree(KERNELS, ignore_errors=True)
-    cache = KERNELS.with_name("compiled")
-    shutil.rmtree(cache, ignore_errors=True)
 
     def kernels(name: str) -> list:
         command = [sys.executable, __file__, name]
-        done = subprocess.run(command, env=environment(cache), stdout=subprocess.PIPE, text=True, check=True)
+        done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
         return json.loads(done.stdout.splitlines()[-1])
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        scenes = dict(zip(STANDARD_SCENES, pool.map(kernels, STANDARD_SCENES), strict=True))
-    write_list(scenes)
+        return dict(zip(STANDARD_SCENES, pool.map(kernels, STANDARD_SCENES), strict=True))
+
+
+def pack() -> None:
+    """Compile the kernels of the list, and what the scenes need besides them, for `target`."""
+    from llvmlite.binding import get_process_triple
+
+    from supple.runtime.kernel_folder import TARGET
+
+    cache = KERNELS.with_name("compiled")
+    for folder in (KERNELS, cache):
+        shutil.rmtree(folder, ignore_errors=True)
+    subprocess.run([sys.executable, "-m", "supple", "warm"], env=environment(cache), check=True)
+    kernels_of_all(environment(cache))
     KERNELS.mkdir(parents=True)
     for entry in (cache / "supple").glob("*.kernel"):
         shutil.copy(entry, KERNELS)
     (KERNELS / TARGET).write_text(json.dumps([get_process_triple(), *target()]), encoding="utf-8")
     size = sum(entry.stat().st_size for entry in KERNELS.iterdir())
-    print(f"{len(list(KERNELS.glob('*.kernel')))} kernels, {size / 1e6:.0f} MB, for {target()[0]}; list: {PATH}")
+    print(f"{len(list(KERNELS.glob('*.kernel')))} kernels, {size / 1e6:.0f} MB, for {target()[0]}")
+
+
+def main(arguments: list[str]) -> None:
+    from supple.runtime.kernel_list import write_list
+
+    if arguments not in ([], ["--list"]):
+        print(json.dumps(kernels_of(arguments[0])))
+        return
+    write_list(kernels_of_all(dict(os.environ)))
+    if not arguments:
+        pack()
 
 
 if __name__ == "__main__":
-    print(json.dumps(kernels_of(sys.argv[1]))) if len(sys.argv) > 1 else main()
+    main(sys.argv[1:])

@@ -28,12 +28,12 @@ def test_signatures_survive_the_list():
 
 
 def test_the_list_is_that_of_the_standard_scenes_and_names_kernels():
-    """Where this fails, run `make kernels`."""
+    """Where this fails, run `python .ci/kernels.py --list`."""
     import_kernels()
     listed = kernels_of_scenes()
     assert list(listed) == list(STANDARD_SCENES)
     unknown = {name for kernels in listed.values() for name, _ in kernels} - KERNELS.keys()
-    assert not unknown, "the code has other kernels than the list: run `make kernels`"
+    assert not unknown, "the code has other kernels than the list: run `python .ci/kernels.py --list`"
 
 
 def test_what_is_written_is_read(tmp_path, monkeypatch):

@@ -29,12 +29,16 @@ def _ball(solver: Solver) -> Callable[[], None]:
 
 
 def _demo(name: str) -> Callable[[], None]:
+    """The first second of a demo; what it needs later is compiled then."""
+
     def run() -> None:
         demo = find_demo(name)
         measurement = demo.measurement()
         with TemporaryDirectory() as folder:
             recorder = sp.Recorder(Path(folder) / "recording.vtkhdf")
-            for frame in sp.simulate(demo.scene(), demo.solver(), demo.dt, demo.steps, sinks=[measurement, recorder]):
+            for frame in sp.simulate(
+                demo.scene(), demo.solver(), demo.dt, round(1.0 / demo.dt), sinks=[measurement, recorder]
+            ):
                 _ = frame.report
             measurement.claims()
 
