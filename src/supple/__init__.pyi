@@ -68,12 +68,12 @@ from .results.check.settings import CheckSettings as CheckSettings
 from .results.export.exporter import export as export
 from .results.frame import Frame as Frame
 from .results.frame import Report as Report
-from .results.page import write_page as write_page
 from .results.plots import plot_recording as plot_recording
 from .results.progress import ProgressBar as ProgressBar
 from .results.recording.reader import Recording as Recording
 from .results.recording.reader import read_recording as read_recording
 from .results.recording.recorder import Recorder as Recorder
+from .results.view.page import write_page as write_page
 from .scene.actuators.cable import Cable as Cable
 from .scene.actuators.cavity import Cavity as Cavity
 from .scene.actuators.gas import Gas as Gas

@@ -6,9 +6,10 @@ import time
 
 import numpy as np
 
-from supple.results import page as page_module
-from supple.results.page import write_page
 from supple.results.recording.reader import read_recording
+from supple.results.view import page as page_module
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.page import write_page
 
 
 def test_the_page_plays_in_a_browser(tmp_path, tools, browser, pixels):
@@ -67,13 +68,11 @@ def test_long_recordings_are_shown_with_fewer_frames(tmp_path, recorded, monkeyp
 
 
 def test_vertices_are_rounded_by_less_than_a_pixel(recording):
-    from supple.results.drawing import view_of
-
-    view = view_of(recording)
-    quantum = page_module.quantum_of(view)
-    assert quantum < 2.0 * view.radius / 4000.0
-    x = recording[5].state.positions
-    np.testing.assert_allclose(page_module._rounded(x, quantum), x, atol=0.51 * quantum)
+    model = model_of_recording(recording)
+    quantum = page_module.quantum_of(model.view)
+    assert quantum < 2.0 * model.view.radius / 4000.0
+    moment = moment_of_frame(model, recording[5])
+    np.testing.assert_allclose(page_module._rounded(moment).positions, moment.positions, atol=0.51 * quantum)
 
 
 def test_pages_of_open_recordings_leave_them_open(tmp_path, recorded):

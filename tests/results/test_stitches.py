@@ -7,8 +7,8 @@ import pytest
 import supple as sp
 from supple.model.system import initial_state
 from supple.results import page as page_module
-from supple.results.page import write_page
 from supple.results.plots import plot_recording
+from supple.results.view.page import write_page
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 
 SOFT = sp.StableNeoHookean(youngs=1e4, poisson=0.3)

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.drawing.layers.obstacles import ObstacleView
-from supple.app.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
-from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.app.viewer.engine.measurement.contact_points import contact_points
 from supple.app.viewer.engine.measurement.describe import describe
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop
+from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.results.drawing import obstacle_pictures, view_of
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.layers.obstacles import ObstacleView
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.polyhedra import hull, round_ball

@@ -11,10 +11,10 @@ from typing import Any
 from supple.errors import OutputError
 from supple.model.system import build_system, initial_state
 from supple.results.frame import Frame, start_frame
-from supple.results.page import write_page
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
 from supple.results.recording.recorder import Recorder
+from supple.results.view.page import write_page
 from supple.runtime.replacing import whole_file
 from supple.scene.scene import Scene
 

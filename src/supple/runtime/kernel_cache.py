@@ -20,16 +20,16 @@ import llvmlite
 import numba
 import numpy as np
 from numba import prange
-from numba.core import config, types
+from numba.core import config
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
-from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 from numba.np.numpy_support import numpy_version
 from numpy.typing import NDArray
 
 from supple.runtime import kernel_folder
+from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly
 from supple.runtime.kernel_count import WATCHERS
 from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
@@ -94,36 +94,15 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
 def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> Any:
     # Nothing calls a kernel from C; without that wrapper, compilation takes some 6 % less time.
     options = {"nogil": True, "no_cfunc_wrapper": True, **options}
-    compiled: Any = numba.njit(**options)(function)
+    compiled: Any = numba.njit(**options, pipeline_class=KernelCompiler)(function)
     if not isinstance(compiled, Dispatcher):  # NUMBA_DISABLE_JIT is set
         return compiled
+    compare_quickly(compiled)
     if cache:
         compiled._cache = kept = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
         KERNELS[kept.name] = compiled
         return compiled
     return InnerFunction(function, {}, compiled.targetoptions)
-
-
-class InnerFunction(CPUDispatcher):
-    """A function that kernels call. It is compiled without a wrapper for calls from Python, in some 8 % less time.
-
-    Called from Python, as in tests, it is compiled once more, with the wrapper.
-    """
-
-    def __init__(self, py_func: FunctionType, locals: dict[str, Any], targetoptions: dict[str, Any]) -> None:
-        super().__init__(py_func, locals, {**targetoptions, "no_cpython_wrapper": True})
-
-    def get_call_template(self, args, kws):
-        """Numba would compile a function once more for each constant, such as True, that a call passes."""
-        return super().get_call_template(tuple(map(types.unliteral, args)), kws)
-
-    def __call__(self, *values: Any) -> Any:
-        return self._from_python(*values)
-
-    @cached_property
-    def _from_python(self) -> Any:
-        options: dict[str, Any] = {**self.targetoptions, "no_cpython_wrapper": False}
-        return numba.jit(**options)(self.py_func)
 
 
 def _called_kernels(function: FunctionType) -> dict[str, ParallelKernel]:

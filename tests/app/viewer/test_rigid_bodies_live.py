@@ -7,17 +7,17 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.controls.measures import measures_text
-from supple.app.viewer.drawing.layers.joints import JointView
-from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
-from supple.app.viewer.drawing.picking import nearest_surface_point, surface_point_on_ray
 from supple.app.viewer.engine.measurement.contact_points import contact_points
 from supple.app.viewer.engine.measurement.describe import describe, measures
 from supple.app.viewer.engine.scene.changes import change, without_body
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop
+from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.protocol import commands
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
+from supple.results.view.layers.joints import JointView
+from supple.results.view.picking import nearest_surface_point, surface_point_on_ray
 
 
 @pytest.fixture

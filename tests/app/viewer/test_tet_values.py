@@ -5,10 +5,10 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.engine.measurement.contact_points import contact_points
-from supple.app.viewer.engine.measurement.tet_values import QUANTITIES, tet_values
 from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import build_system
+from supple.results.readings.tet_values import QUANTITIES, tet_values
 
 
 def cube_system(material, **parts):

@@ -8,13 +8,13 @@ import time
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, Simulation
-from supple.app.viewer.drawing.frame_rate import FrameRate
-from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
-from supple.app.viewer.drawing.options import ViewOptions
-from supple.app.viewer.drawing.stage import Stage
+from supple.app.viewer.frame_rate import FrameRate
+from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.panel import Panel
 from supple.app.viewer.protocol.commands import Watch
 from supple.app.viewer.protocol.snapshots import Progress, Snapshot
+from supple.results.view.options import ViewOptions
+from supple.results.view.stage import Stage
 
 logger = logging.getLogger(__name__)
 

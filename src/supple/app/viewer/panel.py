@@ -18,11 +18,11 @@ from supple.app.viewer.controls.view.keys import add_keys
 from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.controls.view.record_controls import RecordControls
 from supple.app.viewer.controls.view.view_controls import ViewControls
-from supple.app.viewer.drawing.coloring.fields import FIELDS
-from supple.app.viewer.drawing.options import ViewOptions
-from supple.app.viewer.drawing.stage import Stage
 from supple.app.viewer.protocol.commands import Reset, SetView, Step
 from supple.app.viewer.protocol.snapshots import Snapshot
+from supple.results.view.fields import FIELDS
+from supple.results.view.options import ViewOptions
+from supple.results.view.stage import Stage
 
 _NUMBERS_EVERY = 0.15  # [s]; numbers that change faster cannot be read
 _PLOTS_EVERY = 0.5  # [s]

@@ -15,13 +15,13 @@ from supple.app.viewer.controls.view.keys import add_keys
 from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.controls.view.record_controls import RecordControls
 from supple.app.viewer.controls.view.view_controls import ViewControls
-from supple.app.viewer.drawing.frame_rate import FrameRate
-from supple.app.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
-from supple.app.viewer.drawing.moments.model import Moment
-from supple.app.viewer.drawing.options import ViewOptions
-from supple.app.viewer.drawing.page_of_moments import evenly, most_moments, page_of_moments
-from supple.app.viewer.drawing.stage import Stage
+from supple.app.viewer.frame_rate import FrameRate
 from supple.results.recording.reader import Recording
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.model import Moment
+from supple.results.view.options import ViewOptions
+from supple.results.view.page import page_of_frames
+from supple.results.view.stage import Stage
 
 _SLOWEST, _FASTEST = 0.05, 4.0
 _KEPT = 64  # frames
@@ -106,9 +106,8 @@ class Replay:
 
     def page(self) -> str:
         """The whole recording as HTML page, with the present view options."""
-        options = self.stage.options
-        chosen = evenly(len(self._recording), most_moments(self._model, options))
-        return page_of_moments([(float(self._recording.times[i]), self.moment(i)) for i in chosen], options)
+        with self._reading:
+            return page_of_frames(self._recording, self._recording, self.stage.options)
 
     def frame_at(self, seconds: float) -> int:
         """The frame to draw at a time [s]: the last one that is not later."""

@@ -43,7 +43,7 @@ FORMATS = {
     "gif": Format("export.video:write_video", (".gif",)),  # (extra: video)
     "mp4": Format("export.video:write_video", (".mp4",)),  # (extra: video)
     "csv": Format("export.table:write_csv", (".csv",)),  # the reports of all frames
-    "html": Format("page:write_page", (".html", ".htm")),  # plays the recording in a browser
+    "html": Format("view.page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }
 
 

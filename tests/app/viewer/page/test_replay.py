@@ -7,12 +7,12 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.app import opened_page
-from supple.app.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
-from supple.app.viewer.drawing.options import ViewOptions
-from supple.app.viewer.drawing.page_of_moments import evenly, page_of_moments
 from supple.app.viewer.replay import Replay
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.options import ViewOptions
+from supple.results.view.page import _evenly, page_of_moments
 
 STEPS = 30
 
@@ -83,18 +83,18 @@ def test_frames_at_times_between_and_beyond_frames(replay):
 
 
 def test_exported_pages_keep_times_and_drop_frames_above_the_limit(recorded, monkeypatch):
-    from supple.app.viewer.drawing import page_of_moments as module
+    from supple.results.view import page as module
 
     with read_recording(recorded) as recording:
         model = model_of_recording(recording)
         taken = [(frame.time, moment_of_frame(model, frame)) for frame in recording]
         whole = page_of_moments(taken, ViewOptions("tets", "volume ratio J"))
-        monkeypatch.setattr(module, "MOST_BYTES", 1)
+        monkeypatch.setattr(module, "_MOST_BYTES", 1)
         thin = page_of_moments(taken, ViewOptions("tets", "volume ratio J"))
     assert len(thin) < len(whole)
     assert "<title>ball · Supple</title>" in thin
-    assert evenly(10, 4) == [0, 3, 6, 9]
-    assert evenly(3, 9) == [0, 1, 2]
+    assert _evenly(10, 4) == [0, 3, 6, 9]
+    assert _evenly(3, 9) == [0, 1, 2]
 
 
 def test_a_recording_in_the_browser(recorded, look, browser, pixels, spot, tmp_path):

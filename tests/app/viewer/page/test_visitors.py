@@ -50,8 +50,8 @@ def test_a_visitor_who_never_reads_does_not_block_others(busy, server, visit, un
 
 
 def test_the_frame_rate_decreases_where_the_server_falls_behind(server, until, monkeypatch):
-    from supple.app.viewer.drawing import frame_rate as frame_rate_module
-    from supple.app.viewer.drawing.frame_rate import FASTEST, FrameRate
+    from supple.app.viewer import frame_rate as frame_rate_module
+    from supple.app.viewer.frame_rate import FASTEST, FrameRate
 
     frame_rate = FrameRate(server)
     loop = server.get_event_loop()
@@ -74,7 +74,7 @@ def test_the_frame_rate_decreases_where_the_server_falls_behind(server, until, m
 
 
 def test_pictures_go_on_after_one_that_raises(server, until):
-    from supple.app.viewer.drawing.frame_rate import FrameRate
+    from supple.app.viewer.frame_rate import FrameRate
 
     frame_rate = FrameRate(server)
     with pytest.raises(ValueError, match="no picture"), frame_rate.sending():

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from supple.app.viewer.controls.controller import Controller
 from supple.app.viewer.controls.mouse_controls import MouseControls
-from supple.app.viewer.drawing.camera import fit
-from supple.app.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
-from supple.app.viewer.drawing.stage import Stage
 from supple.app.viewer.protocol.commands import Command, Grab, MoveGrab, MovePusher, Pin, ReleaseGrab, Unpin
+from supple.results.view.camera import fit
+from supple.results.view.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
+from supple.results.view.stage import Stage
 
 _BACKDROP = "/backdrop"
 

@@ -15,7 +15,6 @@ from supple.app.viewer.engine.displayed_states import LONGEST_UNSEEN, between, w
 from supple.app.viewer.engine.measurement.contact_points import contact_points
 from supple.app.viewer.engine.measurement.describe import describe, measures
 from supple.app.viewer.engine.measurement.readings import readings, strongest_forces
-from supple.app.viewer.engine.measurement.tet_values import tet_values
 from supple.app.viewer.engine.pacing import Pacing
 from supple.app.viewer.engine.scene.changes import change
 from supple.app.viewer.engine.scene.live_scene import LiveScene
@@ -28,6 +27,7 @@ from supple.app.viewer.protocol.snapshots import Notice, Snapshot
 from supple.contact.mesh.obstacle_poses import ObstaclePoses
 from supple.errors import SuppleError
 from supple.model.state import State
+from supple.results.readings.tet_values import tet_values
 
 logger = logging.getLogger(__name__)
 

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
+from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.protocol.commands import SetSpeed
 from supple.app.viewer.protocol.snapshots import GrabState
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.drawing.coloring.color_scale import BINS, Limits, Range, bar_html, bin_of
-from supple.app.viewer.drawing.coloring.fields import FIELDS
-from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
+from supple.app.viewer.controls.view.legend import bar_html
+from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
+from supple.results.view.color_scale import BINS, Limits, Range, bin_of
+from supple.results.view.fields import FIELDS
 
 J, MISES, ENERGY = FIELDS.values()
 

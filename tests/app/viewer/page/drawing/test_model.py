@@ -3,8 +3,8 @@
 import numpy as np
 
 import supple as sp
-from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
-from supple.app.viewer.drawing.moments.model import facets_of
+from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.results.view.model import facets_of
 
 
 def test_every_facet_is_found_once_and_outer_facets_are_the_surface():

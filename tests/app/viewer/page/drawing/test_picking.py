@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
-from supple.app.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
+from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.results.view.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
 
 
 @pytest.fixture

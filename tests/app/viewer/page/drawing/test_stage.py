@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from supple.app.viewer.drawing.coloring.fields import FIELDS
-from supple.app.viewer.drawing.layers.section import Cut, surface
-from supple.app.viewer.drawing.layers.springs import length_text
-from supple.app.viewer.drawing.layers.tets import exploded_facets
-from supple.app.viewer.drawing.moments.from_snapshot import MomentBuilder
-from supple.app.viewer.drawing.options import COLOR_BY_BODY, SURFACES, ViewOptions
-from supple.app.viewer.drawing.stage import Stage
+from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.results.drawing import body_color
 from supple.results.recording.actions.stitches import no_stitches
 from supple.results.recording.scene import RecordedObstacle
+from supple.results.view.fields import FIELDS
+from supple.results.view.layers.section import Cut, surface
+from supple.results.view.layers.springs import length_text
+from supple.results.view.layers.tets import exploded_facets
+from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
+from supple.results.view.stage import Stage
 
 
 def kept_messages(server):

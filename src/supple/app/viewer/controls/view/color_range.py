@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.app.viewer.controls.controller import sequential
-from supple.app.viewer.drawing.coloring.color_scale import Range
-from supple.app.viewer.drawing.stage import Stage
 from supple.app.viewer.protocol.quantities import typed, written
 from supple.errors import CommandError
+from supple.results.view.color_scale import Range
+from supple.results.view.stage import Stage
 
 _FIXED = "fixed"
 _SHARES = {"98 % of the values": 0.98, "90 % of the values": 0.90, "all values": 1.0}

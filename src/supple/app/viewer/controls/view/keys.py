@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from supple.app.viewer.controls.controller import sequential
-from supple.app.viewer.drawing.camera import PRESETS, fit, look_from
-from supple.app.viewer.drawing.stage import Stage
+from supple.results.view.camera import PRESETS, fit, look_from
+from supple.results.view.stage import Stage
 
 # A key of viser, and what it does.
 Actions = Mapping[str, tuple[str, Callable[[Any], object]]]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from supple.app.viewer.drawing.stage import Stage
 from supple.app.viewer.protocol.quantities import written
+from supple.results.view.stage import Stage
 
 
 class Probe:

@@ -7,9 +7,9 @@ import threading
 import time
 from typing import Any
 
-from supple.app.viewer.drawing.moments.model import Moment
-from supple.app.viewer.drawing.page_of_moments import page_of_moments
-from supple.app.viewer.drawing.stage import Stage
+from supple.results.view.model import Moment
+from supple.results.view.page import page_of_moments
+from supple.results.view.stage import Stage
 
 _MOST_SECONDS = 120.0  # of a page
 _MOST_BYTES = 300_000_000  # of recorded moments

@@ -11,16 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.viewer.controls.view.color_range import ColorRange
+from supple.app.viewer.controls.view.legend import arrows_html, bar_html
 from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.controls.view.probe import Probe
-from supple.app.viewer.drawing.camera import PRESETS, follow, look_from
-from supple.app.viewer.drawing.coloring.color_scale import bar_html
-from supple.app.viewer.drawing.coloring.fields import FIELDS
-from supple.app.viewer.drawing.layers.forces import COLOR
-from supple.app.viewer.drawing.options import COLOR_BY_BODY, SURFACES, ViewOptions
-from supple.app.viewer.drawing.stage import Stage
-from supple.app.viewer.protocol.quantities import written
 from supple.app.viewer.theme import set_theme
+from supple.results.view.camera import PRESETS, follow, look_from
+from supple.results.view.fields import FIELDS
+from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
+from supple.results.view.stage import Stage
 
 _AXES = ("x", "y", "z")
 _NOTHING = "nothing"
@@ -177,13 +175,3 @@ class ViewControls:
 def found_some(points: NDArray[np.float64] | None) -> bool:
     """Whether there are contacts."""
     return points is not None and len(points) > 0
-
-
-def arrows_html(full: float) -> str:
-    """The legend of the arrows of forces: the force of one of half the size of the scene."""
-    color = "rgb({},{},{})".format(*COLOR)
-    arrow = f'<path d="M2 7H74M66 2L76 7L66 12" fill="none" stroke="{color}" stroke-width="2"/>'
-    return (
-        f'<svg viewBox="0 0 80 14" style="width:80px;display:block">{arrow}</svg>'
-        f"<div>contact force, half the scene: {written(full, 'N')}</div>"
-    )

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.viewer.drawing.coloring.color_scale import round_up
-from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
-from supple.app.viewer.drawing.moments.model import Moment
+from supple.results.view.color_scale import round_up
+from supple.results.view.layers.layer import Layer, single
+from supple.results.view.model import Moment
 
 COLOR = (200, 30, 90)
 _LONGEST = 0.5  # length of the arrow of `full`, as a share of the size of the scene

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.drawing.layers.primitives.layer import single
+from supple.results.view.layers.layer import single
 
 _LEAST = 16  # smallest capacity of a mesh, in triangles
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from supple.app.viewer.drawing.layers.primitives.layer import Layer
-from supple.app.viewer.drawing.layers.primitives.rotation import turning_z_to
-from supple.app.viewer.drawing.moments.model import Moment
+from supple.results.view.layers.layer import Layer
+from supple.results.view.layers.rotation import turning_z_to
+from supple.results.view.model import Moment
 
 
 class Ground(Layer):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.drawing.moments.model import Moment
+from supple.results.view.model import Moment
 
 
 class Layer(ABC):

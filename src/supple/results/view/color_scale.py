@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import html
 import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.drawing.coloring.fields import Field
-from supple.app.viewer.protocol.quantities import written
+from supple.results.view.fields import Field
 
 BINS = 16  # colors of a scale; each is one mesh on the page, because a mesh has one color
 NOT_KNOWN_COLOR = (150, 152, 158)
@@ -75,18 +73,3 @@ def round_up(value: float) -> float:
     """The next of 1, 2, 5, 10, 20, 50, ..."""
     scale = 10.0 ** math.floor(math.log10(value))
     return next(scale * step for step in (1.0, 2.0, 5.0, 10.0) if scale * step >= value * (1.0 - 1e-12))
-
-
-def bar_html(field: Field, ends: tuple[float, float] | None) -> str:
-    """The legend: name, colors, and the values at both ends and in the middle with their unit."""
-    title = f"<div>{html.escape(field.name)}</div>"
-    if ends is None:
-        return f"{title}<div>not known</div>"
-    colors = ["rgb({},{},{})".format(*color) for color in palette(field)]
-    stops = ",".join(f"{color} {100 * i / BINS:.2f}% {100 * (i + 1) / BINS:.2f}%" for i, color in enumerate(colors))
-    low, high = ends
-    numbers = "".join(f"<span>{written(value, field.unit)}</span>" for value in (low, 0.5 * (low + high), high))
-    return (
-        f'{title}<div class="bar" style="background:linear-gradient(to right,{stops})"></div>'
-        f'<div class="numbers">{numbers}</div>'
-    )

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
-from supple.app.viewer.drawing.moments.model import Moment
+from supple.results.view.layers.layer import Layer, single
+from supple.results.view.model import Moment
 
 _MOST = 400  # arrows; more cannot be distinguished
 _HEAD = 0.04  # length of the head of an arrow, as a share of the size of the scene

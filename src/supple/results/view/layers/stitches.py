@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
-from supple.app.viewer.drawing.moments.model import Moment
+from supple.results.view.layers.layer import Layer, single
+from supple.results.view.model import Moment
 
 
 class StitchView(Layer):

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
-from supple.app.viewer.drawing.moments.model import Moment
+from supple.results.view.layers.layer import Layer, single
+from supple.results.view.model import Moment
 
 _SPRING_COLOR, _PUSHER_COLOR = (20, 150, 70), (120, 90, 200)
 

@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.app.viewer.drawing.camera import set_initial_camera
-from supple.app.viewer.drawing.coloring.fields import FIELDS, Field
-from supple.app.viewer.drawing.layers.dots import Dots
-from supple.app.viewer.drawing.layers.forces import ForceView
-from supple.app.viewer.drawing.layers.ground import Ground
-from supple.app.viewer.drawing.layers.joints import JointView
-from supple.app.viewer.drawing.layers.obstacles import ObstacleView
-from supple.app.viewer.drawing.layers.primitives.layer import Layer
-from supple.app.viewer.drawing.layers.section import Cut
-from supple.app.viewer.drawing.layers.skin import SkinView
-from supple.app.viewer.drawing.layers.springs import PusherView, SpringView
-from supple.app.viewer.drawing.layers.stitches import StitchView
-from supple.app.viewer.drawing.layers.tets import TetView
-from supple.app.viewer.drawing.layers.velocities import VelocityView
-from supple.app.viewer.drawing.moments.model import Model, Moment
-from supple.app.viewer.drawing.options import COLOR_BY_BODY, ViewOptions
+from supple.results.view.camera import set_initial_camera
+from supple.results.view.fields import FIELDS, Field
+from supple.results.view.layers.dots import Dots
+from supple.results.view.layers.forces import ForceView
+from supple.results.view.layers.ground import Ground
+from supple.results.view.layers.joints import JointView
+from supple.results.view.layers.layer import Layer
+from supple.results.view.layers.obstacles import ObstacleView
+from supple.results.view.layers.section import Cut
+from supple.results.view.layers.skin import SkinView
+from supple.results.view.layers.springs import PusherView, SpringView
+from supple.results.view.layers.stitches import StitchView
+from supple.results.view.layers.tets import TetView
+from supple.results.view.layers.velocities import VelocityView
+from supple.results.view.model import Model, Moment
+from supple.results.view.options import COLOR_BY_BODY, ViewOptions
 
 _PIN_COLOR, _CONTACT_COLOR = (20, 20, 24), (220, 40, 110)
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.drawing.moments.model import Moment
-from supple.app.viewer.engine.measurement.tet_values import tet_values
 from supple.numerics.deformation import determinants
+from supple.results.readings.tet_values import tet_values
+from supple.results.view.model import Moment
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.app.viewer.drawing.coloring.color_scale import NOT_KNOWN_COLOR, Limits, Range, bin_of, palette
-from supple.app.viewer.drawing.coloring.fields import Field
-from supple.app.viewer.drawing.layers.primitives.layer import Layer
-from supple.app.viewer.drawing.layers.primitives.triangles import ColoredTriangles
-from supple.app.viewer.drawing.layers.section import Cut, Triangles, surface, whole
-from supple.app.viewer.drawing.moments.model import Model, Moment
-from supple.app.viewer.drawing.picking import first_hit
 from supple.mesh.topology import TET_FACETS
+from supple.results.view.color_scale import NOT_KNOWN_COLOR, Limits, Range, bin_of, palette
+from supple.results.view.fields import Field
+from supple.results.view.layers.colored_triangles import ColoredTriangles
+from supple.results.view.layers.layer import Layer
+from supple.results.view.layers.section import Cut, Triangles, surface, whole
+from supple.results.view.model import Model, Moment
+from supple.results.view.picking import first_hit
 
 
 class TetView(Layer):

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from supple.app.viewer.drawing.moments.model import Model, ModelBody, Moment
 from supple.results.drawing import view_of
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
+from supple.results.view.model import Model, ModelBody, Moment
 
 
 def model_of_recording(recording: Recording) -> Model:

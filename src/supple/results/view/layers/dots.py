@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
-from supple.app.viewer.drawing.moments.model import Moment
+from supple.results.view.layers.layer import Layer, single
+from supple.results.view.model import Moment
 
 
 class Dots(Layer):

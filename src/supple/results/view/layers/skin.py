@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
-from supple.app.viewer.drawing.moments.model import Model, Moment
+from supple.results.view.layers.layer import Layer, single
+from supple.results.view.model import Model, Moment
 
 
 class SkinView(Layer):

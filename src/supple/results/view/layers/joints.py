@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
-from supple.app.viewer.drawing.moments.model import Model, Moment
 from supple.results.recording.actions.joints import RecordedJoint
+from supple.results.view.layers.layer import Layer, single
+from supple.results.view.model import Model, Moment
 
 _COLOR = (225, 120, 20)
 _ARC = 32  # lines of a whole turn

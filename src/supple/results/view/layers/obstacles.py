@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.viewer.drawing.layers.primitives.layer import Layer, single
-from supple.app.viewer.drawing.layers.primitives.rotation import quaternion
-from supple.app.viewer.drawing.moments.model import Moment
 from supple.results.drawing import OBSTACLE_COLOR, obstacle_pictures
+from supple.results.view.layers.layer import Layer, single
+from supple.results.view.layers.rotation import quaternion
+from supple.results.view.model import Moment
 
 
 class ObstacleView(Layer):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.app.viewer.drawing.moments.model import Model, ModelBody, Moment
+from supple.results.view.model import Model, ModelBody, Moment
 
 
 @dataclass(frozen=True, eq=False)

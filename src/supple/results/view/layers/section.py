@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.drawing.moments.model import Model
+from supple.results.view.model import Model
 
 
 @dataclass(frozen=True)

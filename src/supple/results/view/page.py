@@ -1,0 +1,103 @@
+"""Pages that play in a browser: one file that needs no installation and no network.
+
+The player is the client of viser (three.js), which is in the wheel of viser; the page contains the moments, compressed.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from supple.results.drawing import View, opened
+from supple.results.recording.frame import RecordedFrame
+from supple.results.recording.reader import Recording
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.gate import new_token
+from supple.results.view.layers.skin import drawn_points
+from supple.results.view.model import Model, Moment
+from supple.results.view.options import ViewOptions
+from supple.results.view.server import gated_server
+from supple.results.view.stage import Stage
+from supple.runtime.replacing import whole_file
+
+# Bytes of moving points before compression, which at least halves them; longer pages have fewer moments.
+_MOST_BYTES = 36_000_000
+_RESOLUTION = 2.0**-13  # to which positions are rounded, as a share of the size of the scene: less than a pixel
+
+
+def write_page(
+    recording: Recording | str | Path, output: str | Path, *, frames: Sequence[RecordedFrame] | None = None
+) -> Path:
+    """Write `output` (such as index.html), which plays the recording in a loop in any browser.
+
+    Parameters
+    ----------
+    recording : an open recording, or its path; output : the page, replaced where it exists.
+    frames : of the recording, at least one, which the page plays; all without this.
+
+    Raises
+    ------
+    OutputError : where the recording cannot be read, or the page cannot be written.
+    """
+    output = Path(output)
+    with opened(recording) as source, whole_file(output) as fresh:
+        fresh.write_text(page_of_frames(source, frames or source, ViewOptions()), encoding="utf-8")
+    return output
+
+
+def page_of_frames(recording: Recording, frames: Sequence[RecordedFrame], options: ViewOptions) -> str:
+    """The HTML of a page that plays frames of a recording in a loop."""
+    model = model_of_recording(recording)
+    played = (frames[i] for i in _evenly(len(frames), _most_moments(model, options)))
+    return _page(((frame.time, moment_of_frame(model, frame)) for frame in played), options)
+
+
+def page_of_moments(moments: Sequence[tuple[float, Moment]], options: ViewOptions) -> str:
+    """The HTML of a page that plays moments in a loop.
+
+    Parameters
+    ----------
+    moments : at least one, each with its time on the page [s], ascending
+    options : how they are drawn
+    """
+    return _page((moments[i] for i in _evenly(len(moments), _most_moments(moments[0][1].model, options))), options)
+
+
+def _page(moments: Iterator[tuple[float, Moment]], options: ViewOptions) -> str:
+    previous, first = next(moments)
+    with gated_server(new_token()) as server:  # nobody knows the token
+        stage = Stage(server, _rounded(first), options)
+        serializer = server.get_scene_serializer()
+        for seconds, moment in moments:
+            serializer.insert_sleep(max(0.0, seconds - previous))
+            previous = seconds
+            stage.show(_rounded(moment))
+        serializer.insert_sleep(0.1)
+        text = serializer.as_html()
+    title = html.escape(", ".join(body.name for body in first.model.bodies)[:80])
+    return text.replace("<title>Viser</title>", f"<title>{title} · Supple</title>", 1)
+
+
+def _most_moments(model: Model, options: ViewOptions) -> int:
+    """Number of moments for a page of at most _MOST_BYTES."""
+    size = 12 * (drawn_points(model) if options.surface in ("skin", "wireframe") else 24 * len(model.tets))
+    return max(2, _MOST_BYTES // max(1, size + 24 * len(model.stitches)))
+
+
+def _evenly(count: int, most: int) -> list[int]:
+    """At most `most` numbers below `count`, evenly spaced, with the first and the last one."""
+    return [int(i) for i in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
+
+
+def quantum_of(view: View) -> float:
+    """The power of two to which positions are rounded: numbers with few bits compress well."""
+    return float(2.0 ** np.floor(np.log2(_RESOLUTION * 2.0 * view.radius)))
+
+
+def _rounded(moment: Moment) -> Moment:
+    quantum = quantum_of(moment.model.view)
+    return replace(moment, positions=np.round(moment.finite_positions / quantum) * quantum)

@@ -1,0 +1,92 @@
+"""Functions that kernels call: compiled once per signature, to be linked into kernels, and never run by themselves."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from types import FunctionType
+from typing import Any
+
+import numba
+from numba.core import compiler, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.registry import CPUDispatcher
+
+
+class Flags(compiler.Flags):
+    """Numba's, with a quick comparison: typing compares them at every call, 160,000 times for a first frame."""
+
+    # The digest is the same for all flags, as Numba's own is, which sorts their names.
+    _HASH = hash(compiler.Flags())
+
+    def __hash__(self) -> int:
+        return self._HASH
+
+    def __eq__(self, other: object) -> bool:
+        same = isinstance(other, compiler.Flags) and self._values == other._values
+        return same or super().__eq__(other)
+
+
+def compare_quickly(dispatcher: Any) -> None:
+    """Let a function be compiled with `Flags` of this module."""
+    dispatcher._compiler._customize_flags = Flags
+
+
+class _LinkedLibrary(JITCodeLibrary):
+    """Code to be linked into kernels. No machine code is made of it: what is not inlined is compiled in each kernel."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        return 0
+
+    @property
+    def codegen(self) -> _LinkedLibrary:
+        """What is asked to set the environment; a kernel sets those of all that is linked into it."""
+        return self
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Nothing is in memory here."""
+
+
+class _LinkedCompiler(compiler.Compiler):
+    def __init__(self, *state: Any) -> None:
+        super().__init__(*state)
+        if self.state.library is None:
+            self.state.library = _LinkedLibrary(self.state.targetctx.codegen(), "inner function")
+
+
+class KernelCompiler(compiler.Compiler):
+    """Compiles functions that are called from Python, with inner functions of this module linked into them."""
+
+    def compile_extra(self, func: FunctionType) -> Any:
+        result = super().compile_extra(func)
+        for environment in result._find_referenced_environments():
+            result.codegen.set_env(environment.env_name, environment)
+        return result
+
+
+class InnerFunction(CPUDispatcher):
+    """A function that kernels call. It is compiled without a wrapper for calls from Python, and without machine code.
+
+    Called from Python, as in tests, it is compiled once more, with both.
+    """
+
+    def __init__(self, py_func: FunctionType, locals: dict[str, Any], targetoptions: dict[str, Any]) -> None:
+        super().__init__(py_func, locals, {**targetoptions, "no_cpython_wrapper": True}, _LinkedCompiler)
+        compare_quickly(self)
+
+    def get_call_template(self, args, kws):
+        """Numba would compile a function once more for each constant, such as True, that a call passes."""
+        return super().get_call_template(tuple(map(types.unliteral, args)), kws)
+
+    def __call__(self, *values: Any) -> Any:
+        return self._from_python(*values)
+
+    @cached_property
+    def _from_python(self) -> Any:
+        options: dict[str, Any] = {**self.targetoptions, "no_cpython_wrapper": False}
+        return numba.jit(**options, pipeline_class=KernelCompiler)(self.py_func)
