@@ -30,7 +30,7 @@ SHOWN = {
     "reading_fields": Shown("reference/forces_and_stresses.md", reading_text),
     "tolerances": Shown("theory/implicit.md", table_text),
     "quadratic_tets": Shown("theory/locking.md", table_text),
-    "rigid_heap": Shown("reference/bodies.md", table_text),
+    "rigid_heap": Shown("theory/rigid_bodies.md", table_text),
     "automatic_substeps": Shown("theory/xpbd.md", table_text),
     **dict.fromkeys(
         (

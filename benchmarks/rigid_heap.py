@@ -58,7 +58,7 @@ def main(count: int = 200, steps: int = 90, dt: float = 1 / 60) -> dict[str, Any
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/reference/bodies.md."""
+    """Measure, and write the figures of docs/theory/rigid_bodies.md."""
     publish("rigid_heap", main())
 
 

@@ -64,7 +64,7 @@ def test_the_programs_of_a_page_run(page, tmp_path, monkeypatch):
                 program, *arguments = shlex.split(line, comments=True)
                 assert program == "supple", f"{page}: {line!r} is not run; use lines of supple"
                 assert main(arguments) == 0, line
-    frame = names.get("exact" if page == "theory/contact.md" else "frame")
+    frame = names.get("exact" if page == "reference/contact.md" else "frame")
     if frame is not None:
         assert frame.report.status == "converged"  # pyright: ignore[reportAttributeAccessIssue]
 

@@ -230,7 +230,7 @@ def test_more_tets_than_memory_are_refused_before_the_mesher_starts(size) -> Non
 
 @pytest.mark.parametrize("size", [{"tets": 20_000_000}, {"max_volume": SPHERE.volume / 20_000_000}], ids=str)
 def test_twenty_million_tets_do_not_fit_into_four_gibibytes(size) -> None:
-    with pytest.raises(MeshingError, match=r"at least 2e\+07 tets do not fit into .* 4096 MiB; ask for fewer \(tets="):
+    with pytest.raises(MeshingError, match=r"at least 2e\+07 tets do not fit into .* 4096 MiB; ask for fewer \(tets,"):
         fill(SPHERE, **size)
 
 

@@ -45,8 +45,8 @@ def test_without_an_output_the_mesh_has_the_name_of_the_surface(
     assert TetMesh.load(elsewhere / "ball.vtu").volume == pytest.approx(BALL.volume, rel=1e-4)
 
 
-@pytest.mark.parametrize(("options", "count"), [([], 10_000), (["--tets", "3000"], 3000)])
-def test_the_number_of_tets_is_as_asked_or_ten_thousand(ball: Path, options: list[str], count: int) -> None:
+@pytest.mark.parametrize(("options", "count"), [([], 5_000), (["--tets", "3000"], 3000)])
+def test_the_number_of_tets_is_as_asked_or_five_thousand(ball: Path, options: list[str], count: int) -> None:
     assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), *options]) == 0
     assert len(TetMesh.load(ball.with_name("b.vtu")).tets) == pytest.approx(count, rel=0.1)
 
@@ -59,13 +59,14 @@ def test_tets_have_edges_of_the_length_asked(ball: Path) -> None:
     assert 0.07 < np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).mean() < 0.11
 
 
-def test_a_file_in_millimetres_is_named_and_scaled(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_in_millimetres_is_named_and_scaled(ball: Path, caplog: pytest.LogCaptureFixture) -> None:
     SurfaceMesh(30 * BALL.vertices, BALL.triangles).save(ball)
     command = ["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--tets", "500"]
     assert main(command) == 0
-    assert " m long; where it is in millimetres, use --scale 0.001" in " ".join(capsys.readouterr().err.split())
+    assert " m long; where it is in millimetres, give --scale 0.001" in caplog.text
+    caplog.clear()
     assert main([*command, "--scale", "0.001"]) == 0
-    assert "millimetres" not in capsys.readouterr().err
+    assert "millimetres" not in caplog.text
     assert np.ptp(TetMesh.load(ball.with_name("b.vtu")).vertices) == pytest.approx(0.03, rel=0.05)
 
 
@@ -93,14 +94,17 @@ def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> N
         (["ball.stl", "-o", "b.step"], "b.step: the extension must be one of .node"),
         (["ball.stl", "-o", "no/where/b.msh"], "there is no folder"),
         (["ball.stl", "-o", "used.1.node"], "used.1.face: is a folder"),
-        (["ball.stl", "-o", "b.node", "--quality", "0.9"], "ball.stl: quality must be"),
-        (["ball.stl", "-o", "b.node", "--max-volume", "-1"], "max_volume must be"),
+        (["ball.stl", "-o", "b.node", "--quality", "0.9"], "ball.stl: --quality must be"),
+        (["ball.stl", "-o", "b.node", "--max-volume", "-1"], "--max-volume must be"),
         (["ball.stl", "-o", "b.node", "--tets", "0"], "tets must be"),
         (["ball.stl", "-o", "b.node", "--edge", "nan"], "edge must be"),
-        (["ball.stl", "-o", "b.node", "--edge", "0.1", "--tets", "9"], "give only one of max_volume, edge and tets"),
+        (
+            ["ball.stl", "-o", "b.node", "--edge", "0.1", "--tets", "9"],
+            "give only one of --max-volume, --edge and --tets",
+        ),
         (["ball.stl", "-o", "b.node", "--scale", "0"], "scale must be"),
         (["ball.stl", "-o", "b.node", "--memory-limit", "0"], "memory limit must be"),
-        (["ball.stl", "-o", "b.node", "--time-limit", "nan"], "time_limit must be"),
+        (["ball.stl", "-o", "b.node", "--time-limit", "nan"], "--time-limit must be"),
         (["ball.stl", "-o", "b.node", "--max-volume", "3e-6", "--time-limit", "0.5"], "time limit of 0.5 s"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

@@ -95,17 +95,36 @@ def test_the_plots_that_fit_the_number_of_factors(tmp_path, factors, files):
         assert path.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_curve_and_a_map_have_the_table_s_numbers(tmp_path, monkeypatch):
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that are written."""
     kept = []
-    monkeypatch.setattr("supple.app.studies.plots._saved", lambda figure, output: kept.append(figure))
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, file, format: kept.append(self))
+    return kept
+
+
+def test_a_curve_and_a_map_have_the_table_s_numbers(tmp_path, drawn):
     table = table_of([{"a": 3}, {"a": 1}, {"a": 2}], lambda a: a * a)
     plot_one_factor(table, "y", "a", tmp_path / "a.png")
-    (line,) = kept[0].axes[0].lines
+    (line,) = drawn[0].axes[0].lines
     assert line.get_xydata().tolist() == [[1, 1], [2, 4], [3, 9]]
     points = sp.Grid().points({"a": Levels((1, 2, 3)), "b": Levels((10, 20))})
     plot_two_factors(table_of(points, lambda a, b: a + b), "y", "a", "b", tmp_path / "b.png")
-    (mesh,) = kept[1].axes[0].collections
+    (mesh,) = drawn[1].axes[0].collections
     assert mesh.get_array().reshape(2, 3).tolist() == [[11, 12, 13], [21, 22, 23]]
+
+
+def test_values_over_decades_have_logarithmic_axes(tmp_path, drawn):
+    decades, linear = [{"a": 10.0**k, "b": k} for k in range(3)], [{"a": 1.0 + k} for k in range(3)]
+    plot_one_factor(table_of(decades, lambda a, b: a), "y", "a", tmp_path / "a.png")
+    plot_one_factor(table_of(linear, lambda a: -a), "y", "a", tmp_path / "a.png")
+    points = sp.Grid().points({"a": Levels((1, 2, 3)), "b": Levels((1, 1000))})
+    plot_two_factors(table_of(points, lambda a, b: a * b), "y", "a", "b", tmp_path / "b.png")
+    assert [(figure.axes[0].get_xscale(), figure.axes[0].get_yscale()) for figure in drawn[:2]] == [
+        ("log", "log"),
+        ("linear", "linear"),
+    ]
+    assert drawn[2].axes[1].get_yscale() == "log"  # the color bar
 
 
 def test_a_table_without_a_case_that_is_done_cannot_be_plotted(tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +12,7 @@ from cyclopts import App
 from cyclopts.exceptions import CycloptsError
 
 from supple import __version__
+from supple.app.cli.announcements import set_up_log
 from supple.app.cli.console import ShellConsole
 from supple.app.cli.exit_codes import ExitCode
 from supple.app.cli.interrupts import ended_as_by_ctrl_c
@@ -56,11 +56,6 @@ for _order, (_name, _path) in enumerate(COMMANDS.items()):
     app.command(_path, name=_name, sort_key=_order)
 
 
-def _log_level() -> int:
-    """The level in the environment variable SUPPLE_LOG (DEBUG, INFO, ERROR), or WARNING."""
-    return logging.getLevelNamesMapping().get(os.environ.get("SUPPLE_LOG", "").upper(), logging.WARNING)
-
-
 def _flush(stream: TextIO | None) -> None:
     if stream is not None:  # None where the caller has closed it
         stream.flush()
@@ -68,8 +63,8 @@ def _flush(stream: TextIO | None) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `supple` with the given arguments, or those of the process; returns the exit code."""
-    logging.basicConfig(level=_log_level(), format="%(levelname)s: %(message)s")
     given = sys.argv[1:] if arguments is None else list(arguments)
+    set_up_log(quiet=bool({"-q", "--quiet"}.intersection(given)))
     for text in given:
         if any("\ud800" <= character <= "\udfff" for character in text):  # Python's sign for a byte that is not UTF-8
             print_error(f"{text}: is not in UTF-8, and no scene file or recording could name it; rename it")

@@ -15,18 +15,22 @@ from pydantic import ValidationError
 
 from supple.app.scene_file.document import OutputModel, SceneFileModel
 from supple.app.scene_file.entries.joints import with_shared_inputs
-from supple.app.scene_file.entries.mesh_sources import MeshStore
+from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES, MeshStore
+from supple.app.scene_file.from_surface import read_surface_scene
 from supple.app.scene_file.mesh_sets import with_numbers
 from supple.app.scene_file.urdf.document import read_urdf
 from supple.app.scene_file.validation_errors import scene_error
 from supple.app.scene_file.yaml_reader import Key, YamlDocument, read_yaml
 from supple.errors import SceneError
+from supple.mesh.meshing.spelling import spelled_for
 from supple.scene.body import PlacedBody
 from supple.scene.located import LocatedError, at
 from supple.scene.scene import Scene
 from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)
+
+_READERS = {".urdf": read_urdf, **dict.fromkeys(SURFACE_FILES, read_surface_scene)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +89,22 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
 
     Parameters
     ----------
-    path : of the scene file (YAML).
+    path : of the scene file (YAML), of a robot (URDF), or of a surface, which becomes a body above a floor.
     meshes : makes the store of meshes from the file's folder; `ConfinedMeshStore` reads only files in this folder.
 
     Raises
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
-    document = read_urdf(path) if Path(path).suffix.lower() == ".urdf" else read_yaml(path)
+    document = _READERS.get(Path(path).suffix.lower(), read_yaml)(path)
     model = validated(document)
     try:
-        built = _built(model, meshes(Path(path).parent))
+        with spelled_for("yaml"):
+            built = _built(model, meshes(Path(path).parent))
         return replace(built, text=document.text, description=model, folder=Path(path).parent)
     except LocatedError as error:
+        if Path(path).suffix.lower() in SURFACE_FILES:  # its lines are not those of the document
+            raise SceneError(f"{path}: {error}") from None
         raise document.error(_keys_of_message(document.data, error.keys, str(error)), str(error)) from None
 
 

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from supple.app.studies.effects import main_effects, varying_factors
 from supple.app.studies.table import StudyTable
 from supple.errors import StudyError
-from supple.runtime.figures import save_figure
+from supple.runtime.figures import paper_figure, spans_decades
 
 _COLOR, _LOW, _HIGH = "#30638e", "#5ba3d0", "#d1495b"
-# A factor whose ends have at least this ratio is drawn on a logarithmic axis.
-_LOGARITHMIC = 50.0
+_SIZE = (5.4, 3.6)
 
 
 def plot_study(table: StudyTable, folder: str | Path) -> list[Path]:
@@ -57,16 +56,17 @@ def plot_one_factor(table: StudyTable, measure: str, factor: str, output: str | 
     """
     done = _some_done(table)
     y, column = table[measure][done], table[factor][done]
-    figure, axis = _figure()
     x, ticks = _positions(column)
     order = np.argsort(x, kind="stable")
     line = "-" if varying_factors(table) == [factor] else ""
-    axis.plot(x[order], y[order], marker="o", linestyle=line, color=_COLOR, markersize=4)
-    _label_axis(axis.xaxis, axis.set_xscale, x, ticks)
-    axis.set_xlabel(table.label(factor))
-    axis.set_ylabel(table.label(measure))
-    axis.grid(alpha=0.25, linewidth=0.6)
-    return _saved(figure, output)
+    with paper_figure(Path(output), *_SIZE) as figure:
+        axis = figure.subplots()
+        axis.plot(x[order], y[order], marker="o", linestyle=line, color=_COLOR, markersize=4)
+        _label_axis(axis.xaxis, axis.set_xscale, x, ticks)
+        _label_axis(axis.yaxis, axis.set_yscale, y, None)
+        axis.set_xlabel(table.label(factor))
+        axis.set_ylabel(table.label(measure))
+    return Path(output)
 
 
 def plot_two_factors(table: StudyTable, measure: str, first: str, second: str, output: str | Path) -> Path:
@@ -80,23 +80,27 @@ def plot_two_factors(table: StudyTable, measure: str, first: str, second: str, o
     z = table[measure][done]
     x, x_ticks = _positions(table[first][done])
     y, y_ticks = _positions(table[second][done])
-    figure, axis = _figure()
     columns, column = np.unique(x, return_inverse=True)
     rows, row = np.unique(y, return_inverse=True)
-    if len(columns) * len(rows) <= 2 * len(z):  # a grid, in which some cases may have failed
-        cells = np.full((len(rows), len(columns)), np.nan)
-        cells[row, column] = z
-        drawn = axis.pcolormesh(np.arange(len(columns)), np.arange(len(rows)), cells, cmap="viridis", shading="nearest")
-        _label_cells(axis.xaxis, columns, x_ticks)
-        _label_cells(axis.yaxis, rows, y_ticks)
-    else:
-        drawn = axis.scatter(x, y, c=z, cmap="viridis", s=30)
-        _label_axis(axis.xaxis, axis.set_xscale, x, x_ticks)
-        _label_axis(axis.yaxis, axis.set_yscale, y, y_ticks)
-    axis.set_xlabel(table.label(first))
-    axis.set_ylabel(table.label(second))
-    figure.colorbar(drawn, ax=axis, label=table.label(measure))
-    return _saved(figure, output)
+    with paper_figure(Path(output), *_SIZE) as figure:
+        axis = figure.subplots()
+        axis.grid(False)
+        colors = {"cmap": "viridis", "norm": "log" if spans_decades(z) else "linear"}
+        if len(columns) * len(rows) <= 2 * len(z):  # a grid, in which some cases may have failed
+            cells = np.full((len(rows), len(columns)), np.nan)
+            cells[row, column] = z
+            places = np.arange(len(columns)), np.arange(len(rows))
+            drawn = axis.pcolormesh(*places, cells, shading="nearest", **colors)
+            _label_cells(axis.xaxis, columns, x_ticks)
+            _label_cells(axis.yaxis, rows, y_ticks)
+        else:
+            drawn = axis.scatter(x, y, c=z, s=30, **colors)
+            _label_axis(axis.xaxis, axis.set_xscale, x, x_ticks)
+            _label_axis(axis.yaxis, axis.set_yscale, y, y_ticks)
+        axis.set_xlabel(table.label(first))
+        axis.set_ylabel(table.label(second))
+        figure.colorbar(drawn, ax=axis, label=table.label(measure))
+    return Path(output)
 
 
 def plot_tornado(table: StudyTable, measure: str, output: str | Path) -> Path:
@@ -110,20 +114,22 @@ def plot_tornado(table: StudyTable, measure: str, output: str | Path) -> Path:
     """
     _some_done(table)
     effects = main_effects(table, measure)[::-1]
-    figure, axis = _figure(height=1.2 + 0.45 * len(effects))
     middle = float(np.mean(table[measure][table.done]))
-    for k, effect in enumerate(effects):
-        for end, label, color in ((effect.low, effect.low_label, _LOW), (effect.high, effect.high_label, _HIGH)):
-            axis.barh(k, end - middle, left=middle, color=color, height=0.6)
-            side = "left" if end >= middle else "right"
-            axis.annotate(
-                label, (end, k), (3 if side == "left" else -3, 0), textcoords="offset points", ha=side, va="center"
-            )
-    axis.axvline(middle, color="0.2", linewidth=0.8)
-    axis.set_yticks(range(len(effects)), [table.label(effect.factor) for effect in effects])
-    axis.set_xlabel(table.label(measure))
-    axis.margins(x=0.15)
-    return _saved(figure, output)
+    with paper_figure(Path(output), _SIZE[0], 1.1 + 0.4 * len(effects)) as figure:
+        axis = figure.subplots()
+        axis.grid(False, axis="y")
+        for k, effect in enumerate(effects):
+            for end, label, color in ((effect.low, effect.low_label, _LOW), (effect.high, effect.high_label, _HIGH)):
+                axis.barh(k, end - middle, left=middle, color=color, height=0.6)
+                side = "left" if end >= middle else "right"
+                axis.annotate(
+                    label, (end, k), (3 if side == "left" else -3, 0), textcoords="offset points", ha=side, va="center"
+                )
+        axis.axvline(middle, color="0.2", linewidth=0.8)
+        axis.set_yticks(range(len(effects)), [table.label(effect.factor) for effect in effects])
+        axis.set_xlabel(table.label(measure))
+        axis.margins(x=0.15)
+    return Path(output)
 
 
 def _some_done(table: StudyTable) -> NDArray[np.bool_]:
@@ -143,7 +149,7 @@ def _positions(column: NDArray[Any]) -> tuple[NDArray[np.float64], list[str] | N
 def _label_axis(axis: Any, set_scale: Any, places: NDArray[np.float64], ticks: list[str] | None) -> None:
     if ticks is not None:
         axis.set_ticks(range(len(ticks)), ticks)
-    elif places.min() > 0.0 and places.max() / places.min() >= _LOGARITHMIC:
+    elif spans_decades(places):
         set_scale("log")
 
 
@@ -153,20 +159,3 @@ def _label_cells(axis: Any, places: NDArray[np.float64], ticks: list[str] | None
 
 def _file_name(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name)[:80]
-
-
-def _figure(height: float = 4.5) -> tuple[Any, Any]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, height), layout="constrained", dpi=110)
-    FigureCanvasAgg(figure)
-    axis = figure.subplots()
-    axis.spines[["top", "right"]].set_visible(False)
-    return figure, axis
-
-
-def _saved(figure: Any, output: str | Path) -> Path:
-    output = Path(output)
-    save_figure(figure, output, output.suffix[1:].lower() or "png")
-    return output

@@ -38,10 +38,11 @@ def main() -> int:
 
 
 def _mesh(job: dict[str, Any]) -> None:
-    """Read, scale, check and mesh the surface."""
+    """Read, scale and mesh the surface, which is repaired where it has faults."""
     import numpy as np
 
-    from supple.errors import MeshError
+    from supple.errors import MeshError, MeshingError
+    from supple.mesh.meshing.sizes import automatic_tets
     from supple.mesh.meshing.tetrahedralize import tetrahedralize
     from supple.mesh.surface import SurfaceMesh
 
@@ -54,11 +55,11 @@ def _mesh(job: dict[str, Any]) -> None:
     if not 0.0 < extent < np.inf:
         raise MeshError(f"{file}: all its vertices are at one point; check the file")
     surface = surface.transformed(1.0, None, -0.5 * (low + high)).transformed(job["size"] / extent)
-    report = surface.check()
-    if not (report.watertight and report.consistently_oriented) or report.self_intersecting:
-        faults = "; ".join(report.problems)
-        raise MeshError(f"{file}: {faults}; repair it with `supple mesh --repair` or in a modelling program")
-    mesh = tetrahedralize(surface, mesher="tetgen", time_limit=job["seconds"], memory_limit=job["memory"])
+    options = {"time_limit": job["seconds"], "memory_limit": job["memory"]}
+    try:
+        mesh = tetrahedralize(surface, tets=automatic_tets(surface), repair=True, mesher="tetgen", **options)
+    except MeshingError as error:
+        raise MeshingError(f"{file}: {error}") from None
     with Path(MESH).open("wb") as out:
         np.savez(out, vertices=mesh.vertices, tets=mesh.tets)
 

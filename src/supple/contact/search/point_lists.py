@@ -43,7 +43,7 @@ def _boxes_of_triangles(points, triangles, radii, out):
 def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, scratch):
     """Append the triangles near the points of a group, of their own piece or of others; returns the number of all.
 
-    One walk through the tree serves all points of the group; see docs/theory/xpbd_contact.md.
+    One walk through the tree serves all points of the group; see docs/theory/contact.md.
 
     Parameters
     ----------

@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import OutputError
 from supple.materials.fitting.curves import Curve
-from supple.runtime.figures import save_figure
+from supple.runtime.figures import paper_figure
 
-_KINDS = ("png", "pdf", "svg")
 _COLORS = {"uniaxial": "#30638e", "equibiaxial": "#d1495b", "pure_shear": "#3a7d44"}
 
 
@@ -25,27 +23,17 @@ def draw_fit(
     ------
     OutputError : where the picture cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    kind = path.suffix[1:].lower()
-    if kind not in _KINDS:
-        raise OutputError(f"{path}: there is no picture format {path.suffix!r}; take .png, .pdf or .svg")
-    figure = Figure(figsize=(7.0, 5.0), layout="constrained", dpi=110)
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
     largest = max(float(np.abs(curve.stress).max()) for curve in curves)
     unit, factor = next((u, f) for u, f in (("MPa", 1e6), ("kPa", 1e3), ("Pa", 1.0)) if largest >= f or f == 1.0)
-    for curve in curves:
-        color = _COLORS[curve.mode]
-        axes.plot(curve.stretch, curve.stress / factor, "o", markersize=4, color=color, label=curve.name)
-        dense = np.linspace(min(1.0, curve.stretch.min()), curve.stretch.max(), 200)
-        axes.plot(dense, stresses(dense, curve.mode) / factor, "-", color=color)
-    axes.set_xlabel("stretch")
-    axes.set_ylabel(f"nominal stress [{unit}]")
-    axes.set_title(title)
-    axes.grid(alpha=0.25, linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False)
-    save_figure(figure, path, kind)
+    with paper_figure(path, 6.0, 4.2) as figure:
+        axes = figure.subplots()
+        for curve in curves:
+            color = _COLORS[curve.mode]
+            axes.plot(curve.stretch, curve.stress / factor, "o", markersize=4, color=color, label=curve.name)
+            dense = np.linspace(min(1.0, curve.stretch.min()), curve.stretch.max(), 200)
+            axes.plot(dense, stresses(dense, curve.mode) / factor, "-", color=color)
+        axes.set_xlabel("stretch")
+        axes.set_ylabel(f"nominal stress [{unit}]")
+        axes.set_title(title)
+        axes.legend()
     return path

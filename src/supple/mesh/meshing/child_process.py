@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshingError
 from supple.mesh.meshing import mesher_worker
+from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)
@@ -40,6 +41,12 @@ OUT_OF_MEMORY = (
     "cannot allocate memory",
     "failed to map segment",
 )
+
+
+DEFAULT_TETS = 5_000
+"""Fine enough that a body bends, coarse enough for a live page."""
+DAMAGED = ("failed", "crash")
+"""Kinds of failures of a mesher that its input causes."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +107,7 @@ def run_mesher(
         answer_file = folder / "answer.json"
         answer = json.loads(answer_file.read_text("utf-8")) if answer_file.exists() else {}
         for note in filter(None, answer.get("notes", [])):
-            logger.info("%s: %s", mesher, note)
+            logger.debug("%s: %s", mesher, note)
         if code == 0 and "error" not in answer:
             with np.load(folder / "mesh.npz") as mesh:
                 return MesherResult(mesh["vertices"], mesh["elements"], mesh["labels"], float(answer["seconds"]))
@@ -159,8 +166,9 @@ def _run_child(mesher: str, folder: Path, limits: Limits) -> tuple[int, int]:
                 if time.monotonic() >= end:
                     raise MesherFailure(
                         "time",
-                        f"{mesher} was stopped at the time limit of {limits.time:g} s; ask for less (a larger "
-                        "max_volume, a larger quality ratio, no min_dihedral) or raise time_limit",
+                        f"{mesher} was stopped at the time limit of {limits.time:g} s; ask for fewer tets "
+                        f"({option('tets')}, which also reduces the surface; a larger "
+                        f"{option('quality')}, no {option('min_dihedral')}) or raise {option('time_limit')}",
                     )
         finally:
             if child.poll() is None:
@@ -185,7 +193,9 @@ def _failure(
     if any(sign in report for sign in OUT_OF_MEMORY) or (starved and not error):
         limit = "" if limits.memory is None else f" within the memory limit of {limits.memory / 2**20:.0f} MiB"
         return MesherFailure(
-            "memory", f"{mesher} ran out of memory{limit}; ask for less (a larger max_volume) or raise memory_limit"
+            "memory",
+            f"{mesher} ran out of memory{limit}; ask for fewer tets ({option('tets')}) or raise "
+            f"{option('memory_limit')}",
         )
     if error:
         return MesherFailure("failed", f"{mesher} failed: {error.rstrip('.')}{remedy}")

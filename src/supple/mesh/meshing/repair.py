@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from supple.errors import MeshingError
 from supple.mesh.merge import merge_map
 from supple.mesh.meshing.child_process import Limits, run_mesher
+from supple.mesh.meshing.holes import close_holes
+from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
 from supple.mesh.topology import edge_keys, facet_keys, graph_components, has_vertex_twice
@@ -58,11 +60,11 @@ def repair_surface(
     time_limit: float = 120.0,
     memory_limit: int | None = 4 * 2**30,
 ) -> tuple[SurfaceMesh, RepairReport]:
-    """Repair a surface: duplicates, mixed orientation, then holes, self-intersections and triangles without area.
+    """Repair a surface: duplicates, mixed orientation, holes, then self-intersections and triangles without area.
 
-    The first two are exact and done here. The remaining faults are left to MeshFix (Attene 2010, "A lightweight
-    approach to repairing digitized polygon meshes"; the extra `dirty`), in a child process and one component at a
-    time, so that it drops none of them. The log lists the changes.
+    The first two are exact and done here, as is the closing of holes with a simple rim. The remaining faults are left
+    to MeshFix (Attene 2010, "A lightweight approach to repairing digitized polygon meshes"; the extra `dirty`), in a
+    child process and one component at a time, so that it drops none of them. The log lists the changes.
 
     Parameters
     ----------
@@ -85,14 +87,21 @@ def repair_surface(
     repaired = _drop_useless(surface, steps)
     repaired = _orient(repaired, steps)
     after = repaired.check()
+    if len(after.open_edges) and after.consistently_oriented:
+        closed, count = close_holes(repaired, after.open_edges)
+        report = closed.check()
+        if count and report.watertight and len(report.intersecting_triangles) <= len(after.intersecting_triangles):
+            steps.append(f"closed {count} {'hole' if count == 1 else 'holes'} of {len(after.open_edges)} edges")
+            repaired = _orient(closed, steps)
+            after = repaired.check()
     if not after.ok:
         repaired = _meshfix_components(repaired, steps, allow_lost_components, Limits(time_limit, memory_limit))
         repaired = _orient(repaired, steps)
         after = repaired.check()
     if not after.ok:
         raise MeshingError(
-            f'repair could not fix the surface: {"; ".join(after.problems)}; use mesher="ftetwild" or fix it in a '
-            "modelling program"
+            f"repair could not fix the surface: {'; '.join(after.problems)}; use {option('mesher', 'ftetwild')} or fix "
+            "it in a modelling program"
         )
     report = RepairReport(tuple(steps), before, after)
     if steps:
@@ -196,8 +205,8 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
         if loss > LARGEST_LOSS and not allow_lost:
             how_much = "all" if loss == 1.0 else f"{100.0 * loss:.0f} % of the area"
             raise MeshingError(
-                f"repair would drop {how_much} of {what}: remove it yourself, allow it with repair_surface(surface, "
-                'allow_lost_components=True), or use mesher="ftetwild"'
+                f"repair would drop {how_much} of {what}: remove it yourself, allow it in Python with repair_surface("
+                f"surface, allow_lost_components=True), or use {option('mesher', 'ftetwild')}"
             )
         if fixed is None or loss == 1.0:
             steps.append(f"dropped {what}")

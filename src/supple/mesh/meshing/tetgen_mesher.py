@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.meshing.child_process import Limits, MesherResult, run_mesher
+from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import winding_number
 from supple.mesh.topology import without_unused
 
-REMEDY = (
-    "; the surface is most likely damaged or has details near round-off: fix it (repair=True) or use "
-    'mesher="ftetwild" (pip install "supple[dirty]")'
-)
+
+def _remedy() -> str:
+    return (
+        f"; the surface is most likely damaged or has details near round-off: fix it ({option('repair', True)}) or use "
+        f'{option("mesher", "ftetwild")} (pip install "supple[dirty]")'
+    )
 
 
 def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limits) -> MesherResult:
@@ -34,7 +37,7 @@ def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limi
     scale = 2.0 ** -math.frexp(float((high - low).max()) or 1.0)[1]
     volume = options["max_volume"]
     scaled = options | {"max_volume": None if volume is None else volume * scale**3}
-    result = run_mesher("tetgen", SurfaceMesh(surface.vertices * scale, surface.triangles), scaled, limits, REMEDY)
+    result = run_mesher("tetgen", SurfaceMesh(surface.vertices * scale, surface.triangles), scaled, limits, _remedy())
     vertices = result.vertices / scale
     inside = _inside(surface, vertices, result)
     if inside.all():

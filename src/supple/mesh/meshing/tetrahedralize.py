@@ -9,11 +9,20 @@ from typing import Literal
 import numpy as np
 
 from supple.errors import MeshError, MeshingError
-from supple.mesh.meshing.child_process import Limits, MesherFailure
+from supple.mesh.meshing.child_process import DAMAGED, Limits, MesherFailure
 from supple.mesh.meshing.decimation import decimate_surface
 from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed, mesh_with_ftetwild
 from supple.mesh.meshing.repair import RepairReport, repair_surface
-from supple.mesh.meshing.sizes import TETS_OF_BOUND, mesh_with_count, refuse_too_many, volume_of_edge, warn_of_many
+from supple.mesh.meshing.sizes import (
+    COUNT_TOLERANCE,
+    TETS_OF_BOUND,
+    coarse_enough,
+    fill_with_count,
+    refuse_too_many,
+    volume_of_edge,
+    warn_of_many,
+)
+from supple.mesh.meshing.spelling import option
 from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
@@ -32,11 +41,26 @@ DEFAULT_QUALITY = 1.4
 
 @dataclass(frozen=True)
 class MeshingReport:
-    """How a tet mesh was made: by "tetgen" or "ftetwild", in how many seconds, and after which repair, if any."""
+    """How a tet mesh was made.
+
+    Attributes
+    ----------
+    mesher : "tetgen" or "ftetwild"; seconds : that it took
+    repair : what was repaired first; None where nothing was
+    fine, filled : the surface before it was reduced to fewer triangles, and the one that was filled; the same one
+        where it was not reduced
+    """
 
     mesher: str
     seconds: float
     repair: RepairReport | None
+    fine: SurfaceMesh
+    filled: SurfaceMesh
+
+    @property
+    def reduced(self) -> bool:
+        """Whether the surface was reduced."""
+        return self.filled is not self.fine
 
 
 def tetrahedralize(
@@ -69,8 +93,8 @@ def tetrahedralize(
     edge : float [m], optional
         Length of edges, instead of `max_volume`: no tet is larger than a regular one with such edges.
     tets : int, optional
-        Number of tets, instead of `max_volume`: it is reached within 10 % by at most six meshings. Where the surface
-        needs more, its coarsest mesh is returned, with a warning in the log.
+        Number of tets, instead of `max_volume`, reached within 10 %. A surface whose triangles need more is reduced
+        first, unless `decimate` or `keep_surface` is given; where it still needs more, the log has a warning.
     quality : float, optional
         TetGen's upper bound on circumradius over shortest edge of each tet [-], above 1. A smaller bound gives more
         tets of better shape. Tets at small angles of the surface may exceed it. None: no bound.
@@ -124,7 +148,7 @@ def tetrahedralize_reported(
     _in_range("edge", edge, 0.0, np.inf)
     _in_range("tets", tets, 0.0, np.inf)
     if sum(size is not None for size in (max_volume, edge, tets)) > 1:
-        raise MeshingError("give only one of max_volume, edge and tets")
+        raise MeshingError(f"give only one of {option('max_volume')}, {option('edge')} and {option('tets')}")
     if edge is not None:
         max_volume = volume_of_edge(edge)
     _in_range("quality", quality, 1.0, np.inf)
@@ -152,9 +176,15 @@ def tetrahedralize_reported(
             logger.warning("%s; meshing the surface without repair", failure)
         else:
             surface, report = _facing_outward(fixed)
+    fine = surface
+
+    def reduce(surface: SurfaceMesh, triangles: int) -> SurfaceMesh:
+        reduced = decimate_surface(surface, triangles, time_limit=time_limit, memory_limit=limits.memory)
+        return surface if reduced is surface else _facing_outward(reduced)[0]
+
     if decimate is not None:
-        reduced = decimate_surface(surface, decimate, time_limit=time_limit, memory_limit=limits.memory)
-        surface, report = _facing_outward(reduced)
+        surface = reduce(surface, decimate)
+        report = surface.check()
     chosen = _choose(mesher, report, repair)
     if chosen == "ftetwild":
         _check_ftetwild_options(quality, min_dihedral, keep_surface)
@@ -167,9 +197,8 @@ def tetrahedralize_reported(
     refuse_too_many(least, limits.memory)
     warn_of_many(least if tets else TETS_OF_BOUND * least, enclosed, limits.time)
 
-    def make(max_volume: float | None) -> TetMesh:
-        nonlocal seconds, chosen
-        result = None
+    def make(surface: SurfaceMesh, max_volume: float | None) -> TetMesh:
+        nonlocal seconds
         if chosen == "tetgen":
             options = {
                 "max_volume": max_volume,
@@ -177,14 +206,8 @@ def tetrahedralize_reported(
                 "min_dihedral": min_dihedral,
                 "keep_surface": keep_surface,
             }
-            try:
-                result = mesh_with_tetgen(surface, options, limits)
-            except MesherFailure as failure:
-                if not (mesher == "auto" and failure.kind in ("failed", "crash") and others_can):
-                    raise
-                logger.warning("%s; meshing it with fTetWild, which may move the surface slightly", failure)
-                chosen = "ftetwild"
-        if result is None:
+            result = mesh_with_tetgen(surface, options, limits)
+        else:
             result = mesh_with_ftetwild(surface, max_volume, envelope, limits)
         seconds += result.seconds
         try:
@@ -192,17 +215,43 @@ def tetrahedralize_reported(
         except MeshError as error:
             raise MeshingError(
                 f"{chosen} returned an unusable mesh: {str(error).removeprefix('TetMesh: ')}; the surface has "
-                'triangles that are too thin or too close to each other: remesh it evenly, or use mesher="ftetwild"'
+                "triangles that are too thin or too close to each other: remesh it evenly, or use "
+                + option("mesher", "ftetwild")
             ) from None
         _check_result(mesh, surface, chosen, max_volume if tets is None else None, keep_surface)
         return mesh
 
-    if tets is None:
-        mesh = make(max_volume)
-    else:
-        mesh = mesh_with_count(make, tets, max(enclosed, 1e-3 * float(np.prod(high - low))))
+    reducing = reduce if decimate is None and not keep_surface else None
+
+    def fill() -> tuple[TetMesh, SurfaceMesh]:
+        nonlocal chosen
+        if tets is None:
+            logger.info("filling %d triangles with tets", len(surface.triangles))
+            return make(surface, max_volume), surface
+        volume = max(enclosed, 1e-3 * float(np.prod(high - low)))
+        if chosen == "tetgen" or reducing is None:
+            return fill_with_count(surface, tets, make, reducing, volume)
+        coarse = coarse_enough(surface, tets, reducing)
+        logger.info("filling %d triangles with about %d tets by fTetWild", len(coarse.triangles), tets)
+        mesh = make(coarse, 2.0 * volume / tets)
+        boundary = mesh.surface.compact()
+        if abs(len(mesh.tets) - tets) <= COUNT_TOLERANCE * tets or not boundary.check().ok:
+            return mesh, coarse
+        # A run of fTetWild can take a minute, and it resolves how far it moves the surface. Its boundary is clean.
+        logger.info("%d tets instead of %d by fTetWild; filling its boundary again", len(mesh.tets), tets)
+        chosen = "tetgen"
+        return fill_with_count(boundary, tets, make, reducing, volume)
+
+    try:
+        mesh, filled = fill()
+    except MesherFailure as failure:
+        if not (chosen == "tetgen" and mesher == "auto" and failure.kind in DAMAGED and others_can):
+            raise
+        logger.warning("%s; meshing it with fTetWild, which may move the surface slightly", failure)
+        chosen = "ftetwild"
+        mesh, filled = fill()
     logger.info("%s: %d vertices, %d tets in %.2f s", chosen, len(mesh.vertices), len(mesh.tets), seconds)
-    return mesh, MeshingReport(chosen, seconds, repaired)
+    return mesh, MeshingReport(chosen, seconds, repaired, fine, filled)
 
 
 def _in_range(name: str, value: float | None, low: float, high: float) -> None:
@@ -215,7 +264,7 @@ def _in_range(name: str, value: float | None, low: float, high: float) -> None:
         or not low < value < high
     ):
         span = f"between {low:g} and {high:g}" if np.isfinite(high) else f"above {low:g} and finite"
-        raise MeshingError(f"{name} must be a number {span}, not {value!r}")
+        raise MeshingError(f"{option(name)} must be a number {span}, not {value!r}")
 
 
 def _facing_outward(surface: SurfaceMesh) -> tuple[SurfaceMesh, SurfaceReport]:
@@ -248,10 +297,10 @@ def _facing_outward(surface: SurfaceMesh) -> tuple[SurfaceMesh, SurfaceReport]:
 
 def _choose(mesher: Mesher, report: SurfaceReport, repaired: bool) -> Literal["tetgen", "ftetwild"]:
     if mesher not in ("auto", "tetgen", "ftetwild"):
-        raise MeshingError(f'mesher must be "auto", "tetgen" or "ftetwild", not {mesher!r}')
+        raise MeshingError(f'{option("mesher")} must be "auto", "tetgen" or "ftetwild", not {mesher!r}')
     if mesher == "ftetwild":
         if not ftetwild_installed():
-            raise MeshingError(f'mesher="ftetwild" is not installed: {INSTALL}')
+            raise MeshingError(f"fTetWild is not installed: {INSTALL}")
         return "ftetwild"
     if report.ok:
         return "tetgen"
@@ -259,8 +308,8 @@ def _choose(mesher: Mesher, report: SurfaceReport, repaired: bool) -> Literal["t
     if mesher == "auto" and ftetwild_installed():
         logger.warning("the surface is not clean (%s): meshing it with fTetWild, which may move it slightly", faults)
         return "ftetwild"
-    remedies = ["fix it in a modelling program"] if repaired else ["fix it with repair=True"]
-    remedies.append('use mesher="ftetwild"' + ("" if ftetwild_installed() else f" ({INSTALL})"))
+    remedies = ["fix it in a modelling program"] if repaired else [f"fix it with {option('repair', True)}"]
+    remedies.append(f"use {option('mesher', 'ftetwild')}" + ("" if ftetwild_installed() else f" ({INSTALL})"))
     still = "even after repair, " if repaired else ""
     raise MeshingError(f"TetGen cannot mesh this surface: {still}{faults}; {' or '.join(remedies)}")
 
@@ -269,19 +318,21 @@ def _check_ftetwild_options(quality: float | None, min_dihedral: float | None, k
     """Raise for options that fTetWild does not have; warn of the one that it does not use."""
     for name, given in (("keep_surface", keep_surface), ("min_dihedral", min_dihedral is not None)):
         if given:
-            raise MeshingError(f"fTetWild has no {name}; omit it, or clean the surface so that TetGen can mesh it")
+            raise MeshingError(
+                f"fTetWild has no {option(name)}; omit it, or clean the surface so that TetGen can mesh it"
+            )
     if quality != DEFAULT_QUALITY:
-        logger.warning("fTetWild optimizes shapes by its own measure: quality=%s is not used", quality)
+        logger.warning("fTetWild optimizes shapes by its own measure: %s is not used", option("quality", quality))
 
 
 def _check_result(
     mesh: TetMesh, surface: SurfaceMesh, mesher: str, max_volume: float | None, keep_surface: bool
 ) -> None:
     if max_volume is not None and (largest := float(mesh.volumes.max())) > max_volume * (1.0 + 1e-6):
-        remedy = "omit keep_surface, give a finer surface" if keep_surface else "give a finer surface"
+        remedy = f"omit {option('keep_surface')}, give a finer surface" if keep_surface else "give a finer surface"
         raise MeshingError(
-            f"{mesher} left a tet of {largest:.4g} m^3, larger than max_volume={max_volume:g}; {remedy}, or allow "
-            "larger tets"
+            f"{mesher} left a tet of {largest:.4g} m^3, larger than {option('max_volume', max_volume)}; {remedy}, "
+            "or allow larger tets"
         )
     if mesher != "tetgen":
         return
@@ -291,4 +342,6 @@ def _check_result(
             "overlap or touch: separate or join them"
         )
     if keep_surface and len(mesh.surface.used_vertices) > len(surface.vertices):
-        raise MeshingError("TetGen added vertices on the surface; omit keep_surface, or give a finer surface")
+        raise MeshingError(
+            f"TetGen added vertices on the surface; omit {option('keep_surface')}, or give a finer surface"
+        )

@@ -56,7 +56,7 @@ class RigidBody(PlacedBody):
     angular_velocity : (3,) initial spin about the center of mass [rad/s].
     friction : Coulomb coefficient against other bodies; a pair uses the geometric mean of its two.
     stiffness : kappa [Pa] of the energy that keeps the body rigid in `Implicit`; in `XPBD` it is exactly rigid. None:
-        from the heaviest load of the scene, see `supple.scene.rigid.stiffness` and docs/reference/bodies.md.
+        from the heaviest load of the scene, see `supple.scene.rigid.stiffness` and docs/theory/rigid_bodies.md.
 
     Attributes
     ----------

@@ -33,10 +33,10 @@ APPROACH = 0.5
 # By how much a rigid body may turn in a substep [rad]; see `supple.solvers.xpbd.rigid.bodies`.
 MOST_TURN = 0.1
 # Largest r g h^2 / H in a substep h, with the ratio r of the masses of a body and of a lighter rigid one near it, and
-# the mean height H of a tet; and the ratio above which this is asked for. docs/reference/bodies.md has what it gains.
+# the mean height H of a tet; and the ratio above which this is asked for. See docs/theory/rigid_bodies.md.
 MOST_SINKING, LEAST_RATIO = 1.5e-4, 4.0
 # Largest g h^2 / H, with the height H of the smallest rigid body's tet: a stack that sinks farther into itself at an
-# impact gains energy when it is parted again. docs/reference/bodies.md has the trial.
+# impact gains energy when it is parted again. See notes/measured_trials.md.
 MOST_FALL = 3e-3
 # By which a number from an earlier frame falls in every frame.
 FALL = 0.8

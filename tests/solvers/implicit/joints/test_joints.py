@@ -117,7 +117,7 @@ def test_joints_between_bodies_keep_momentum():
         frames = run(sp.Scene([first, second], joints=[joint], gravity=(0, 0, 0)), 0.005, 20, "bdf2")
         P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
         assert np.abs(P - P[0]).max() < 1e-11 * np.linalg.norm(P[0])
-        # That of a free body, by the integrator: see docs/reference/bodies.md.
+        # That of a free body, by the integrator: see docs/theory/rigid_bodies.md.
         assert np.abs(L - L[0]).max() < 1e-3 * np.linalg.norm(L[0])
 
 

@@ -83,8 +83,20 @@ def _extent(low: np.ndarray, high: np.ndarray) -> str:
     return " x ".join(f"{x:.6g}" for x in high - low) + " m"
 
 
-def _surface_rows(surface: SurfaceMesh) -> list[tuple[str, str]]:
+def _surface_rows(surface: SurfaceMesh, file: Path) -> list[tuple[str, str]]:
+    from supple.mesh.meshing.child_process import DEFAULT_TETS
+    from supple.mesh.meshing.sizes import TETS_OF_TRIANGLE, automatic_tets
+    from supple.mesh.meshing.spelling import option, spelled_for
+    from supple.mesh.meshing.units import millimetres_hint
+
     report = surface.check()
+    needed = TETS_OF_TRIANGLE * len(surface.triangles)
+    tets = f"about {needed:,} for all triangles"
+    if automatic_tets(surface) is not None:
+        tets += f"; for {DEFAULT_TETS:,} tets it is reduced to about {DEFAULT_TETS // TETS_OF_TRIANGLE} triangles first"
+    with spelled_for("shell"):
+        hint = millimetres_hint(file, surface.vertices)
+        repair = "" if report.ok else f"\nmesh it with {option('repair', True)}"
     return [
         ("kind", "surface"),
         ("vertices", str(len(surface.vertices))),
@@ -93,7 +105,9 @@ def _surface_rows(surface: SurfaceMesh) -> list[tuple[str, str]]:
         ("size", _extent(*surface.bounds)),
         ("area", f"{surface.area:.6g} m^2"),
         ("volume", f"{surface.volume:.6g} m^3" if report.watertight else "none, the surface is open"),
-        ("problems", "none" if report.ok else "\n".join(report.problems)),
+        ("tets", tets),
+        ("problems", "none" if report.ok else "\n".join(report.problems) + repair),
+        *([("warning", hint)] if hint else []),
     ]
 
 
@@ -137,18 +151,20 @@ def _mesh(file: Path, suffix: str) -> None:
                 mesh = SurfaceMesh.load(file)
             except MeshError:
                 raise error from None
-    rows = _tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh)
+    rows = _tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh, file)
     if isinstance(mesh, TetMesh) and suffix in SETS_EXTENSIONS:
         rows += [(f"sets of {kind}", listed) for kind, listed in read_sets(file).listed().items()]
     print_table(rows, str(file))
 
 
 def _scene(file: Path, timed: bool) -> None:
+    from supple.app.cli.announcements import reading
     from supple.app.scene_file.loader import load_run
     from supple.model.system import build_system, initial_state
     from supple.scene.rigid.rigid_body import RigidBody
 
-    run = load_run(file)
+    with reading():
+        run = load_run(file)
     start = initial_state(run.scene, **{key.removeprefix("initial_"): value for key, value in run.start.items()})
     scene, system = run.scene, build_system(run.scene, start)
     points = system.split(start.positions)

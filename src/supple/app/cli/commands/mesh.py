@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
 
-# Fine enough that a body bends, coarse enough for a laptop.
-DEFAULT_TETS = 10_000
-# Few soft bodies are longer; many files are in millimetres [m].
-LARGE = 10.0
-
 
 def mesh(
     surface: Path,
@@ -54,7 +49,8 @@ def mesh(
     scale
         Factor of all coordinates: 0.001 for a surface in millimetres.
     tets
-        Number of tets, within 10 %: 10,000 where no other size and no --keep-surface is given.
+        Number of tets, within 10 %: 5,000 where no other size and no --keep-surface is given. A surface whose
+        triangles need more is reduced first.
     edge
         Length of the tets' edges [m], instead of a number of tets.
     max_volume
@@ -70,7 +66,7 @@ def mesh(
     repair
         Repair a surface that is not clean first, and list the changes. Where that fails, fTetWild meshes it as it is.
     decimate
-        Number of triangles to which the surface is reduced first: TetGen keeps all of them.
+        Number of triangles to which the surface is reduced first, instead of one that fits the number of tets.
     envelope
         How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
     time_limit
@@ -84,6 +80,8 @@ def mesh(
 
     from supple.mesh.io.mesh_files import TET_EXTENSIONS
     from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path
+    from supple.mesh.meshing.child_process import DEFAULT_TETS
+    from supple.mesh.meshing.spelling import spelled_for
     from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetgen_files import write_tetgen
@@ -104,8 +102,8 @@ def mesh(
         refuse_to_replace(surface, target)
     if tets is edge is max_volume is None and not keep_surface:
         tets = DEFAULT_TETS
-    loaded = _scaled(SurfaceMesh.load(surface), scale, surface)
-    with Console(stderr=True).status(f"meshing {len(loaded.triangles)} triangles"):
+    with spelled_for("shell"), Console(stderr=True).status("meshing"):
+        loaded = _scaled(SurfaceMesh.load(surface), scale, surface)
         try:
             filled, report = tetrahedralize_reported(
                 loaded,
@@ -132,18 +130,14 @@ def mesh(
 
 
 def _scaled(surface: SurfaceMesh, scale: float, path: Path) -> SurfaceMesh:
-    import sys
-
     import numpy as np
 
+    from supple.mesh.meshing.units import warn_of_millimetres
     from supple.mesh.surface import SurfaceMesh
 
     if not 0.0 < scale < np.inf:
         raise MeshError(f"scale must be a number above 0 and finite, not {scale:g}")
-    size = scale * float(np.ptp(surface.vertices, axis=0).max())
-    if size > LARGE and scale == 1.0:
-        hint = f"{path} is {size:.4g} m long; where it is in millimetres, use --scale 0.001"
-        print(f"warning: {hint}", file=sys.stderr)
+    warn_of_millimetres(path, surface.vertices, scale)
     return surface if scale == 1.0 else SurfaceMesh(scale * surface.vertices, surface.triangles)
 
 
@@ -166,6 +160,8 @@ def _summarize(tets: TetMesh, report: MeshingReport, files: list[Path]) -> None:
         "smallest dihedral": f"{tets.min_dihedrals.min():.2f} degrees",
         "files": "\n".join(map(str, files)),
     }
+    if report.reduced:
+        rows["surface"] = f"reduced from {len(report.fine.triangles)} to {len(report.filled.triangles)} triangles"
     if report.repair is not None:
         rows["repair"] = str(report.repair)
     print_table(rows.items())

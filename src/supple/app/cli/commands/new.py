@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.commands.mesh import LARGE
 from supple.errors import SceneError
 
 
@@ -34,11 +32,9 @@ def new(
     overwrite
         Replace the file where it exists.
     """
-    import numpy as np
-
-    from supple.app.scene_file.template import new_scene, new_scene_of
+    from supple.app.scene_file.from_surface import scene_of_surface
+    from supple.app.scene_file.template import new_scene
     from supple.mesh.io.mesh_files import SURFACE_READERS
-    from supple.mesh.surface import SurfaceMesh
     from supple.runtime.replacing import whole_file
 
     if scene.suffix.lower() in SURFACE_READERS:
@@ -54,16 +50,9 @@ def new(
             raise SceneError("--scale is of a surface; give --surface, too")
         text = new_scene(scene.name)
     else:
-        vertices = SurfaceMesh.load(surface).vertices
-        length, lowest = float(np.ptp(vertices, axis=0).max()), float(vertices[:, 1].min())
-        used = (0.001 if length > LARGE else 1.0) if scale is None else scale
-        if not 0.0 < used < np.inf:
-            raise SceneError(f"scale must be a number above 0 and finite, not {used:g}")
         file = Path(os.path.relpath(surface.absolute(), scene.absolute().parent)).as_posix()
-        body = re.sub(r"[^A-Za-z0-9_-]+", "_", surface.stem)[:50] or "body"
-        text = new_scene_of(scene.name, file, body, used, used * length, used * lowest)
-        if scale is None and used != 1.0:
-            print(f"{surface} is {length:.4g} m long; it is taken to be in millimetres (scale: {used:g})")
+        text, chosen = scene_of_surface(surface, file, scene.name, scale)
+        print(chosen)
     with whole_file(scene) as fresh:
         fresh.write_text(text, encoding="utf-8")
     print(f"wrote {scene}; try: supple view {scene}")

@@ -38,7 +38,8 @@ def run(
     Parameters
     ----------
     scene
-        The scene file (.yaml); `supple schema` describes it. Or a robot (.urdf); see docs/learn/robots.md.
+        The scene file (.yaml); `supple schema` describes it. Or a surface, which falls on a floor. Or a robot (.urdf);
+        see docs/learn/robots.md.
     output
         Run folder; it is created where it does not exist, and may not contain an earlier run.
     steps
@@ -67,6 +68,7 @@ def run(
     quiet
         Print neither progress nor summary.
     """
+    from supple.app.cli.announcements import reading
     from supple.app.cli.session import Products, run_session
     from supple.app.cli.trace import traces
     from supple.app.runs.run_folder import SceneSource
@@ -80,7 +82,8 @@ def run(
         from supple.runtime.replacing import refuse_to_replace
 
         refuse_to_replace(scene, trace)
-    described = load_run(scene)
+    with reading():
+        described = load_run(scene)
     if separate:
         from supple.app.cli.separation import moved_apart
 

@@ -27,7 +27,8 @@ def view(
     Parameters
     ----------
     source
-        A scene file (.yaml), a robot (.urdf), or a recording (.vtkhdf, or the folder that holds it).
+        A scene file (.yaml), a surface (.stl, .obj ...), a robot (.urdf), or a recording (.vtkhdf, or the folder that
+        holds it).
     solver
         Kind of solver, instead of the file's, with its default parameters.
     port
@@ -38,7 +39,7 @@ def view(
     from supple.app.cli.live import serve_page
 
     found = find_source(source)
-    if found.suffix.lower() not in SCENE_FILES:
+    if found.suffix.lower() in RECORDINGS:
         if solver is not None:
             from supple.errors import OutputError
 
@@ -46,12 +47,14 @@ def view(
         serve_page(found, port, open_)
         return
 
+    from supple.app.cli.announcements import reading
     from supple.app.scene_file.confined import ConfinedMeshStore
     from supple.app.scene_file.entries.solvers import solver_of_kind
     from supple.app.scene_file.loader import load_run
     from supple.app.viewer.protocol.live_source import LiveSource
 
-    run = load_run(found, ConfinedMeshStore)
+    with reading():
+        run = load_run(found, ConfinedMeshStore)
     used = run.solver if solver is None else solver_of_kind(solver)
     live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions)
     serve_page(live, port, open_)
@@ -64,11 +67,12 @@ def find_source(path: Path) -> Path:
     ------
     OutputError : where there is no such file.
     """
+    from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES
     from supple.errors import OutputError
 
     path = recording_at(path)
     if not path.exists():
         raise OutputError(f"{path}: there is no such file")
-    if path.suffix.lower() not in (*SCENE_FILES, *RECORDINGS):
-        raise OutputError(f"{path} is neither a scene file (.yaml) nor a recording (.vtkhdf)")
+    if path.suffix.lower() not in (*SCENE_FILES, *SURFACE_FILES, *RECORDINGS):
+        raise OutputError(f"{path} is neither a scene file (.yaml), nor a surface, nor a recording (.vtkhdf)")
     return path

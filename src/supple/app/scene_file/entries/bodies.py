@@ -118,7 +118,9 @@ class BodyModel(Model):
     )
     friction: NonNegative = Field(default=0.0, description="Coulomb coefficient against other bodies and itself")
     skin: SurfaceModel | None = Field(
-        default=None, description="a finer surface that follows the body in pages and exports"
+        default=None,
+        description="a finer surface that follows the body in pages and exports; default: the surface in the file of "
+        "`mesh`, where it was reduced",
     )
     collide: Literal["tets", "skin"] | None = Field(
         default=None, description="what touches other things: the surface of the tets (default), or the skin"
@@ -179,16 +181,17 @@ class BodyModel(Model):
     def _soft(self, meshes: MeshStore) -> Body:
         """Without copies."""
         assert self.material is not None
+        fine = None
         if self.mesh is not None:
             with at("mesh"):
-                mesh = meshes.tets(self.mesh)
+                mesh, fine = meshes.tets(self.mesh), meshes.fine(self.mesh)
                 mesh = mesh if self.order is None else mesh.to_order(self.order)
         else:
             assert self.shape is not None
             with at("shape"):
                 mesh = meshes.shape(self.shape, self.order or 1)
         with at("skin"):
-            skin = meshes.surface(self.skin) if self.skin is not None else None
+            skin = meshes.surface(self.skin) if self.skin is not None else fine
         with at("material"):
             material = self.material.build()
         if self.regions is not None:

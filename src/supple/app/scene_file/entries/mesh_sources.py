@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,11 +11,14 @@ from pydantic import BaseModel, Field
 from supple.app.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, SurfaceShapeModel
 from supple.app.scene_file.model import FilePath, Model, Positive, Vector
 from supple.errors import MeshError
+from supple.mesh.meshing.units import warn_of_millimetres
 from supple.mesh.sets import MeshSets, read_sets
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.located import at
 from supple.scene.rotation import rotation_matrix
+
+logger = logging.getLogger(__name__)
 
 SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".glb", ".vtp")
 TET_FILES = (".node", ".ele", ".edge", ".face", ".msh", ".inp", ".usd", ".usda", ".usdc")
@@ -33,7 +37,11 @@ MESHING_OPTIONS = (
 
 
 class MeshFileModel(Model):
-    """A mesh file. A surface is filled with tetrahedra according to the meshing options."""
+    """A mesh file. A surface is filled with tetrahedra according to the meshing options.
+
+    Without a size, a surface whose triangles need more than 5,000 tetrahedra is filled with so many. A surface that is
+    reduced for that, or by `decimate`, is the skin of the body.
+    """
 
     file: FilePath = Field(description="relative to the scene file")
     scale: Positive = Field(default=1.0, description="of all coordinates: 0.001 for a file in millimetres")
@@ -98,7 +106,11 @@ class MeshStore:
 
     def tets(self, source: MeshFileModel) -> TetMesh:
         """The tet mesh of a file, or of the surface in it."""
-        return self._once(source, lambda: self._read(source))
+        return self._once(source, lambda: self._read(source))[0]
+
+    def fine(self, source: MeshFileModel) -> SurfaceMesh | None:
+        """The surface in a file, which was reduced before it was filled; None where it was not."""
+        return self._once(source, lambda: self._read(source))[1]
 
     def sets(self, source: MeshFileModel) -> MeshSets:
         """The named sets of a file of tets."""
@@ -133,18 +145,28 @@ class MeshStore:
         """
         return self.folder / file
 
-    def _read(self, source: MeshFileModel) -> TetMesh:
+    def _read(self, source: MeshFileModel) -> tuple[TetMesh, SurfaceMesh | None]:
+        """The mesh; and the surface where it was reduced before it was filled."""
         if source.is_surface():
-            from supple.mesh.meshing.tetrahedralize import tetrahedralize
+            from supple.mesh.meshing.sizes import automatic_tets
+            from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
 
-            return tetrahedralize(self._read_surface(source), **source.meshing)
+            surface, options = self._read_surface(source), source.meshing
+            if not options.keys() & {"tets", "edge", "max_volume", "decimate", "keep_surface"}:
+                options["tets"] = automatic_tets(surface)
+            mesh, report = tetrahedralize_reported(surface, **options)
+            if report.reduced:
+                logger.info("%s: its %d triangles are drawn, as the skin", source.file, len(report.fine.triangles))
+            return mesh, report.fine if report.reduced else None
         with at("file"):
             mesh = TetMesh.load(self.located(source.file))
-        return mesh if source.scale == 1.0 else mesh.transformed(source.scale)
+        warn_of_millimetres(source.file, mesh.vertices, source.scale)
+        return (mesh if source.scale == 1.0 else mesh.transformed(source.scale)), None
 
     def _read_surface(self, source: MeshFileModel) -> SurfaceMesh:
         with at("file"):
             surface = SurfaceMesh.load(self.located(source.file))
+        warn_of_millimetres(source.file, surface.vertices, source.scale)
         return surface if source.scale == 1.0 else surface.transformed(source.scale)
 
     def _surface(self, source: SurfaceModel) -> SurfaceMesh:

@@ -31,7 +31,7 @@ from supple.solvers.xpbd.rigid.bodies import RigidBodies
 # Of the mean surface edge: the largest gap that is reported, and how far contacts may move a point in a substep, where
 # edges are looked for.
 NEAR, SLACK = 1.0, 0.05
-# Sweeps over all contacts of a substep; see docs/theory/xpbd_contact.md for the effect of more. The second number:
+# Sweeps over all contacts of a substep; see docs/theory/contact.md for the effect of more. The second number:
 # where they are solved again because something has still passed through something.
 SWEEPS, MORE_SWEEPS = 2, 4
 # How often contacts are solved again because edges have passed through each other.

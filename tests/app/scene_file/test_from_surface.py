@@ -1,0 +1,94 @@
+"""A surface file is a scene: a body above a floor, of a sensible size, material and number of tets."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.app.cli.app import main
+from supple.app.scene_file.loader import load_run
+
+BALL = sp.shapes.sphere_surface(0.05, 0.004)
+HALF_TURN = np.array([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]])
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_fine_surface_in_millimetres_away_from_the_origin(caplog):
+    BALL.transformed(1000.0, HALF_TURN, (300.0, -200.0, 50.0)).save("part.stl")
+    with caplog.at_level(logging.INFO):
+        run = load_run("part.stl")
+    (body,) = run.scene.bodies
+    assert body.name == "part"
+    assert len(body.mesh.tets) == pytest.approx(5000, rel=0.1)
+    assert body.mesh.volume == pytest.approx(BALL.volume, rel=0.02)
+    assert body.skin is not None
+    assert len(body.skin.triangles) == len(BALL.triangles)
+    placed = body.place(body.mesh.vertices)
+    low, high = placed.min(axis=0), placed.max(axis=0)
+    assert low[1] == pytest.approx(0.1 * 0.1, rel=0.05)
+    assert np.abs(0.5 * (low + high)[[0, 2]]).max() < 1e-3
+    assert [type(obstacle).__name__ for obstacle in run.scene.obstacles] == ["HalfSpace"]
+    said = [record.getMessage() for record in caplog.records]
+    assert any("taken to be in millimetres (scale: 0.001)" in text and "about 5,000 tets" in text for text in said)
+    assert any(f"its {len(BALL.triangles)} triangles are drawn" in text for text in said)
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
+
+
+@pytest.mark.parametrize(("size", "youngs"), [(0.1, 5e4), (2.0, 4e5)])
+def test_large_bodies_are_stiff_enough_to_stand(size, youngs):
+    sp.shapes.box_surface((size, size, size), (4, 4, 4)).save("part.stl")
+    assert load_run("part.stl").scene.bodies[0].material.youngs == youngs
+
+
+def test_an_open_surface_is_closed():
+    middle = BALL.vertices[BALL.triangles].mean(axis=1)
+    sp.SurfaceMesh(BALL.vertices, BALL.triangles[middle[:, 1] < 0.045]).compact().save("part.stl")
+    assert "repair: true" in load_run("part.stl").text
+    assert len(load_run("part.stl").scene.bodies[0].mesh.tets) == pytest.approx(5000, rel=0.1)
+
+
+def test_a_scene_without_a_size_has_no_more_tets_than_by_default(caplog):
+    BALL.save("part.stl")
+    with open("a.yaml", "w", encoding="utf-8") as file:
+        file.write("bodies: [{name: a, mesh: {file: part.stl}, material: {kind: arap, youngs: 1e5, poisson: 0.3}}]")
+    (body,) = sp.load_scene("a.yaml").bodies
+    assert len(body.mesh.tets) == pytest.approx(5000, rel=0.1)
+    assert body.skin is not None
+
+
+def test_a_large_mesh_in_a_scene_is_most_likely_in_millimetres(caplog):
+    sp.shapes.box((119.0, 20.0, 20.0), (6, 1, 1)).save("part.vtu")
+    scene = "bodies: [{name: a, mesh: {file: part.vtu, scale: SCALE}, material: {kind: arap, youngs: 1e5, poisson: 0}}]"
+    for scale, warned in ((1, True), (0.001, False)):
+        caplog.clear()
+        with open("a.yaml", "w", encoding="utf-8") as file:
+            file.write(scene.replace("SCALE", str(scale)))
+        sp.load_scene("a.yaml")
+        assert ("part.vtu is 119 m long; where it is in millimetres, give scale: 0.001" in caplog.text) == warned
+
+
+@pytest.mark.parametrize("command", [["run", "part.stl", "-o", "out/part"], ["demo", "part.stl"]])
+def test_a_surface_is_simulated_and_resumed(command, tmp_path, capsys):
+    sp.shapes.box_surface((100.0, 100.0, 100.0), (3, 3, 3)).save("part.stl")
+    assert main([*command, "--steps", "3", "--no-page", "--no-plot"]) == 0
+    assert "3 frames" in capsys.readouterr().out
+    with sp.read_recording("out/part/recording.vtkhdf") as recording:
+        assert len(recording) == 4
+        assert np.ptp(recording.rest_positions, axis=0).max() == pytest.approx(0.1, rel=0.01)
+    assert main(["resume", "out/part", "--steps", "5"]) == 0
+
+
+def test_errors_name_the_surface(capsys):
+    sp.SurfaceMesh(np.eye(3), [[0, 1, 2]]).save("part.stl")
+    assert main(["run", "part.stl"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("supple: part.stl: ")
+    assert main(["run", "missing.stl"]) == 2
+    assert "missing.stl" in capsys.readouterr().err
