@@ -19,8 +19,8 @@ settings.load_profile("same")
 # Otherwise examples contain constants of all modules that were imported until then, which depends on the tests before.
 providers._get_local_constants = providers.Constants
 
-# Tests share the cores. By default, threads of OpenMP spin while they wait for another thread that waits for a core
-# itself: with other processes beside it, `Implicit` takes ten times the CPU time (2.2 to 2.9 s for 12 steps, not 0.2).
+# Tests share the cores. By default, a thread of OpenMP spins while it waits for another one, which waits for a core:
+# beside other processes, a ball of 5,112 tets in `Implicit` takes ten times the CPU time.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 # Otherwise ffmpeg is started by a copy of this process, which takes a minute on some machines.
 os.environ.setdefault("IMAGEIO_FFMPEG_NO_PREVENT_SIGINT", "1")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.scenes import converged
 
 import supple as sp
 from supple.contact.mesh.obstacle_vertices import obstacle_positions, with_obstacles
@@ -23,8 +24,7 @@ def ranges_of(*obstacles):
 
 
 def run(scene, dt, steps, **solver):
-    frames = list(sp.simulate(scene, sp.Implicit(**solver), dt, steps))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, sp.Implicit(**solver), dt, steps))
     assert all(frame.report.min_det_F > 0.0 for frame in frames)
     return frames
 

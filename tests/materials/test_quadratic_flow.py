@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from tests.derivatives import differences, gradient_of, hessian_product
 
 import supple as sp
 from supple.materials.flows.internal import at_rest, count_of
 from supple.model.system import build_system
 from supple.solvers.implicit.energies.elasticity import elasticity_of
-from supple.solvers.implicit.energies.potential import HessianBlocks
 
 STATIC = sp.Implicit(integrator="static", contact=None)
 RUBBER = sp.MooneyRivlin(c10=8e4, c01=2e4, bulk=1e7)
@@ -54,25 +54,10 @@ def test_the_energy_of_a_step_has_the_derivatives_of_differences():
     x = first + 0.003 * rng.normal(size=first.shape)
     d, t = rng.normal(size=x.shape), 1e-5
 
-    def gradient(potential, y):
-        out = np.zeros_like(y)
-        potential.add_gradient(y, out)
-        return out
-
-    force = gradient(step, x)
-    change = (step.value(x + t * d) - step.value(x - t * d)) / (2 * t)
+    force, exact = gradient_of(step, x), hessian_product(step, system.tets, x, d)
+    change, bend = differences(step, x, d, t)
     assert change == pytest.approx((force * d).sum(), rel=1e-5)
-    blocks, exact = HessianBlocks.zeros(len(system.tets), len(x)), np.zeros_like(x)
-    step.add_hessian(x, blocks, project=False)
-    products = np.einsum("eij,ej->ei", blocks.tets, d[system.tets].reshape(-1, 12)).reshape(-1, 4, 3)
-    np.add.at(exact, system.tets, products)
-    for part in blocks.patches:
-        np.add.at(exact, part.rows, np.einsum("pij,pj->pi", part.blocks, d[part.columns]))
-        off = part.rows != part.columns
-        back = np.einsum("pji,pj->pi", part.blocks[off], d[part.rows[off]])
-        np.add.at(exact, part.columns[off], back)
-    differences = (gradient(step, x + t * d) - gradient(step, x - t * d)) / (2 * t)
-    np.testing.assert_allclose(differences, exact, atol=1e-5 * np.abs(exact).max())
+    np.testing.assert_allclose(bend, exact, atol=1e-5 * np.abs(exact).max())
     # The forces at the end are those of the stress of the state after the step.
-    held = gradient(whole.in_step(whole.flowed(x, internal, 0.1), 0.0), x)
+    held = gradient_of(whole.in_step(whole.flowed(x, internal, 0.1), 0.0), x)
     np.testing.assert_allclose(held, force, atol=1e-9 * np.abs(force).max())

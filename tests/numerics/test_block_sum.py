@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.derivatives import dense_couplings
 
 import supple as sp
 from supple.model.system import build_system
@@ -24,15 +25,6 @@ def random_couplings(rng, n, count):
     own = rows == columns
     blocks[own] += blocks[own].transpose(0, 2, 1)
     return Couplings(rows, columns, blocks)
-
-
-def dense_couplings(couplings, n):
-    dense = np.zeros((n, 3, n, 3))
-    for i, j, block in zip(couplings.rows, couplings.columns, couplings.blocks, strict=True):
-        dense[i, :, j] += block
-        if i != j:
-            dense[j, :, i] += block.T
-    return dense.reshape(3 * n, 3 * n)
 
 
 def random_elements(rng, n, count):
@@ -80,7 +72,7 @@ def test_the_sum_is_the_dense_one(seed, n, pinned, pairs):
     data = assembled(joint, matrices, own[vertex_of], couplings)
     p = joint.pattern
     scalar = (3 * vertex_of[:, None] + np.arange(3)).ravel()
-    expected = (dense + dense_couplings(couplings, n))[np.ix_(scalar, scalar)]
+    expected = (dense + dense_couplings([couplings], n))[np.ix_(scalar, scalar)]
     summed = p.to_scipy(data).toarray()
     assert np.abs(summed - expected).max() <= 1e-13 * np.abs(expected).max()
     assert np.array_equal(summed, summed.T)
@@ -113,7 +105,7 @@ def test_a_pattern_serves_all_couplings_that_have_blocks_in_it():
     few = Couplings(many.columns[7:12], many.rows[7:12], many.blocks[7:12].transpose(0, 2, 1).copy())
     joint = JointPattern.of(build_pattern(elements, 20), many, row_of)
     data = joint.pattern.to_scipy(assembled(joint, matrices, own, few)).toarray()
-    expected = dense + dense_couplings(few, 20)
+    expected = dense + dense_couplings([few], 20)
     assert np.abs(data - expected).max() <= 1e-13 * np.abs(expected).max()
     small = JointPattern.of(build_pattern(elements, 20), few, row_of)
     assert small.places(many) is None
@@ -151,7 +143,7 @@ def test_products_are_those_of_the_dense_matrix():
     couplings = random_couplings(rng, 9, 30)
     x, out = rng.normal(size=(9, 3)), np.ones((9, 3))
     couplings.add_product(x, out)
-    expected = 1.0 + (dense_couplings(couplings, 9) @ x.ravel()).reshape(-1, 3)
+    expected = 1.0 + (dense_couplings([couplings], 9) @ x.ravel()).reshape(-1, 3)
     assert np.abs(out - expected).max() < 1e-13 * np.abs(expected).max()
 
 

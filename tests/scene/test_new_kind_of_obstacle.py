@@ -7,6 +7,7 @@ from typing import ClassVar
 import h5py
 import numpy as np
 import pytest
+from tests.scenes import converged
 
 import supple as sp
 from supple.app.viewer.engine.measurement.contact_points import contact_points
@@ -74,8 +75,7 @@ def recorded(tmp_path_factory):
 
 @pytest.mark.parametrize("solver", [sp.XPBD(substeps=10), sp.Implicit()], ids=["xpbd", "implicit"])
 def test_a_cube_comes_to_rest_on_it(solver):
-    frames = list(sp.simulate(falling_cube(), solver, 1 / 60, 30))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(falling_cube(), solver, 1 / 60, 30))
     lowest = [frame.positions["cube"][:, 1].min() for frame in frames]
     assert min(lowest) > 0.5 - 1e-4
     assert lowest[-1] == pytest.approx(0.5, abs=1e-3)

@@ -1,19 +1,11 @@
 """Matrices between embedded points, against dense products."""
 
 import numpy as np
+from tests.derivatives import dense_couplings
 
 from supple.contact.mesh.embedded_couplings import vertex_couplings
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.sparse.couplings import Couplings
-
-
-def dense(couplings, count):
-    out = np.zeros((3 * count, 3 * count))
-    for row, column, block in zip(couplings.rows, couplings.columns, couplings.blocks, strict=True):
-        out[3 * row : 3 * row + 3, 3 * column : 3 * column + 3] += block
-        if row != column:
-            out[3 * column : 3 * column + 3, 3 * row : 3 * row + 3] += block.T
-    return out
 
 
 def test_couplings_of_points_are_those_of_their_vertices():
@@ -36,7 +28,9 @@ def test_couplings_of_points_are_those_of_their_vertices():
         part = slice(points.start[k], points.start[k + 1])
         np.add.at(weights[k], points.vertices[part], points.weights[part])
     W = np.kron(weights, np.eye(3))
-    assert np.allclose(dense(vertex_couplings(points, between), 5), W.T @ dense(between, 4) @ W, atol=1e-13)
+    assert np.allclose(
+        dense_couplings([vertex_couplings(points, between)], 5), W.T @ dense_couplings([between], 4) @ W, atol=1e-13
+    )
 
 
 def test_points_that_are_vertices_are_renamed():

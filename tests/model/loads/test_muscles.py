@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.derivatives import derivative_errors, hessian_product
 
 import supple as sp
 from supple.model.system import build_system
 from supple.solvers.implicit.energies.loads.muscles import muscles_at
-from supple.solvers.implicit.energies.potential import HessianBlocks
 
 E, NU, RHO = 1e5, 0.3, 1000.0
 RUBBER = sp.StableNeoHookean(youngs=E, poisson=NU, density=RHO, damping=0.1)
@@ -29,24 +29,10 @@ def test_gradients_and_hessians_have_slope_two(curve):
     d = rng.normal(size=x.shape)
     (potential,) = muscles_at(system, 0.0)
 
-    def gradient(at):
-        out = np.zeros_like(at)
-        potential.add_gradient(at, out)
-        return out
-
     def product(project):
-        blocks, out = HessianBlocks.zeros(len(system.tets), len(x)), np.zeros_like(x)
-        potential.add_hessian(x, blocks, project)
-        moved = np.einsum("eij,ej->ei", blocks.elements, d[system.tets].reshape(-1, 12)).reshape(-1, 4, 3)
-        np.add.at(out, system.tets, moved)
-        return out
+        return hessian_product(potential, system.tets, x, d, project)
 
-    slope, errors = float((gradient(x) * d).sum()), []
-    for h in (2e-4, 1e-4):
-        by_value = (potential.value(x + h * d) - potential.value(x - h * d)) / (2 * h)
-        by_force = (gradient(x + h * d) - gradient(x - h * d)) / (2 * h)
-        exact = product(False)
-        errors.append((abs(by_value - slope) / abs(slope), np.abs(by_force - exact).max() / np.abs(exact).max()))
+    errors, _ = derivative_errors(potential, system.tets, x, d, (2e-4, 1e-4))
     for coarse, fine in zip(*errors, strict=True):
         assert fine < 1e-3
         assert fine < 0.3 * coarse or fine < 1e-8

@@ -157,7 +157,7 @@ def test_the_checker_shares_no_code_with_the_solvers():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
     assert done.stdout.strip() == "[]", done
     mine = Path(check_package.__file__).parent
-    known = re.compile(r"supple\.(output|files|errors|state|materials|numerics\.(threads|kernel_cache))\b")
+    known = re.compile(r"supple\.(results|errors|model\.state|materials|runtime)\b")
     for path in mine.rglob("*.py"):
         for name in re.findall(r"^\s*(?:from|import) (supple[\w.]*)", path.read_text(encoding="utf-8"), flags=re.M):
             assert known.match(name), f"{path.name} imports {name}"

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.scenes import converged
 
 import supple as sp
 from supple.solvers.implicit.solver import Implicit
@@ -15,9 +16,7 @@ def cube(density=1000.0, youngs=2e4, poisson=0.3, divisions=(2, 2, 2), size=0.2,
 
 
 def run(scene, solver, dt, steps, **start):
-    frames = list(sp.simulate(scene, solver, dt, steps, **start))
-    assert all(frame.report.status == "converged" for frame in frames)
-    return frames
+    return converged(sp.simulate(scene, solver, dt, steps, **start))
 
 
 def squeezed(body):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.derivatives import dense_couplings, differences, gradient_of
 
 import supple as sp
 from supple.errors import SceneError, SolverError
@@ -44,29 +45,18 @@ def hessian_of(potential, system, x, project):
     blocks = HessianBlocks.zeros(len(system.tets), len(x))
     potential.add_hessian(x, blocks, project)
     assert not blocks.tets.any()
-    H = np.zeros((3 * len(x), 3 * len(x)))
-    for part in blocks.patches:
-        for i, j, block in zip(part.rows, part.columns, part.blocks, strict=True):
-            H[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] += block
-            if i != j:
-                H[3 * j : 3 * j + 3, 3 * i : 3 * i + 3] += block.T
-    return H
+    return dense_couplings(blocks.patches, len(x))
 
 
 def assert_derivatives(potential, system, x, scale):
     """Central differences, of the energy to 1e-6 and of the gradient to 1e-5."""
     d = np.random.default_rng(5).normal(size=x.shape)
-    h = 1e-6
-    gradient, ahead, behind = (np.zeros_like(x) for _ in range(3))
-    potential.add_gradient(x, gradient)
-    slope = (potential.value(x + h * d) - potential.value(x - h * d)) / (2 * h)
-    assert slope == pytest.approx(np.sum(gradient * d), rel=1e-6, abs=1e-9 * scale)
-    potential.add_gradient(x + h * d, ahead)
-    potential.add_gradient(x - h * d, behind)
+    slope, bend = differences(potential, x, d, 1e-6)
+    assert slope == pytest.approx(np.sum(gradient_of(potential, x) * d), rel=1e-6, abs=1e-9 * scale)
     H = hessian_of(potential, system, x, False)
     np.testing.assert_allclose(H, H.T, atol=1e-9 * np.abs(H).max())
     product = (H @ d.ravel()).reshape(-1, 3)
-    np.testing.assert_allclose(product, (ahead - behind) / (2 * h), atol=1e-5 * np.abs(product).max())
+    np.testing.assert_allclose(product, bend, atol=1e-5 * np.abs(product).max())
     assert np.linalg.eigvalsh(hessian_of(potential, system, x, True)).min() > -1e-9 * np.abs(H).max()
 
 

@@ -2,31 +2,16 @@
 
 import numpy as np
 import pytest
+from tests.scenes import FLOOR, G, converged, momenta, rigid, soft
 
 import supple as sp
 from supple.contact.start.separation import separate
 from supple.errors import SolverError
 from supple.scene.rotation import rotation_matrix
 
-G = 9.81
-FLOOR = sp.HalfSpace(point=(0, 0, 0), normal=(0, 1, 0), friction=0.5, name="floor")
-CUBE = sp.shapes.box_surface((0.1, 0.1, 0.1), (1, 1, 1))
-BOX = sp.shapes.box_surface((0.1, 0.2, 0.3), (1, 1, 1))
-
-
-def rigid(name="rigid", shape=CUBE, **values):
-    return sp.RigidBody(name, shape, **({"density": 1000.0} | values))
-
-
-def soft(name="soft", youngs=1e5, density=1000.0, **values):
-    material = sp.StableNeoHookean(youngs=youngs, poisson=0.3, density=density)
-    return sp.Body(name, sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2)), material, **values)
-
 
 def run(scene, dt, steps, integrator="backward_euler", **more):
-    frames = list(sp.simulate(scene, sp.Implicit(integrator=integrator), dt, steps, **more))
-    assert {frame.report.status for frame in frames} == {"converged"}
-    return frames
+    return converged(sp.simulate(scene, sp.Implicit(integrator=integrator), dt, steps, **more))
 
 
 def error_of(frames):
@@ -141,7 +126,7 @@ def test_a_collision_keeps_momentum(other):
     hit = {"position": (0.13, 0.03, 0.02), "velocity": (-1.0, 0.0, 0.0), "friction": 0.5}
     bodies = [rigid("a", friction=0.5), rigid("b", **hit) if other == "rigid" else soft("b", **hit)]
     frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 0.001, 120, "bdf2")
-    P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
+    P, L = momenta(frames)
     pushes = [np.linalg.norm(f.report.details.contact_forces["a"]) for f in frames]
     assert max(pushes) > 10.0
     assert np.abs(P - P[0]).max() <= 1e-10 * np.linalg.norm(P[0])

@@ -7,6 +7,7 @@ the change of the pivot takes. It approaches a cylinder in proportion to the ang
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tests.scenes import converged
 
 import supple as sp
 
@@ -63,9 +64,7 @@ def turned_without_bounces(sides, inertia, slope, end):
 
 
 def frames_of(scene, dt, end, integrator="bdf2"):
-    frames = list(sp.simulate(scene, sp.Implicit(integrator=integrator), dt, round(end / dt)))
-    assert {frame.report.status for frame in frames} == {"converged"}
-    return frames
+    return converged(sp.simulate(scene, sp.Implicit(integrator=integrator), dt, round(end / dt)))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.scenes import converged
 
 import supple as sp
 
@@ -17,9 +18,7 @@ def ball(name="ball", **values):
 
 
 def run(scene, dt, steps, **more):
-    frames = list(sp.simulate(scene, sp.Implicit(), dt, steps, **more))
-    assert {frame.report.status for frame in frames} == {"converged"}
-    return frames
+    return converged(sp.simulate(scene, sp.Implicit(), dt, steps, **more))
 
 
 def test_a_body_rests_on_its_skin_and_its_tets_reach_through_the_floor(tmp_path):

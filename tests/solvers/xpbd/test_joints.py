@@ -5,25 +5,17 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
+from tests.scenes import G, bar, converged, gyroscope, hinge, rate_of_precession
 
 import supple as sp
 
-G = 9.81
-BAR = sp.shapes.box_surface((1.0, 0.05, 0.05), (1, 1, 1))
 MASS = 2.5
 
 
-def bar(name="bar", **values):
-    return sp.RigidBody(name, BAR, **({"density": 1000.0, "position": (0.5, 0, 0)} | values))
-
-
-def hinge(first="bar", second=None, **values):
-    return sp.HingeJoint(first, second, **({"point": (0, 0, 0), "name": "hinge"} | values))
-
-
 def run(scene, steps, substeps=20, dt=1 / 60, *, violation=1e-4, contact=None, **more):
-    frames = list(sp.simulate(scene, sp.XPBD(substeps=substeps, contact=contact, sleep_after=None), dt, steps, **more))
-    assert {frame.report.status for frame in frames} == {"converged"}, [f.report.message for f in frames][-1]
+    frames = converged(
+        sp.simulate(scene, sp.XPBD(substeps=substeps, contact=contact, sleep_after=None), dt, steps, **more)
+    )
     assert max(max(one.violation for one in frame.report.joints.values()) for frame in frames) < violation
     return frames
 
@@ -58,25 +50,9 @@ def test_a_double_pendulum_keeps_its_energy(substeps, drift):
 
 
 def test_a_gyroscope_precesses():
-    """With a horizontal axis the steady precession is m g l / (I w), exactly."""
-    length, spin = 0.1, 50.0
-    disk = sp.shapes.box_surface((0.2, 0.02, 0.2), (1, 1, 1))
-    inertia = sp.RigidBody("disk", disk, density=2700.0).properties
-    rate = inertia.mass * G * length / (inertia.inertia[1, 1] * spin)
-    body = sp.RigidBody(
-        "disk",
-        disk,
-        density=2700.0,
-        position=(length, 0, 0),
-        rotation=(0, 0, -np.pi / 2),
-        velocity=(0, 0, -rate * length),
-        angular_velocity=(spin, rate, 0),
-    )
-    frames = run(sp.Scene([body], joints=[sp.BallJoint("disk", point=(0, 0, 0), name="tip")]), 30)
-    centers = np.array([frame.poses["disk"].translation for frame in frames])
-    angles = np.unwrap(np.arctan2(-centers[:, 2], centers[:, 0]))
-    assert (angles[-1] - angles[0]) * 60 / 29 == pytest.approx(rate, rel=0.01)
-    assert np.abs(centers[:, 1]).max() < 1e-3
+    scene, rate = gyroscope()
+    frames = run(scene, 30)
+    assert rate_of_precession(frames, 1 / 60, 1e-3) == pytest.approx(rate, rel=0.01)
 
 
 def chain(count, damping=2e-3):
@@ -302,6 +278,5 @@ def test_a_joint_that_spins_fast_holds_by_more_substeps():
         bar("b", position=(1.5, 0, 0), angular_velocity=(0, 0, -100.0), velocity=(0, 50.0, 0)),
     ]
     joints = [hinge("a", point=(0, 0, 0)), sp.BallJoint("a", "b", point=(1.0, 0, 0))]
-    frames = list(sp.simulate(sp.Scene(bodies, joints=joints), sp.XPBD(), 1 / 60, 40))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(sp.Scene(bodies, joints=joints), sp.XPBD(), 1 / 60, 40))
     assert any(frame.report.details.repeats for frame in frames)

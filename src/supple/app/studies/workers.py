@@ -154,7 +154,6 @@ Opener = Callable[[int], contextlib.AbstractContextManager[Workers]]
 
 def local_workers(count: int | None, logs: Path) -> Opener:
     """Opens `count` workers on this machine (None: one per core), or fewer where the memory allows only fewer."""
-    _distributed()
     cores = os.cpu_count() or 1
     available = available_bytes()
     budget = int(_SHARE * available) if available is not None else None
@@ -182,7 +181,6 @@ def local_workers(count: int | None, logs: Path) -> Opener:
 
 def cluster_workers(scheduler: str) -> Opener:
     """Opens a connection to a scheduler of `dask.distributed`, such as "tcp://node1:8786"."""
-    _distributed()
 
     @contextmanager
     def opened(bytes_needed: int) -> Iterator[Workers]:
@@ -211,12 +209,3 @@ def _quiet() -> Iterator[None]:
     finally:
         for name, level in before.items():
             logging.getLogger(name).setLevel(level)
-
-
-def _distributed() -> None:
-    try:
-        import distributed  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ModuleNotFoundError:
-        raise StudyError(
-            "studies need the package distributed, which is not installed; install Supple with the extra `cluster`"
-        ) from None

@@ -3,6 +3,7 @@
 import ipctk
 import numpy as np
 import pytest
+from tests.scenes import converged
 
 import supple as sp
 from supple.model.system import initial_state
@@ -22,8 +23,7 @@ def oblique():
 
 
 def collide(scene, dt, steps, **solver):
-    frames = list(sp.simulate(scene, sp.Implicit(**solver), dt, steps))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, sp.Implicit(**solver), dt, steps))
     assert any(frame.report.details.contacts for frame in frames)
     assert frames[-1].report.details.contacts == 0  # they have parted again
     return [first_frame(scene, initial_state(scene)), *frames]

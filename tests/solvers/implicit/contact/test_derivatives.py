@@ -3,6 +3,7 @@
 import ipctk
 import numpy as np
 import pytest
+from tests.derivatives import dense_couplings, differences, gradient_of
 
 import supple as sp
 from supple.contact.barrier.barrier_function import barrier_slopes, barrier_value
@@ -73,23 +74,12 @@ def near_pair(kind, seed, size):
     return model_of(bodies, size)
 
 
-def gradient_of(potential, x):
-    out = np.zeros_like(x)
-    potential.add_gradient(x, out)
-    return out
-
-
 def dense_hessian(potential, x, project=False):
     blocks = HessianBlocks.zeros(0, len(x))
     potential.add_hessian(x, blocks, project)
-    dense = np.zeros((3 * len(x), 3 * len(x)))
+    dense = dense_couplings(blocks.couplings, len(x))
     for v, block in enumerate(blocks.vertices):
         dense[3 * v : 3 * v + 3, 3 * v : 3 * v + 3] += block
-    for part in blocks.couplings:
-        for i, j, block in zip(part.rows, part.columns, part.blocks, strict=True):
-            dense[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] += block
-            if i != j:
-                dense[3 * j : 3 * j + 3, 3 * i : 3 * i + 3] += block.T
     return dense
 
 
@@ -112,12 +102,12 @@ def check_derivatives(potential, x, d, largest):
     d = d / np.abs(d).max()
     check_slope_two(
         float((gradient_of(potential, x) * d).sum()),
-        lambda t: (potential.value(x + t * d) - potential.value(x - t * d)) / (2 * t),
+        lambda t: differences(potential, x, d, t)[0],
         largest,
     )
     check_slope_two(
         dense_hessian(potential, x) @ d.ravel(),
-        lambda t: (gradient_of(potential, x + t * d) - gradient_of(potential, x - t * d)).ravel() / (2 * t),
+        lambda t: differences(potential, x, d, t)[1].ravel(),
         largest,
     )
 
@@ -205,14 +195,14 @@ def test_the_barrier_of_planes_has_slope_two(seed, size):
     # Also by the two points of the plane, which tilt it.
     check_slope_two(
         float((gradient_of(barrier, x) * d).sum()),
-        lambda t: (barrier.value(x + t * d) - barrier.value(x - t * d)) / (2 * t),
+        lambda t: differences(barrier, x, d, t)[0],
         0.01 * GAP * size,
     )
     d[4:] = d[4]  # the Hessian knows planes that shift
     rows = slice(0, 12)  # and is asked for the forces on the body
     check_slope_two(
         (dense_hessian(barrier, x) @ d.ravel())[rows],
-        lambda t: (gradient_of(barrier, x + t * d) - gradient_of(barrier, x - t * d)).ravel()[rows] / (2 * t),
+        lambda t: differences(barrier, x, d, t)[1].ravel()[rows],
         0.01 * GAP * size,
     )
     body = dense_hessian(barrier, x, True)[:12, :12]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.scenes import converged
 
 import supple as sp
 
@@ -34,8 +35,7 @@ def block(friction=0.0, size=0.2, youngs=1e9):
 
 def slide(scene, time=TIME, dt=DT, **contact):
     """Frames, and how far the block has slid down at the end [m]."""
-    frames = list(sp.simulate(scene, sp.Implicit(contact=sp.IPCContact(**contact)), dt, round(time / dt)))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, sp.Implicit(contact=sp.IPCContact(**contact)), dt, round(time / dt)))
     body = scene.body("block")
     moved = (frames[-1].positions["block"] - body.place(body.mesh.vertices)).mean(axis=0)
     assert abs(moved @ NORMAL) < 1e-3
@@ -87,8 +87,7 @@ def test_friction_brakes_a_sliding_block(iterations):
     body = sp.Body("block", mesh, material, position=(0, 0.0501, 0), velocity=(1, 0, 0))
     scene = sp.Scene([body], obstacles=[sp.HalfSpace(friction=0.5)])
     solver = sp.Implicit(contact=sp.IPCContact(friction_iterations=iterations))
-    frames = list(sp.simulate(scene, solver, 0.01, 30))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, solver, 0.01, 30))
     way = frames[-1].positions["block"][:, 0].mean()
     assert way == pytest.approx(1.0 / (2 * 0.5 * GRAVITY), rel=0.06)
     # It stays where it stopped; and has never gained energy.

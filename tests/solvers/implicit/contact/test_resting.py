@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.scenes import converged
 
 import supple as sp
 
@@ -23,8 +24,7 @@ def block(**body):
 
 
 def settled(scene, dt=0.05, steps=30, **solver):
-    frames = list(sp.simulate(scene, sp.Implicit(**solver), dt, steps))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, sp.Implicit(**solver), dt, steps))
     assert all(frame.report.min_distance is None or frame.report.min_distance > 0.0 for frame in frames)
     return frames[-1]
 
@@ -56,8 +56,7 @@ def test_second_order_integrators_report_the_weight(integrator):
     material = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.02)
     body = sp.Body("cube", sp.shapes.box((0.2, 0.2, 0.2), (2, 2, 2)), material, position=(0, 0.1002, 0))
     scene = sp.Scene([body], obstacles=[sp.HalfSpace()])
-    frames = list(sp.simulate(scene, sp.Implicit(integrator=integrator), 0.01, 120))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, sp.Implicit(integrator=integrator), 0.01, 120))
     mean = np.mean([frame.report.details.contact_forces["cube"][1] for frame in frames[40:]])
     assert mean == pytest.approx(WEIGHT, rel=0.03)
 
@@ -70,8 +69,7 @@ def test_statics_presses_until_the_forces_balance():
     target = sp.SoftTarget("cube", top, stiffness=500.0, motion=lambda t: (0, -0.02 * t, 0))
     pin = sp.Pin("cube", top[:1])
     scene = sp.Scene([body], obstacles=[sp.HalfSpace()], soft_targets=[target], pins=[pin], gravity=(0, 0, 0))
-    frames = list(sp.simulate(scene, sp.Implicit(integrator="static"), 0.5, 2))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, sp.Implicit(integrator="static"), 0.5, 2))
     last = frames[-1]
     away = body.place(mesh.vertices)[top] + np.array([0, -0.02, 0]) - last.positions["cube"][top]
     pulled = 500.0 * away.sum(axis=0)

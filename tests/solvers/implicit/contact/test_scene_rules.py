@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from tests.scenes import converged
 
 import supple as sp
 
@@ -18,9 +19,7 @@ def cube(name="cube", size=0.2, divisions=1, youngs=2e4, **body):
 
 
 def run(scene, dt, steps, solver=None, **start):
-    frames = list(sp.simulate(scene, solver or sp.Implicit(), dt, steps, **start))
-    assert {frame.report.status for frame in frames} == {"converged"}
-    return frames
+    return converged(sp.simulate(scene, solver or sp.Implicit(), dt, steps, **start))
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.derivatives import gradient_of
 
 import supple as sp
 from supple.scene.stitches.elements import Pairs, Springs
@@ -91,12 +92,6 @@ def hessian_of(energy, x, project):
             if nodes[p] >= 0 and nodes[q] >= 0:
                 out[nodes[p], :, nodes[q], :] += block.reshape(4, 3, 4, 3)[p, :, q, :]
     return out.reshape(3 * len(x), -1)
-
-
-def gradient_of(energy, x):
-    out = np.zeros_like(x)
-    energy.add_gradient(x, out)
-    return out
 
 
 def assert_close(found, wanted):

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from tests.scenes import bar, hinge
 
 import supple as sp
-
-from .conftest import bar, hinge
 
 SOFT = sp.Body("soft", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
 

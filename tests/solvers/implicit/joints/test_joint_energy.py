@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.derivatives import differences, gradient_of, hessian_product
 
 import supple as sp
 from supple.model.joints.geometry import JointGeometry
@@ -47,26 +48,21 @@ JOINTS = {
 WHEEL = sp.Sphere(radius=0.1, center=(5, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 5]))
 
 
+# Control points of the two bodies.
+BODIES = np.arange(8).reshape(2, 4)
+
+
 @pytest.mark.parametrize("kind", JOINTS)
 def test_derivatives_are_those_of_the_energy(kind):
     """Taylor's remainders have the slopes 2 for gradient and Hessian alike."""
     energy, x = potential_of(JOINTS[kind], obstacles=[WHEEL] if kind == "obstacle" else ())
     along = 0.1 * np.random.default_rng(2).normal(size=x.shape)
-    gradient = np.zeros_like(x)
-    energy.add_gradient(x, gradient)
-    blocks = HessianBlocks.zeros(2, len(x))
-    energy.add_hessian(x, blocks, project=False)
-    product = np.zeros_like(x)
-    for coupling in blocks.couplings:
-        coupling.add_product(along, product)
+    gradient, product = gradient_of(energy, x), hessian_product(energy, BODIES, x, along)
     remainders, of_gradients = [], []
     for h in (1e-3, 5e-4, 2.5e-4):
-        ahead, behind = x + h * along, x - h * along
-        remainders.append(abs((energy.value(ahead) - energy.value(behind)) / (2 * h) - np.vdot(gradient, along)))
-        g = [np.zeros_like(x) for _ in range(2)]
-        energy.add_gradient(ahead, g[0])
-        energy.add_gradient(behind, g[1])
-        of_gradients.append(np.linalg.norm((g[0] - g[1]) / (2 * h) - product))
+        of_value, of_gradient = differences(energy, x, along, h)
+        remainders.append(abs(of_value - np.vdot(gradient, along)))
+        of_gradients.append(np.linalg.norm(of_gradient - product))
     # Quadratic energies have no remainder but round-off.
     size, scale = np.linalg.norm(gradient), np.linalg.norm(product)
     assert max(remainders) < 1e-6 * size or slope_of(remainders) == pytest.approx(2.0, abs=0.1)

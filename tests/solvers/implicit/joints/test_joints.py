@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
+from tests.scenes import G, bar, converged, gyroscope, hinge, rate_of_precession
 
 import supple as sp
 from supple.model.joints.geometry import JointGeometry
@@ -15,15 +16,11 @@ from supple.model.system import build_system, initial_state
 from supple.scene.rotation import rotation_matrix
 from supple.solvers.implicit.joints.joint_step import coordinates_at
 
-from .conftest import bar, hinge
-
-G = 9.81
 MASS = 2.5
 
 
 def run(scene, dt, steps, integrator="backward_euler", contact=None):
-    frames = list(sp.simulate(scene, sp.Implicit(integrator=integrator, contact=contact), dt, steps))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, sp.Implicit(integrator=integrator, contact=contact), dt, steps))
     assert max(max(one.violation for one in frame.report.joints.values()) for frame in frames) < 1e-6
     return frames
 
@@ -56,25 +53,9 @@ def test_a_double_pendulum_keeps_its_energy():
 
 
 def test_a_gyroscope_precesses():
-    """With a horizontal axis the steady precession is m g l / (I w), exactly."""
-    length, spin = 0.1, 50.0
-    disk = sp.shapes.box_surface((0.2, 0.02, 0.2), (1, 1, 1))
-    inertia = sp.RigidBody("disk", disk, density=2700.0).properties
-    rate = inertia.mass * G * length / (inertia.inertia[1, 1] * spin)
-    body = sp.RigidBody(
-        "disk",
-        disk,
-        density=2700.0,
-        position=(length, 0, 0),
-        rotation=(0, 0, -np.pi / 2),
-        velocity=(0, 0, -rate * length),
-        angular_velocity=(spin, rate, 0),
-    )
-    frames = run(sp.Scene([body], joints=[sp.BallJoint("disk", point=(0, 0, 0))]), 1e-3, 200, "bdf2")
-    centers = np.array([frame.poses["disk"].translation for frame in frames])
-    angles = np.unwrap(np.arctan2(-centers[:, 2], centers[:, 0]))
-    assert (angles[-1] - angles[0]) / 0.199 == pytest.approx(rate, rel=0.01)
-    assert np.abs(centers[:, 1]).max() < 1e-3
+    scene, rate = gyroscope()
+    frames = run(scene, 1e-3, 200, "bdf2")
+    assert rate_of_precession(frames, 1e-3, 1e-3) == pytest.approx(rate, rel=0.01)
 
 
 def chain(count, span):
@@ -228,8 +209,7 @@ def test_the_rate_of_a_joint_is_limited_and_the_check_finds_faster_ones(motor, t
     """The weight, a motor without a largest force, and what turns already at the start: all move with that rate."""
     scene = sp.Scene([bar(angular_velocity=(0, 0, -3.0))], joints=[hinge(max_velocity=0.5, motor=motor)])
     solver, path = sp.Implicit(contact=None), tmp_path / "r.vtkhdf"
-    frames = list(sp.simulate(scene, solver, 0.01, 30, sinks=[sp.Recorder(path, solver=solver)]))
-    assert {frame.report.status for frame in frames} == {"converged"}
+    frames = converged(sp.simulate(scene, solver, 0.01, 30, sinks=[sp.Recorder(path, solver=solver)]))
     angles = np.array([0.0, *(frame.report.joints["hinge"].coordinate for frame in frames)])
     way = 1.0 if isinstance(motor, sp.VelocityMotor | sp.ForceMotor) else -1.0
     np.testing.assert_allclose(np.diff(angles)[12:], way * 0.005, atol=1e-6)
@@ -284,8 +264,7 @@ def test_the_twist_of_a_ball_is_limited_and_the_check_finds_larger_ones(tmp_path
     for rate in (3.0, -3.0):
         path = tmp_path / f"{rate}.vtkhdf"
         scene = sp.Scene([bar(angular_velocity=(rate, 0, 0))], joints=[joint])
-        frames = list(sp.simulate(scene, solver, 0.01, 60, sinks=[sp.Recorder(path, solver=solver)]))
-        assert {frame.report.status for frame in frames} == {"converged"}
+        frames = converged(sp.simulate(scene, solver, 0.01, 60, sinks=[sp.Recorder(path, solver=solver)]))
         twists[rate] = np.array([twist_of(frame.poses["bar"].rotation) for frame in frames])
         assert frames[-1].report.joints["ball"].coordinate == pytest.approx(0.5, abs=1e-6)
         assert sp.check_recording(path)["joints"].verdict == "pass"
