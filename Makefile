@@ -14,10 +14,12 @@ endif
 # Bytecode is compiled now, also that of src, so that no later start has to (it is 1.3 s of one, and 0.4 s for src).
 install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
 
-.PHONY: demo test test-all fuzz soak bench blender lint format docs dist lock clean
+.PHONY: demo test test-all fuzz soak bench blender lint format docs kernels dist lock clean
 .DELETE_ON_ERROR:
 
+# Both demos compile for a minute, once: first, on all cores.
 demo: .venv/.base
+	$(BIN)/supple warm squash bears
 	$(BIN)/supple demo squash --overwrite --output out/squash
 	$(BIN)/supple demo bears --overwrite --output out/bears
 
@@ -63,9 +65,13 @@ blender: .venv/.base
 	BLENDER_USER_SCRIPTS=$(CURDIR)/out/blender SUPPLE_PYTHON=$(CURDIR)/$(BIN)/python blender --background \
 	  --factory-startup --python-exit-code 1 --python blender/test_headless.py -- dist/supple_blender.zip
 
+# The list of the kernels of standard scenes, and these kernels in build/kernels, compiled for most processors of this kind.
+kernels: .venv/.base
+	$(BIN)/python .ci/kernels.py
+
 # The wheel and the sdist in dist/, checked: their contents, their page on an index, and a demo from the wheel alone.
-dist: .venv/.base
-	$(BIN)/python -m uv build -q --clear --out-dir dist
+dist: kernels
+	SUPPLE_KERNELS=$(CURDIR)/build/kernels $(BIN)/python -m uv build -q --clear --out-dir dist
 	$(BIN)/python -m uv tool run "twine>=6.2,<8" check --strict dist/*
 	$(BIN)/python .ci/check_dist.py dist
 

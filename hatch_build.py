@@ -9,8 +9,10 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import sysconfig
 from pathlib import Path
 
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 
@@ -31,6 +33,24 @@ class RepositoryMetadata(MetadataHookInterface):
             }
         text = off_site((root / "README.md").read_text(encoding="utf-8"), address)
         metadata["readme"] = {"content-type": "text/markdown", "text": text}
+
+
+class CompiledKernels(BuildHookInterface):
+    """Packs the folder of compiled kernels that the variable SUPPLE_KERNELS names, in a wheel for this platform.
+
+    Other versions of Python can use the wheel; they compile the kernels.
+    """
+
+    PLUGIN_NAME = "custom"
+
+    def initialize(self, version: str, build_data: dict) -> None:
+        folder = os.environ.get("SUPPLE_KERNELS", "")
+        if not folder or self.target_name != "wheel":
+            return
+        # The kernels need the C library only as Numba itself does; 2.17 is the oldest that an index has a name for.
+        system = re.sub(r"^linux_", "manylinux_2_17_", re.sub(r"[-.]", "_", sysconfig.get_platform()))
+        build_data["force_include"][folder] = "supple/runtime/kernels"
+        build_data["pure_python"], build_data["tag"] = False, f"py3-none-{system}"
 
 
 def repository(root: Path) -> str:

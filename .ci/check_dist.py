@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -23,6 +24,7 @@ def check_contents(wheel: Path, sdist: Path) -> None:
     assert sources <= names, f"the wheel lacks {sorted(sources - names)[:5]}"
     strange = {name.partition("/")[0] for name in names} - {"supple"}
     assert all(name.endswith(".dist-info") for name in strange), f"the wheel contains {strange}"
+    assert "supple/runtime/kernels/target.json" in names, "the wheel has no compiled kernels"
     assert any(name.endswith("/licenses/LICENSE") for name in names), "the wheel has no licence"
     assert "Typing :: Typed" in metadata
     page = metadata.partition("\n\n")[2]
@@ -50,10 +52,35 @@ def run_from(wheel: Path) -> None:
         subprocess.run([*uv, "pip", "install", "-q", "--python", python, "--no-deps", wheel], check=True, env=clean)
         code = "import supple, sys; print(supple.__file__); sys.exit('bare' not in supple.__file__)"
         subprocess.run([python, "-c", code], check=True, env=clean, cwd=folder)
+        compare_kernels(python, folder, clean)
         demo = ["-m", "supple", "demo", "squash", "--output", "squash"]  # fails where a claim does not hold
         subprocess.run([python, *demo], check=True, env=clean, cwd=folder)
         check = ["-m", "supple", "check", "squash/recording.vtkhdf", "--every", "20"]
         subprocess.run([python, *check], check=True, env=clean, cwd=folder)
+
+
+def compare_kernels(python: Path, folder: Path, environment: dict[str, str]) -> None:
+    """README's snippet compiles nothing, and gives the same bits as with kernels that are compiled here."""
+    snippet = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S | re.M)[0]
+    (folder / "snippet.py").write_text(f"{snippet}\nprint(frame.positions['ball'].tobytes().hex())\n", encoding="utf-8")
+
+    def run(cache: str, **more: str) -> str:
+        chosen = {**environment, "NUMBA_CACHE_DIR": str(folder / cache), **more}
+        command = [python, "snippet.py"]
+        return subprocess.run(command, check=True, env=chosen, cwd=folder, capture_output=True, text=True).stdout
+
+    packed = run("unused")
+    entries = list((folder / "unused").rglob("*.kernel"))
+    assert not entries, f"README's snippet compiled {len(entries)} kernels"
+    (kernels,) = python.parents[1].rglob("supple/runtime/kernels")
+    _, processor, features = json.loads((kernels / "target.json").read_text(encoding="utf-8"))
+    kernels.rename(kernels.with_name("hidden"))
+    compiled = run("compiled", NUMBA_CPU_NAME=processor, NUMBA_CPU_FEATURES=features)
+    kernels.with_name("hidden").rename(kernels)
+    count = len(list((folder / "compiled").rglob("*.kernel")))
+    assert count > 20
+    assert packed == compiled, "kernels of the wheel give other bits than those that are compiled here"
+    print(f"{count} kernels of README's snippet come from the wheel, with the same bits as kernels compiled here")
 
 
 def main(folder: Path) -> None:

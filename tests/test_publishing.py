@@ -20,15 +20,30 @@ def hook(monkeypatch):
     """hatch_build.py, without the package that only builds have."""
     interface = types.ModuleType("hatchling.metadata.plugin.interface")
     interface.MetadataHookInterface = object  # pyright: ignore[reportAttributeAccessIssue]
-    for name in ("hatchling", "hatchling.metadata", "hatchling.metadata.plugin"):
-        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
-    monkeypatch.setitem(sys.modules, interface.__name__, interface)
-    for name in ("SUPPLE_REPOSITORY", "GITHUB_SERVER_URL", "GITHUB_REPOSITORY"):
+    hooks = types.ModuleType("hatchling.builders.hooks.plugin.interface")
+    hooks.BuildHookInterface = object  # pyright: ignore[reportAttributeAccessIssue]
+    for module in (interface, hooks):
+        for parent in module.__name__.split(".")[:-1]:
+            monkeypatch.setitem(sys.modules, parent, types.ModuleType(parent))
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    for name in ("SUPPLE_REPOSITORY", "GITHUB_SERVER_URL", "GITHUB_REPOSITORY", "SUPPLE_KERNELS"):
         monkeypatch.delenv(name, raising=False)
     spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def test_a_wheel_with_kernels_names_its_platform(hook, monkeypatch):
+    builder, data = hook.CompiledKernels(), {"force_include": {}}
+    builder.target_name = "wheel"
+    builder.initialize("standard", data)
+    assert data == {"force_include": {}}, "a build without kernels is for every platform"
+    monkeypatch.setenv("SUPPLE_KERNELS", "build/kernels")
+    monkeypatch.setattr(hook.sysconfig, "get_platform", lambda: "linux-x86_64")
+    builder.initialize("standard", data)
+    assert data["force_include"] == {"build/kernels": "supple/runtime/kernels"}
+    assert data["tag"] == "py3-none-manylinux_2_17_x86_64"
 
 
 def built(hook, root=ROOT):

@@ -12,13 +12,14 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from llvmlite.binding import get_process_triple
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
 import supple
 from supple.runtime import kernel_folder
 from supple.runtime.kernel_cache import KernelCache, njit
-from supple.runtime.kernel_folder import read, write
+from supple.runtime.kernel_folder import TARGET, note_use, read, write
 from supple.runtime.parallel_kernel import ParallelKernel
 from supple.runtime.reached_code import reached_code
 
@@ -176,7 +177,7 @@ def test_the_entries_that_were_not_used_for_longest_go(tmp_path, monkeypatch):
     for k in range(4):
         write(tmp_path / f"{k}.kernel", bytes(96))
         os.utime(tmp_path / f"{k}.kernel", (1e9 + k, 1e9 + k))
-    read(tmp_path / "0.kernel")  # a use
+    note_use(tmp_path / "0.kernel")
     kernel_folder._remove_unused.cache_clear()
     write(tmp_path / "new.kernel", bytes(96))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0.kernel", "3.kernel", "new.kernel"]
@@ -257,3 +258,22 @@ def test_a_function_that_kernels_call_can_be_called_from_python_too():
     assert doubled_twice(1.5) == 6.0
     assert doubled(1.5) == 3.0
     assert doubled(np.ones(2)).tolist() == [2.0, 2.0]
+
+
+def test_kernels_of_a_wheel_are_used_where_the_processor_has_their_features(clone, tmp_path):
+    """A kernel compiled for another processor is found, and nothing is written; not where a feature is missing."""
+    copied, run = clone
+    package = copied("a")
+    prelude = "import os; os.environ.update(NUMBA_CPU_NAME='generic', NUMBA_CPU_FEATURES='')\n"
+    assert run(package, prelude + RUN_KERNEL).endswith(" 0")
+    (entry,) = entries(tmp_path)
+    shipped = package / "runtime" / "kernels"
+    shipped.mkdir()
+    entry.rename(shipped / entry.name)
+    target = [get_process_triple(), "generic", ""]
+    (shipped / TARGET).write_text(json.dumps(target), encoding="utf-8")
+    assert run(package) == "[3.0, 2.0, 1.0] 1"
+    assert not entries(tmp_path)
+    (shipped / TARGET).write_text(json.dumps([*target[:2], "+no_processor_has_it"]), encoding="utf-8")
+    assert run(package) == "[3.0, 2.0, 1.0] 0"
+    assert len(entries(tmp_path)) == 1

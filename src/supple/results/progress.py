@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import cache
 from typing import TYPE_CHECKING
 
 from supple.results.frame import Frame
@@ -13,8 +14,16 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 _PERIOD = 0.2  # between two lines in a notebook [s]
-_STARTING = "starting (the first run of a solver compiles it)"
+_STARTING = "starting"
 _SMOOTHING = 0.2  # weight of the newest frame in the displayed milliseconds
+
+
+@cache
+def error_console() -> Console:
+    """The console on standard error. There is one: displays that change, as bars, know of each other by it."""
+    from rich.console import Console
+
+    return Console(stderr=True)
 
 
 class ProgressBar:
@@ -36,11 +45,10 @@ class ProgressBar:
         self._displayed_ms = self._next_line = 0.0
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
         if self._console is None:
-            self._console = Console(stderr=True)
+            self._console = error_console()
         self._start, self._steps, self._status = time.perf_counter(), steps, _STARTING
         self._seconds.clear()
         if self._console.is_terminal:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from supple.runtime import kernel_folder
 from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly
+from supple.runtime.kernel_count import WATCHERS
 from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
 from supple.runtime.reached_code import reached_code
@@ -47,7 +48,9 @@ _COMPILER = (
     [getattr(config, name, None) for name in _SETTINGS],
 )
 
-__all__ = ["KernelCache", "njit", "prange", "read_only"]
+KERNELS: dict[str, Dispatcher] = {}  # all kernels that are kept on disk, by name
+
+__all__ = ["KERNELS", "KernelCache", "njit", "prange", "read_only"]
 
 
 def njit(
@@ -96,7 +99,8 @@ def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> A
         return compiled
     compare_quickly(compiled)
     if cache:
-        compiled._cache = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
+        compiled._cache = kept = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
+        KERNELS[kept.name] = compiled
         return compiled
     return InnerFunction(function, {}, compiled.targetoptions)
 
@@ -145,38 +149,58 @@ class KernelCache(_Cache):
     def flush(self) -> None:
         """Nothing is out of date: an entry is named by all that it depends on."""
 
+    @property
+    def name(self) -> str:
+        return f"{self._function.__module__}:{self._function.__qualname__}"
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
-        path = self._path(sig, target_context.codegen())
-        found = _loaded(path, target_context)
+        found = None
+        if kernel_folder.shipped_target() is not None:
+            shipped = self._entry(sig, kernel_folder.shipped_target())
+            found = _rebuilt(kernel_folder.read(kernel_folder.SHIPPED / shipped), target_context)
+        path = kernel_folder.kernel_folder() / self._entry(sig, target_context.codegen().magic_tuple())
+        if found is None:
+            found = self._own(path, target_context)
+        self._tell("compiling" if found is None else "loaded", sig)
+        return found
+
+    def _own(self, path: Path, target_context: Any) -> Any:
+        """The kernel from the user's folder; None where it must be compiled here, and is locked for that."""
+        found = _rebuilt(kernel_folder.read(path), target_context)
         if found is None and path not in self._locks:
             lock, waited = kernel_folder.lock(path)
             if lock is not None:
                 self._locks[path] = lock
-            found = _loaded(path, target_context) if waited else None
+            found = _rebuilt(kernel_folder.read(path), target_context) if waited else None
             if found is not None:
                 self._unlock(path)
+        if found is not None:
+            kernel_folder.note_use(path)
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        path = self._path(sig, data.codegen)
+        path = kernel_folder.kernel_folder() / self._entry(sig, data.codegen.magic_tuple())
         # A kernel that is not kept is compiled again next time: a full disk is no reason to end a run.
         with suppress(OSError):
             if not data.library.has_dynamic_globals:  # addresses of this process
                 kernel_folder.write(path, dumps(data._reduce()))
         self._unlock(path)
+        self._tell("compiled", sig)
+
+    def _tell(self, stage: str, sig: Any) -> None:
+        for watcher in WATCHERS:
+            watcher(stage, self.name, sig)
 
     def _unlock(self, path: Path) -> None:
         lock = self._locks.pop(path, None)
         if lock is not None:
             lock.release()
 
-    def _path(self, sig: Any, codegen: Any) -> Path:
-        # An entry refers to the module of its kernel, and its symbols to the name.
-        function = self._function
-        name = f"{function.__module__}.{function.__qualname__}"
-        text = repr((_COMPILER, codegen.magic_tuple(), name, str(sig), self._code))
-        return kernel_folder.kernel_folder() / f"{hashlib.sha256(text.encode()).hexdigest()[:40]}.kernel"
+    def _entry(self, sig: Any, target: Any) -> str:
+        """The name of a file. An entry refers to the module of its kernel, and its symbols to the name."""
+        text = repr((_COMPILER, tuple(target), self.name, str(sig), self._code))
+        return f"{hashlib.sha256(text.encode()).hexdigest()[:40]}.kernel"
 
     @cached_property
     def _code(self) -> bytes:
@@ -184,8 +208,7 @@ class KernelCache(_Cache):
         return reached_code(self._function)
 
 
-def _loaded(path: Path, target_context: Any) -> Any:
-    content = kernel_folder.read(path)
+def _rebuilt(content: bytes | None, target_context: Any) -> Any:
     if content is None:
         return None
     try:

@@ -1,7 +1,12 @@
-"""The folder of a user's compiled kernels: one file per kernel, named by a digest of what it was compiled from."""
+"""The folder of a user's compiled kernels: one file per kernel, named by a digest of what it was compiled from.
+
+A wheel may contain such a folder, which is only read: its kernels are compiled for a level of instructions that many
+processors have.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import zlib
 from contextlib import suppress
@@ -9,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from time import monotonic, sleep, time
 
+from llvmlite.binding import get_host_cpu_features
 from numba.core import config
 from numba.misc.appdirs import AppDirs
 
@@ -27,17 +33,45 @@ def kernel_folder() -> Path:
     return Path(chosen, "supple") if chosen else Path(AppDirs("supple", appauthor=False).user_cache_dir, "kernels")
 
 
+# Of a wheel; `TARGET` holds the triple, the processor and the features that its kernels were compiled for.
+SHIPPED = Path(__file__).with_name("kernels")
+TARGET = "target.json"
+
+
+@cache
+def shipped_target() -> tuple[str, str, str] | None:
+    """What the kernels of the wheel were compiled for; None where there are none, or this processor lacks a feature.
+
+    Where `NUMBA_CPU_NAME` is set, kernels for that processor are wanted.
+    """
+    try:
+        triple, processor, features = json.loads((SHIPPED / TARGET).read_text(encoding="utf-8"))
+    except OSError:
+        return None
+    here = get_host_cpu_features()
+    needed = [feature[1:] for feature in features.split(",") if feature.startswith("+")]
+    chosen: str | None = config.CPU_NAME  # pyright: ignore[reportAttributeAccessIssue]
+    if chosen not in (None, processor) or not all(here.get(feature) for feature in needed):
+        return None
+    return triple, processor, features
+
+
 def read(path: Path) -> bytes | None:
     """The content of an entry; None where there is none, or it is damaged."""
     try:
         content = path.read_bytes()
         if zlib.crc32(content[4:]).to_bytes(4, "little") != content[:4]:
             return None
-        if path.stat().st_mtime < time() - _DAY:
-            os.utime(path)
     except OSError:
         return None
     return content[4:]
+
+
+def note_use(path: Path) -> None:
+    """Let an entry count as used now."""
+    with suppress(OSError):
+        if path.stat().st_mtime < time() - _DAY:
+            os.utime(path)
 
 
 def write(path: Path, content: bytes) -> None:

@@ -18,6 +18,7 @@ from supple.app.cli.exit_codes import ExitCode
 from supple.app.cli.interrupts import ended_as_by_ctrl_c
 from supple.app.cli.print_error import print_error
 from supple.errors import SuppleError
+from supple.results.compile_bar import CompileBar
 
 app = App(
     name="supple",
@@ -49,6 +50,7 @@ COMMANDS = {
     "table": "supple.app.cli.commands.table:table",
     "schema": "supple.app.cli.commands.schema:schema",
     "info": "supple.app.cli.commands.info:info",
+    "warm": "supple.app.cli.commands.warm:warm",
 }
 for _order, (_name, _path) in enumerate(COMMANDS.items()):
     app.command(_path, name=_name, sort_key=_order)
@@ -71,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in COMMANDS:
             _ = app[name]  # imports it, so that the list of commands shows their descriptions
     try:
-        with ended_as_by_ctrl_c():
+        with ended_as_by_ctrl_c(), CompileBar():
             code = app(given)
         _flush(sys.stdout)
     except SuppleError as error:

@@ -72,12 +72,12 @@ class Products:
                 )
 
     def waiting(self) -> AbstractContextManager[object]:
-        """Shows in a terminal that the solver prepares the scene; the first run of a solver compiles it."""
+        """Shows in a terminal that the solver prepares the scene."""
         if self.quiet:
             return nullcontext()
-        from rich.console import Console
+        from supple.results.progress import error_console
 
-        return Console(stderr=True).status("preparing (the first run of a solver compiles it)")
+        return error_console().status("preparing")
 
     def progress(self) -> list[ProgressBar]:
         """The sink that shows the progress; none where nothing is printed."""

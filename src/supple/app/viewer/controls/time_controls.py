@@ -69,7 +69,9 @@ class TimeControls:
 
     def wait(self, progress: Progress) -> None:
         """Display that the simulation is within a long step."""
-        what = "compiling kernels, once on this machine" if progress.compiling else "a long step"
+        what = "a long step"
+        if progress.kernels is not None:
+            what = "compiling kernel {} of {}, once on this machine".format(*progress.kernels)
         rounds = (
             f", {_ROUNDS[self._controller.snapshot.description.solver]} {progress.rounds}" if progress.rounds else ""
         )

@@ -36,10 +36,13 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
     from supple.app.viewer.engine.scene.live_scene import LiveScene
     from supple.app.viewer.engine.simulation_loop import SimulationLoop
     from supple.app.viewer.protocol.outbox import ERROR, Outbox, packed
+    from supple.results.compile_bar import CompileBar
 
     try:
         live = LiveScene(source)
-        live.warm_up()
+        with CompileBar() as kernels:
+            live.warm_up()
+            kernels.compile_rest()  # the first contact, too, does not wait for it
         # Otherwise a collection looks at the objects of all loaded libraries, for a tenth of a second or more.
         gc.freeze()
     except (SuppleError, MemoryError) as error:

@@ -10,6 +10,7 @@ from supple.app.viewer.engine.compile_clock import CompileClock
 from supple.app.viewer.protocol.snapshots import Progress
 from supple.errors import SolverError
 from supple.runtime.interruption import interruptible
+from supple.runtime.kernel_count import KernelCount
 
 
 class StepWatch:
@@ -29,7 +30,7 @@ class StepWatch:
     ) -> None:
         self.longest, self.longest_awaited = longest, longest_awaited
         self._is_awaited = is_awaited
-        self._compiled = CompileClock()
+        self._compiled, self._kernels = CompileClock(), KernelCount()
         self._began: float | None = None
         self._rounds = 0
 
@@ -56,7 +57,8 @@ class StepWatch:
     def progress(self) -> Progress | None:
         """Of the present computation; None where there is none. Another thread may ask."""
         running = self._began is not None
-        return Progress(self.seconds, self._rounds, self._compiled.running) if running else None
+        kernels = self._kernels.numbers() if self._kernels.compiling else None
+        return Progress(self.seconds, self._rounds, kernels) if running else None
 
     @property
     def seconds(self) -> float:

@@ -154,12 +154,12 @@ class Progress:
     Attributes
     ----------
     seconds : since it began; rounds : substeps or Newton iterations so far
-    compiling : whether kernels are compiled now
+    kernels : where kernels are compiled now, the number of the present one, and how many there will be
     """
 
     seconds: float
     rounds: int = 0
-    compiling: bool = False
+    kernels: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)

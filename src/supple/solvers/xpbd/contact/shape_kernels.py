@@ -14,7 +14,6 @@ from typing import Any
 
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.runtime.reached_code import reached_code
 from supple.solvers.xpbd.contact.friction import along_surface, friction_total
 from supple.solvers.xpbd.contact.movers import place, place_before, push_body, softness
 from supple.solvers.xpbd.contact.response_rates import kept_share
@@ -181,13 +180,13 @@ def _project_shapes(
 def kernels_of(function: Callable[..., Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """`_find_candidates` and `_project_shapes` with `contact` replaced by a shape's element function, compiled.
 
-    Numba names symbols of machine code by the kernel's name, so that it contains a digest of the code.
+    Numba names symbols of machine code by the kernel's name, so that it contains that of the function.
     """
     compiled = []
     for kernel in (_find_candidates, _project_shapes):
         names = {**kernel.__globals__, "contact": function}
         copy = FunctionType(kernel.__code__, names, kernel.__name__, kernel.__defaults__)
-        copy.__qualname__ = f"{kernel.__qualname__}_{reached_code(copy).hex()[:14]}"
+        copy.__qualname__ = f"{kernel.__qualname__}_{function.__module__}.{function.__qualname__}"
         copy.__module__ = kernel.__module__
         compiled.append(njit(cache=True)(copy))
     return compiled[0], compiled[1]

@@ -75,8 +75,8 @@ def test_the_progress_of_a_long_step(live, fake, until, monkeypatch):
     fake.show(time=1.25)
     fake.progress = Progress(7.2, 31)
     until(lambda: part("busy").endswith("Busy for 7 s: a long step, substep 31</div>"))
-    fake.progress = Progress(8.0, 0, compiling=True)
-    until(lambda: "compiling kernels" in part("busy"))
+    fake.progress = Progress(8.0, 0, kernels=(12, 68))
+    until(lambda: "compiling kernel 12 of 68" in part("busy"))
     until(lambda: "t = 1.25 s" in live.panel.time._message.content)
     fake.progress = None
     until(lambda: part("busy") == "")
