@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from supple.runtime import kernel_folder
 from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly
-from supple.runtime.kernel_count import WATCHERS
+from supple.runtime.kernel_watchers import WATCHERS
 from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
 from supple.runtime.reached_code import reached_code

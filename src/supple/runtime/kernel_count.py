@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-# Called with "loaded", "compiling" or "compiled", and with the name and the signature of the kernel.
-WATCHERS: list[Callable[[str, str, Any], None]] = []
+from supple.runtime.kernel_watchers import WATCHERS
 
 
 class KernelCount:
