@@ -80,9 +80,9 @@ def _type_as_json(one: Any) -> Any:
     if isinstance(one, types.Array) and one.aligned:
         return [_ARRAY, _type_as_json(one.dtype), one.ndim, one.layout, one.mutable]
     if isinstance(one, types.BaseNamedTuple):
-        of: Any = one.instance_class
-        parts: Any = one.types  # pyright: ignore[reportAttributeAccessIssue]
-        return [_NAMED, f"{of.__module__}:{of.__qualname__}", [_type_as_json(part) for part in parts]]
+        named: Any = one  # Numba's stubs do not know its attributes
+        of = named.instance_class
+        return [_NAMED, f"{of.__module__}:{of.__qualname__}", [_type_as_json(part) for part in named.types]]
     if isinstance(one, (types.UniTuple, types.Tuple)):
         return [_TUPLE, [_type_as_json(part) for part in one.types]]
     if isinstance(one, types.Omitted) and isinstance(one.value, (int, float, str, type(None))):
@@ -94,7 +94,7 @@ def _type_as_json(one: Any) -> Any:
     raise ValueError(f"{one} cannot be listed")
 
 
-def _type_from_json(one: Any) -> types.Type:
+def _type_from_json(one: Any) -> Any:
     if isinstance(one, str):
         return getattr(types, one)
     kind, *values = one
