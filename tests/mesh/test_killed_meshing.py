@@ -54,7 +54,8 @@ def test_the_mesher_ends_with_its_program(number, tmp_path):
     assert until(lambda: not is_running(mesher))
     assert not (tmp_path / "ball.vtu").exists()
     if number == signal.SIGTERM:
-        assert (parent.returncode, output) == (130, b"supple: interrupted\n")
+        assert parent.returncode == 130
+        assert output.endswith(b"supple: interrupted\n")
         assert list(scratch.iterdir()) == []
 
 

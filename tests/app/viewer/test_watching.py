@@ -55,7 +55,7 @@ def test_the_progress_of_a_step():
         for _ in range(3):
             interruption_point()
         progress = watch.progress
-        assert (progress.rounds, progress.compiling) == (3, False)
+        assert (progress.rounds, progress.kernels) == (3, None)
         assert 0.0 <= progress.seconds < 5.0
     assert watch.progress is None
 

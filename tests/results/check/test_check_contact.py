@@ -105,6 +105,9 @@ def test_vertices_that_may_touch_a_triangle_are_left_out(free, corrupted):
             stitches = file.create_group("supple/stitches")
             stitches["nodes"], stitches["weights"] = np.array([[vertex, *triangles[facing[0]]]]), np.full((1, 3), 1 / 3)
             stitches["anchors"], stitches["anchor_owners"] = np.zeros((0, 3)), np.zeros(0, dtype=int)
+            stitches["rigid_control"], stitches["rigid_weights"] = np.zeros((0, 4), dtype=int), np.zeros((0, 4))
+            stitches["moduli"], stitches["rest_shape_inverse"] = np.zeros((0, 2)), np.zeros((0, 3, 3))
+            stitches["springs"] = np.ones((1, 2))
 
     assert failures(corrupted(free, lambda file, n: touch(file, n, False)), only=["intersection"]) == {
         "intersection": 2

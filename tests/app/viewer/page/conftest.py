@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import threading
 import time
 from dataclasses import replace
@@ -325,7 +326,9 @@ class Screen:
 
     def press(self, name: str) -> None:
         """Click a button where it has come to rest: on a busy machine, a folder that opens moves it under the mouse."""
-        button = self.tab.get_by_role("button", name=name, exact=True)
+        named = self.tab.get_by_role("button", name=name, exact=True)
+        # A label above the picture that presses a button gives it a name of its own.
+        button = named.or_(self.tab.locator("button", has_text=re.compile(f"^{re.escape(name)}$"))).first
         button.scroll_into_view_if_needed()
         places = [button.bounding_box()]
         while len(places) < 4 or places[-1] != places[-4]:
