@@ -5,6 +5,7 @@ import json
 import h5py
 import numpy as np
 import pytest
+from tests.recordings import replace_array, set_in_scene
 
 import supple as sp
 from supple.results.drawing import pictures, view_of
@@ -117,10 +118,7 @@ def test_a_soft_body_that_calls_itself_rigid_is_an_error(recorded, tmp_path):
     copy = tmp_path / "wrong.vtkhdf"
     copy.write_bytes(recorded[0].read_bytes())
     with h5py.File(copy, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        header["bodies"][0]["rigid"] = True
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        set_in_scene(file, "bodies/0/rigid", True)
     with pytest.raises(sp.OutputError, match="rigid body 'soft' does not have four vertices and a surface"):
         sp.read_recording(copy)
 
@@ -266,11 +264,11 @@ def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, wher
     ("number", "key", "value", "where"),
     [
         (2, "max_force", 1e-3, "slider, its motor exceeds its largest effort"),
-        (2, "limits", [-0.1, 0.01], "slider"),
+        (2, "limits", (-0.1, 0.01), "slider"),
         (2, "max_velocity", 1e-3, "slider, its rate"),
-        (2, "axis", [1.0, 1.0, 0.1], "slider"),
-        (0, "axis", [0.0, 0.1, 1.0], "hinge"),
-        (1, "limits", [0.0, 0.01], "ball"),
+        (2, "axis", np.array([1.0, 1.0, 0.1]), "slider"),
+        (0, "axis", np.array([0.0, 0.1, 1.0]), "hinge"),
+        (1, "limits", (0.0, 0.01), "ball"),
     ],
 )
 def test_joints_beyond_their_limits_and_efforts_are_found(jointed, tmp_path, number, key, value, where):
@@ -286,16 +284,25 @@ def with_joint(recording, folder, number, key, value):
     copy = folder / "changed.vtkhdf"
     copy.write_bytes(recording.read_bytes())
     with h5py.File(copy, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        header["physics"]["joints"][number][key] = value
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        if isinstance(value, np.ndarray):
+            replace_array(file, f"joints/{number}/{key}", value)
+        else:
+            set_in_scene(file, f"joints/{number}/{key}", value)
     return copy
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("sides", [9, None]), ("kind", "spring"), ("limits", 3), ("axis", [0, 0, 0]), ("point", ["x"])]
+    ("key", "value", "message"),
+    [
+        ("sides", (9, None), "joint 'hinge' is not between rigid bodies of the scene"),
+        ("sides", (0, 1, 2), "joints/0/sides is not the tuple"),
+        ("kind", "spring", "of an unknown kind"),
+        ("limits", 3, "joints/0/limits is not the tuple"),
+        ("axis", np.zeros(3), "joint 'hinge'"),
+        ("axis", np.array([0.0, np.nan, 1.0]), "joints/0/axis is not finite"),
+        ("point", np.zeros(2), r"joints/0/point has shape \(2,\), not \(3,\)"),
+    ],
 )
-def test_joints_that_make_no_sense_are_an_error(jointed, tmp_path, key, value):
-    with pytest.raises(sp.OutputError, match="its joints are not described as they should be"):
+def test_joints_that_make_no_sense_are_an_error(jointed, tmp_path, key, value, message):
+    with pytest.raises(sp.OutputError, match=message):
         sp.read_recording(with_joint(jointed, tmp_path, 0, key, value))

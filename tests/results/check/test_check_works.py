@@ -9,7 +9,7 @@ import supple as sp
 from supple.results.check.checks.works import Works
 from supple.results.check.load_forces import load_forces
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.recording.actions.loads import RecordedLoad
+from supple.results.recording.scene import RecordedLoad
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.4, damping=0.02)
 

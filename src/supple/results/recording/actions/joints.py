@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.results.recording.checked_hdf5 import CheckedFile
+from supple.results.checkpoint.typed import Rows
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.ball_joint import BallJoint
 from supple.scene.rigid.rigid_body import RigidBody
@@ -37,28 +38,24 @@ class RecordedJoint:
     name: str
     kind: str
     sides: tuple[int, int | None]
-    placed: NDArray[np.float64]
-    point: NDArray[np.float64]
-    axis: NDArray[np.float64]
+    placed: Annotated[NDArray[np.float64], Rows(2, 3, 4, finite=True)]
+    point: Annotated[NDArray[np.float64], Rows(3, finite=True)]
+    axis: Annotated[NDArray[np.float64], Rows(3, finite=True)]
     limits: tuple[float, float]
     max_force: float
     max_velocity: float
     twist_limits: tuple[float, float]
 
-    def described(self) -> dict[str, Any]:
-        """As the header has it."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "sides": list(self.sides),
-            "placed": self.placed.tolist(),
-            "point": self.point.tolist(),
-            "axis": self.axis.tolist(),
-            "limits": [end if np.isfinite(end) else None for end in self.limits],
-            "twist_limits": [end if np.isfinite(end) else None for end in self.twist_limits],
-            "max_force": self.max_force if np.isfinite(self.max_force) else None,
-            "max_velocity": self.max_velocity if np.isfinite(self.max_velocity) else None,
-        }
+    def check(self, jointed: Sequence[bool], bodies: int) -> None:
+        """Raise `ValueError` where it joins what does not exist or is soft, or a number of it is not finite.
+
+        `jointed` tells of bodies, then obstacles, whether a joint may hold them.
+        """
+        first, second = self.sides
+        ends = [first] if second is None else [first, second]
+        there = first < bodies and all(0 <= end < len(jointed) and jointed[end] for end in ends)
+        if self.kind not in KINDS or not self.axis.any() or not there:
+            raise ValueError(f"joint {self.name!r} is not between rigid bodies of the scene, or of an unknown kind")
 
 
 def joints_of(system: System) -> tuple[RecordedJoint, ...]:
@@ -98,41 +95,4 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
                 (joint.twist_limits if isinstance(joint, BallJoint) else None) or (-np.inf, np.inf),
             )
         )
-    return tuple(joints)
-
-
-def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoint, ...]:
-    """The joints of a recording.
-
-    Raises
-    ------
-    OutputError : where one is not described as it should be, or joins what does not exist or is soft.
-    """
-    jointed = [body.get("rigid") is True for body in header["bodies"]] + [True] * len(header["obstacles"])
-    joints = []
-    try:
-        for given in header["physics"]["joints"]:
-            first, second = int(given["sides"][0]), given["sides"][1]
-            low, high = given["limits"]
-            least, most = given["twist_limits"]
-            joint = RecordedJoint(
-                name=str(given["name"]),
-                kind=str(given["kind"]),
-                sides=(first, None if second is None else int(second)),
-                placed=np.array(given["placed"], dtype=np.float64).reshape(2, 3, 4),
-                point=np.array(given["point"], dtype=np.float64).reshape(3),
-                axis=np.array(given["axis"], dtype=np.float64).reshape(3),
-                limits=(-np.inf if low is None else float(low), np.inf if high is None else float(high)),
-                max_force=np.inf if given["max_force"] is None else float(given["max_force"]),
-                max_velocity=np.inf if given["max_velocity"] is None else float(given["max_velocity"]),
-                twist_limits=(-np.inf if least is None else float(least), np.inf if most is None else float(most)),
-            )
-            joints.append(joint)
-            numbers = np.concatenate([joint.placed.ravel(), joint.point, joint.axis])
-            ends = [first] if second is None else [first, int(second)]
-            there = first < len(header["bodies"]) and min(ends) >= 0 and all(jointed[end] for end in ends)
-            if joint.kind not in KINDS or not np.isfinite(numbers).all() or not joint.axis.any() or not there:
-                raise ValueError
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
-        raise file.broken("its joints are not described as they should be") from None
     return tuple(joints)
