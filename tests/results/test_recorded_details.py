@@ -30,7 +30,7 @@ def touching_scene() -> sp.Scene:
         ],
         obstacles=[
             sp.HalfSpace(friction=0.5),
-            sp.Box(name="table", center=(0.2, 0.05, 0.0), size=(0.2, 0.1, 0.2), friction=0.3),
+            sp.obstacles.Box(name="table", center=(0.2, 0.05, 0.0), size=(0.2, 0.1, 0.2), friction=0.3),
         ],
         pins=[sp.Pin("held", [0, 1], name="nail"), sp.Pin("held", [2])],
     )

@@ -207,7 +207,9 @@ def jointed_scene():
     bar = sp.shapes.box_surface((0.2, 0.02, 0.02), (1, 1, 1))
     places = {"a": (0.1, 0, 0), "b": (0.3, 0, 0), "c": (0, 0.5, 0), "d": (0.6, 0.5, 0)}
     bodies = [sp.RigidBody(name, bar, density=1000.0, position=place) for name, place in places.items()]
-    wheel = sp.Sphere(radius=0.1, center=(0.7, 0.8, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0]))
+    wheel = sp.obstacles.Sphere(
+        radius=0.1, center=(0.7, 0.8, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0])
+    )
     motor = sp.PositionMotor(0.05, stiffness=50.0, damping=5.0, max_force=2.0)
     joints = [
         sp.HingeJoint("a", point=(0, 0, 0), limits=(-0.3, 8.0), name="hinge"),
@@ -254,7 +256,7 @@ def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, wher
     with h5py.File(copy, "r+") as file:
         rows = slice(4 * "abcd".index(body), 4 * "abcd".index(body) + 4)
         file[POINTS][rows] = change(file[POINTS][rows])
-    found = sp.check_recording(copy, sp.CheckSettings(only=["joints"]))["joints"]
+    found = sp.check_recording(copy, only=["joints"])["joints"]
     assert (found.failed_frames, found.first_failure) == (1, 0)
     assert found.where.startswith(where)
     assert found.worst == pytest.approx(worst, rel=1e-3)
@@ -274,7 +276,7 @@ def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, wher
 def test_joints_beyond_their_limits_and_efforts_are_found(jointed, tmp_path, number, key, value, where):
     """The recording is left as it is, and what it says about a joint changed."""
     changed = with_joint(jointed, tmp_path, number, key, value)
-    report = sp.check_recording(changed, sp.CheckSettings(only=["joints"]))
+    report = sp.check_recording(changed, only=["joints"])
     assert not report.ok
     assert report["joints"].where == where
 

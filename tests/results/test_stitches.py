@@ -24,7 +24,7 @@ def scene():
         sp.SoftVertexTriangleStitch("low", "sheet", max_distance=0.0101, youngs=1e4, poisson=0.3),
         sp.VertexEdgeStitch("high", "low", max_distance=0.0201, stiffness=10.0),
     ]
-    return sp.Scene(bodies, [sp.TriangleObstacle(name="sheet", surface=SHEET, motion=up)], stitches=stitches)
+    return sp.Scene(bodies, [sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET, motion=up)], stitches=stitches)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ CUBE = sp.shapes.box(divisions=(1, 1, 1))
 
 def scene(*pairs):
     bodies = [sp.Body(name, CUBE, RUBBER, friction=mu) for name, mu in (("a1", 0.4), ("a2", 0.9), ("b", 0.0))]
-    obstacles = [sp.HalfSpace(friction=0.3, name="floor"), sp.Sphere(friction=0.7)]
+    obstacles = [sp.HalfSpace(friction=0.3, name="floor"), sp.obstacles.Sphere(friction=0.7)]
     return sp.Scene(bodies, obstacles, contact_pairs=pairs)
 
 

@@ -78,7 +78,7 @@ def test_a_body_completely_inside_another(free, corrupted):
         x[n // 2 :] = (right - right.mean(axis=0)) * 0.3 + left.mean(axis=0)
         file[X][2 * n : 3 * n] = x
 
-    report = sp.check_recording(corrupted(free, change), sp.CheckSettings(only=CONTACT))
+    report = sp.check_recording(corrupted(free, change), only=CONTACT)
     assert [(result.name, result.first_failure) for result in report.failures] == [("containment", 2)]
     assert report["containment"].where == "right in left"
 
@@ -141,7 +141,7 @@ BY_FORMULA = {
 
 @pytest.mark.parametrize("name", BY_FORMULA)
 def test_a_body_in_an_obstacle_that_is_a_formula(around, corrupted, name):
-    report = sp.check_recording(corrupted(around, move_to(BY_FORMULA[name])), sp.CheckSettings(only=["obstacles"]))
+    report = sp.check_recording(corrupted(around, move_to(BY_FORMULA[name])), only=["obstacles"])
     found = report["obstacles"]
     assert (found.verdict, found.first_failure, found.failed_frames) == ("fail", 3, 1)
     assert name in found.where
@@ -157,7 +157,7 @@ def test_a_body_just_above_the_floor_and_just_beside_the_moving_door_passes(arou
 
 @pytest.mark.parametrize(("lowest", "name"), [([-0.2, 0.9, -2.3], "crate"), ([0.3, 2.0, 0.2], "rock")])
 def test_a_body_that_meets_an_obstacle_made_of_triangles(around, corrupted, lowest, name):
-    report = sp.check_recording(corrupted(around, move_to(lowest)), sp.CheckSettings(only=["intersection"]))
+    report = sp.check_recording(corrupted(around, move_to(lowest)), only=["intersection"])
     assert report["intersection"].first_failure == 3
     assert f"obstacle {name}" in report["intersection"].where
 
@@ -178,7 +178,7 @@ def test_bodies_inside_obstacles_and_obstacles_inside_bodies(around, corrupted, 
         x = (x - x.min(axis=0)) * size + np.asarray(lowest)
         file[X][5 * n : 6 * n] = x
 
-    report = sp.check_recording(corrupted(around, change), sp.CheckSettings(only=["containment"]))
+    report = sp.check_recording(corrupted(around, change), only=["containment"])
     assert report["containment"].first_failure == 5
     assert report["containment"].where == where
 
@@ -208,7 +208,7 @@ def test_excluded_and_stitched_pairs_are_recorded(tmp_path):
             sp.Body("b", cube, JELLY, position=(0.9, 0, 0)),
             sp.Body("c", cube, JELLY, position=(0, 3, 0)),
         ],
-        [sp.HalfSpace(name="floor", point=(0, -1, 0)), sp.TriangleObstacle(name="rock", surface=rock)],
+        [sp.HalfSpace(name="floor", point=(0, -1, 0)), sp.obstacles.TriangleObstacle(name="rock", surface=rock)],
         contact_pairs=[sp.ContactPair("a", "b", collide=False), sp.ContactPair("c", "*", collide=False)],
         stitches=[
             sp.SoftVertexTriangleStitch("c", "a", pairs=[(0, 3)], youngs=1e3, poisson=0.3),

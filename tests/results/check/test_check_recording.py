@@ -67,7 +67,7 @@ def test_without_works_energy_is_judged_only_where_nothing_does_work(free, aroun
         remove_from_scene(file, f"details/fields/{number}")
 
     assert verdicts(corrupted(free, forget), only=["energy", "balance"]) == {"energy": "pass", "balance": "skipped"}
-    report = sp.check_recording(corrupted(around, forget), sp.CheckSettings(only=["energy"]))
+    report = sp.check_recording(corrupted(around, forget), only=["energy"])
     assert report["energy"].message == "obstacles move, which does work"
 
 
@@ -88,11 +88,11 @@ def test_inconsistent_physics_is_an_error(free, corrupted, where, value, message
 
 def test_every_kth_frame_and_the_last(free, corrupted):
     path = corrupted(free, nan_position)
-    report = sp.check_recording(path, sp.CheckSettings(every=4))
+    report = sp.check_recording(path, every=4)
     assert (report.frames, report.frames_checked, report.ok) == (FRAMES, 3, True)
     assert failures(path, every=3) == {"finite": 3}
     seen = []
-    sp.check_recording(path, sp.CheckSettings(every=4, only=["finite"]), progress=lambda *done: seen.append(done))
+    sp.check_recording(path, every=4, only=["finite"], progress=lambda *done: seen.append(done))
     assert seen == [(1, 3), (2, 3), (3, 3)]
 
 
@@ -107,7 +107,7 @@ def test_every_kth_frame_and_the_last(free, corrupted):
 )
 def test_invalid_settings(settings, message):
     with pytest.raises(OutputError, match=message):
-        sp.CheckSettings(**settings)
+        sp.check_recording("missing.vtkhdf", **settings)
 
 
 def test_the_shell(free, corrupted, tmp_path, capsys, monkeypatch):

@@ -91,7 +91,7 @@ def test_the_default_distance_is_a_hundredth_of_the_mean_edge():
 
 
 def test_the_default_distance_to_a_large_triangle_is_that_of_the_fine_mesh():
-    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET)
+    sheet = sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET)
     tets = scene(soft("low", "sheet", max_distance=1e-6), obstacles=[sheet]).stitching.tets
     assert tets.offset.all()
     assert (3.0 * tets.rest_volumes / 2.0).max() <= 0.01 * 0.1 * np.sqrt(2)
@@ -177,7 +177,7 @@ def test_rest_shapes_do_not_depend_on_the_start_of_the_simulation():
 
 def test_stitches_to_triangle_obstacles_follow_their_motion():
     moving = sp.Keyframes([0, 1], [[0, 0, 0], [0, 0, 2]])
-    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET, motion=moving)
+    sheet = sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET, motion=moving)
     one = scene(soft("low", "sheet", max_distance=1e-6), gap=1.0, obstacles=[sp.HalfSpace(point=(0, -9, 0)), sheet])
     found = one.stitching
     assert found.anchors.owner.tolist() == [1] * len(found.anchors)
@@ -263,7 +263,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_errors(case):
     make, text = REFUSED[case]
-    obstacles = [sp.HalfSpace(name="floor", point=(0, -5, 0)), sp.TriangleObstacle(name="flat", surface=FLAT)]
+    obstacles = [sp.HalfSpace(name="floor", point=(0, -5, 0)), sp.obstacles.TriangleObstacle(name="flat", surface=FLAT)]
     with pytest.raises(sp.SceneError) as caught:
         build_system(scene(make(), obstacles=obstacles))
     assert text in str(caught.value)

@@ -277,7 +277,9 @@ def test_the_twist_of_a_ball_is_limited_and_the_check_finds_larger_ones(tmp_path
 
 def test_a_joint_follows_an_obstacle():
     """A bar on the rim of a scripted wheel, clamped to it."""
-    wheel = sp.Sphere(radius=0.1, center=(-0.3, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0]))
+    wheel = sp.obstacles.Sphere(
+        radius=0.1, center=(-0.3, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0])
+    )
     scene = sp.Scene([bar()], obstacles=[wheel], joints=[sp.FixedJoint("bar", "wheel")])
     frame = run(scene, 0.02, 25, contact=sp.IPCContact())[-1]
     R, t = wheel.pose(0.5)
