@@ -10,13 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.mesh.io.cells import FormatError
+from supple.mesh.io.cells import FormatError, tets_of
 from supple.mesh.io.file_contents import file_contents
-from supple.mesh.io.models import abaqus_sets, gmsh_groups
+from supple.mesh.io.libraries.meshio import read_msh
+from supple.mesh.io.models import abaqus_sets
 from supple.mesh.io.models.named_sets import NamedSets
 from supple.runtime.displayed import Displayed
 
-_READERS: dict[str, Callable[[bytes], NamedSets]] = {".inp": abaqus_sets.read, ".msh": gmsh_groups.read}
+
+def _groups(data: bytes) -> NamedSets:
+    """The physical groups of Gmsh's file."""
+    found = read_msh(data)
+    return NamedSets(len(found.soup.points), tets_of(found.soup), found.node_sets, found.tet_sets)
+
+
+_READERS: dict[str, Callable[[bytes], NamedSets]] = {".inp": abaqus_sets.read, ".msh": _groups}
 SETS_EXTENSIONS = tuple(_READERS)
 
 
