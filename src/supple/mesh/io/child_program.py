@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from supple.mesh.io.cells import FormatError
-from supple.mesh.meshing.mesher_worker import end_with_parent, limit_process
+from supple.runtime.memory import end_with_parent, limit_process
 
 
 def main(library: str, path: Path, memory: int, seconds: float, parent: int) -> int:

@@ -7,27 +7,16 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 from textwrap import shorten
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from supple.mesh.io.cells import CellSoup, FormatError
+from supple.mesh.io.cells import CellSoup, FormatError, MeshFile
 
 # What a library needs of memory: itself, and numbers of Python's for each byte of a text [bytes].
 _LEAST_MEMORY, _MEMORY_OF_A_BYTE = 2**31, 64
 _SECONDS, _SECONDS_OF_A_BYTE = 60.0, 1e-5
-
-
-class MeshFile(NamedTuple):
-    """Points and cells of a file, and by name the rows of points, and of its tets, that belong to named sets."""
-
-    soup: CellSoup
-    node_sets: Mapping[str, NDArray[np.int64]] = {}
-    tet_sets: Mapping[str, NDArray[np.int64]] = {}
 
 
 def read_in_child(data: bytes, library: str, suffix: str) -> MeshFile:

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import vertex_array
-from supple.mesh.io import obj, off, ply, stl, vtk_legacy, vtk_xml
+from supple.mesh.io import abaqus, obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.file_contents import file_contents
 from supple.mesh.io.libraries.meshio import read_msh, write_msh
 from supple.mesh.io.libraries.trimesh import read_glb
 from supple.mesh.io.libraries.usd import USD_SUFFIXES, read_usd, write_usd
-from supple.mesh.io.models import abaqus
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.merge import merge_map
@@ -49,7 +48,7 @@ TET_READERS: dict[str, Callable[[bytes], CellSoup]] = {
     ".msh": lambda data: read_msh(data).soup,
     ".vtu": vtk_xml.read,
     ".vtk": vtk_legacy.read,
-    ".inp": abaqus.read,
+    ".inp": lambda data: abaqus.read(data).soup,
     **dict.fromkeys(USD_SUFFIXES, read_usd),
 }
 TET_WRITERS = {".vtu": vtk_xml.written_cells, ".vtk": vtk_legacy.written_cells, ".inp": abaqus.written}

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import QUADRATIC_TETRA, TETRA, CellSoup, FormatError
-from supple.mesh.io.in_child import MeshFile, read_in_child
+from supple.mesh.io.cells import QUADRATIC_TETRA, TETRA, CellSoup, FormatError, MeshFile
+from supple.mesh.io.in_child import read_in_child
 from supple.mesh.io.text import without_mark
 
 _TETS = {"tetra": TETRA, "tetra10": QUADRATIC_TETRA}

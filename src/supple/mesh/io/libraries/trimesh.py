@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from supple.mesh.io.cells import TRIANGLE, CellSoup, FormatError
-from supple.mesh.io.in_child import MeshFile, read_in_child
+from supple.mesh.io.cells import TRIANGLE, CellSoup, FormatError, MeshFile
+from supple.mesh.io.in_child import read_in_child
 
 _FAN = 6  # of the modes of primitives
 

@@ -15,8 +15,8 @@ from textwrap import shorten
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import TETRA, CellSoup, FormatError
-from supple.mesh.io.in_child import MeshFile, read_in_child
+from supple.mesh.io.cells import TETRA, CellSoup, FormatError, MeshFile
+from supple.mesh.io.in_child import read_in_child
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc")
 
