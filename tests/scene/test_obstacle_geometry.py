@@ -57,7 +57,9 @@ def test_the_distance_is_that_of_the_triangles(name):
     assert (distances > 0).any()
     assert (distances < 0).any()
     exact = TriangleTree.of(surface.vertices, surface.triangles).nearest(points)[1]
-    round_off = 1e-12 if obstacle.has_exact_triangles or name == "Box room" else 4e-3 * getattr(obstacle, "radius", 0.0)
+    round_off = (
+        1e-12 if obstacle.checked_by_triangles or name == "Box room" else 4e-3 * getattr(obstacle, "radius", 0.0)
+    )
     np.testing.assert_allclose(np.abs(distances), exact, atol=round_off)
 
 

@@ -22,7 +22,7 @@ from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.physics import write_physics
 from supple.results.recording.skinned_surface import SkinnedSurface
 from supple.scene.body import PlacedBody
-from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle, Surface
 from supple.scene.obstacles.registry import KINDS, restored_obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 
@@ -272,7 +272,7 @@ def read_obstacles(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedO
             name, kind, path = str(described["name"]), str(described["kind"]), f"supple/obstacles/{i}"
             if kind not in KINDS:
                 raise file.broken(f"obstacle {name!r} is of an unknown kind, {kind!r}; register the kind first")
-            if any(one.kind == "surface" for one in KINDS[kind].parameters().values()):
+            if any(isinstance(one.form, Surface) for one in KINDS[kind].parameters().values()):
                 vertices = file.array(f"{path}/vertices", "f", (None, 3))
                 triangles = file.indices(f"{path}/triangles", 3, len(vertices))
             obstacles.append(RecordedObstacle(name, kind, dict(described["parameters"]), vertices, triangles))

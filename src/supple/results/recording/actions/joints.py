@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,9 @@ from numpy.typing import NDArray
 
 from supple.model.system import System
 from supple.results.recording.checked_hdf5 import CheckedFile
-from supple.scene.joints.axis_joint import AxisJoint
-from supple.scene.joints.ball_joint import BallJoint
+from supple.scene.joints.conditions import FORMS, Conditions, Function
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
-
-KINDS = ("fixed", "ball", "hinge", "slider")
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +21,12 @@ class RecordedJoint:
 
     Attributes
     ----------
-    name : of the joint; kind : one of `KINDS`
+    name : of the joint; kind : as scene files write it
     sides : numbers of what it joins: bodies, then obstacles; None for the world
     placed : (2, 3, 4) rotations and translations of the sides where the scene places everything, where the coordinate
         of the joint is zero
-    point, axis : (3,) there, in the world [m], [-]
-    limits : of its coordinate [rad] or [m]; twist_limits : of the twist of a ball [rad]; infinite where there are none
+    point : (3,) there, in the world [m]; axes : (3, 3) unit vectors there (rows), which `conditions` numbers
+    conditions : what it holds and measures
     max_force : of its motor [N m] or [N]; max_velocity : of its coordinate [rad/s] or [m/s]; infinite where there is
         none
     """
@@ -39,26 +36,20 @@ class RecordedJoint:
     sides: tuple[int, int | None]
     placed: NDArray[np.float64]
     point: NDArray[np.float64]
-    axis: NDArray[np.float64]
-    limits: tuple[float, float]
+    axes: NDArray[np.float64]
+    conditions: Conditions
     max_force: float
     max_velocity: float
-    twist_limits: tuple[float, float]
 
     def described(self) -> dict[str, Any]:
         """As the header has it."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "sides": list(self.sides),
-            "placed": self.placed.tolist(),
-            "point": self.point.tolist(),
-            "axis": self.axis.tolist(),
-            "limits": [end if np.isfinite(end) else None for end in self.limits],
-            "twist_limits": [end if np.isfinite(end) else None for end in self.twist_limits],
-            "max_force": self.max_force if np.isfinite(self.max_force) else None,
-            "max_velocity": self.max_velocity if np.isfinite(self.max_velocity) else None,
-        }
+        arrays = {key: getattr(self, key).tolist() for key in ("placed", "point", "axes")}
+        most = {key: _or_none(getattr(self, key)) for key in ("max_force", "max_velocity")}
+        functions = [
+            [one.form, one.vectors, [*map(_or_none, one.limits)], one.vanishes] for one in self.conditions.functions
+        ]
+        conditions = asdict(self.conditions) | {"functions": functions}
+        return {"name": self.name, "kind": self.kind, "sides": self.sides, "conditions": conditions, **arrays, **most}
 
 
 def joints_of(system: System) -> tuple[RecordedJoint, ...]:
@@ -78,26 +69,11 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
             placed.append(np.column_stack([R, t]))
         first = bodies[joint.first]
         assert isinstance(first, RigidBody)
-        axis = joint.axis if isinstance(joint, AxisJoint | BallJoint) else None
-        ends = (joint.limits if isinstance(joint, AxisJoint) else None) or (-np.inf, np.inf)
-        if isinstance(joint, BallJoint) and joint.max_swing is not None:
-            ends = 0.0, joint.max_swing
-        most = joint.motor.max_force if isinstance(joint, AxisJoint) and joint.motor is not None else None
-        fastest = joint.max_velocity if isinstance(joint, AxisJoint) else None
-        joints.append(
-            RecordedJoint(
-                str(joint.name),
-                joint.kind,
-                (number[joint.first], number.get(joint.second)),
-                np.array(placed),
-                np.asarray(joint.place(first), dtype=np.float64),
-                np.array([1.0, 0.0, 0.0] if axis is None else axis, dtype=np.float64),
-                ends,
-                np.inf if most is None else most,
-                np.inf if fastest is None else fastest,
-                (joint.twist_limits if isinstance(joint, BallJoint) else None) or (-np.inf, np.inf),
-            )
-        )
+        most = [getattr(getattr(joint, "motor", None), "max_force", None), getattr(joint, "max_velocity", None)]
+        sides = number[joint.first], number.get(joint.second)
+        where = np.array(placed), np.asarray(joint.place(first), dtype=np.float64), joint.axes()
+        ends = [np.inf if end is None else float(end) for end in most]
+        joints.append(RecordedJoint(str(joint.name), joint.kind, sides, *where, joint.conditions(), *ends))
     return tuple(joints)
 
 
@@ -113,26 +89,52 @@ def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoin
     try:
         for given in header["physics"]["joints"]:
             first, second = int(given["sides"][0]), given["sides"][1]
-            low, high = given["limits"]
-            least, most = given["twist_limits"]
-            joint = RecordedJoint(
-                name=str(given["name"]),
-                kind=str(given["kind"]),
-                sides=(first, None if second is None else int(second)),
-                placed=np.array(given["placed"], dtype=np.float64).reshape(2, 3, 4),
-                point=np.array(given["point"], dtype=np.float64).reshape(3),
-                axis=np.array(given["axis"], dtype=np.float64).reshape(3),
-                limits=(-np.inf if low is None else float(low), np.inf if high is None else float(high)),
-                max_force=np.inf if given["max_force"] is None else float(given["max_force"]),
-                max_velocity=np.inf if given["max_velocity"] is None else float(given["max_velocity"]),
-                twist_limits=(-np.inf if least is None else float(least), np.inf if most is None else float(most)),
+            shapes = {"placed": (2, 3, 4), "point": (3,), "axes": (3, 3)}
+            arrays = {key: np.array(given[key], dtype=np.float64).reshape(shape) for key, shape in shapes.items()}
+            most = [_end(given[key], np.inf) for key in ("max_force", "max_velocity")]
+            sides = first, None if second is None else int(second)
+            holds = _conditions(given["conditions"])
+            joints.append(
+                RecordedJoint(
+                    str(given["name"]),
+                    str(given["kind"]),
+                    sides,
+                    **arrays,
+                    conditions=holds,
+                    max_force=most[0],
+                    max_velocity=most[1],
+                )
             )
-            joints.append(joint)
-            numbers = np.concatenate([joint.placed.ravel(), joint.point, joint.axis])
-            ends = [first] if second is None else [first, int(second)]
+            numbers = np.concatenate([array.ravel() for array in arrays.values()])
+            ends = [end for end in sides if end is not None]
             there = first < len(header["bodies"]) and min(ends) >= 0 and all(jointed[end] for end in ends)
-            if joint.kind not in KINDS or not np.isfinite(numbers).all() or not joint.axis.any() or not there:
+            upright = np.allclose(arrays["axes"] @ arrays["axes"].T, np.eye(3), atol=1e-6)
+            if not np.isfinite(numbers).all() or not upright or not there:
                 raise ValueError
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         raise file.broken("its joints are not described as they should be") from None
     return tuple(joints)
+
+
+_VECTORS = {"apart", *(f"{side}.{k}" for side in ("first", "second") for k in range(3))}
+
+
+def _conditions(given: dict[str, Any]) -> Conditions:
+    functions = []
+    for form, vectors, (low, high), vanishes in given["functions"]:
+        if form not in FORMS or len(vectors) != {"angle": 3, "twist": 4}.get(form, 2):
+            raise ValueError
+        functions.append(Function(form, tuple(vectors), (_end(low, -np.inf), _end(high, np.inf)), bool(vanishes)))
+    lines, parallel = tuple(given["lines"]), tuple(map(int, given["parallel"]))
+    named = {*lines, *(name for one in functions for name in one.vectors)}
+    if not named <= _VECTORS or "apart" in lines or not {*parallel} <= {0, 1, 2}:
+        raise ValueError
+    return Conditions(bool(given["together"]), parallel, tuple(functions), lines)
+
+
+def _or_none(end: float) -> float | None:
+    return float(end) if np.isfinite(end) else None
+
+
+def _end(given: object, otherwise: float) -> float:
+    return otherwise if given is None else float(given)  # pyright: ignore[reportArgumentType]

@@ -26,10 +26,10 @@ class RecordedLoad:
     ----------
     kind : "vector", a force w_i f on each vertex, with the value f (3,); "pressure", a third of -p A on each corner of
         a triangle of area vector A, with the value p; "spring", the forces of k / 2 (l - l0)^2,
-        l = |sum w_i x_i + offset|, with the value l0
+        l = |sum w_i x_i + offset|, with the value l0; "drag", as of `LoadPattern`
     work : the name of its work
-    vertices : (v,), or (t, 3) triangles under a pressure; weights : (v,) w; of no meaning for a pressure
-    offset : (3,) [m]; stiffness : k [N/m]
+    vertices : (v,), or (t, 3) triangles of a pressure or a drag; weights : (v,) w; of no meaning for triangles
+    offset : (3,) [m]; stiffness : k [N/m]; of a drag, density times coefficient [kg/m^3]
     """
 
     kind: str
@@ -76,12 +76,13 @@ def read_loads(
             stiffness = float(entry["stiffness"])
         except (KeyError, TypeError, ValueError):
             raise file.broken("its loads are not described as they should be") from None
-        if kind not in ("vector", "pressure", "spring"):
+        if kind not in ("vector", "pressure", "spring", "drag"):
             raise file.of_another_version(f"a load has the unknown kind {kind!r}")
-        rows = file.indices(f"{_GROUP}/load_{k}/vertices", 3 if kind == "pressure" else 1, vertices)
+        columns = 3 if kind in ("pressure", "drag") else 1
+        rows = file.indices(f"{_GROUP}/load_{k}/vertices", columns, vertices)
         weights = file.array(f"{_GROUP}/load_{k}/weights", "f", (len(rows),))
         if not np.isfinite([*weights, x, y, z, stiffness]).all():
             raise file.broken("a number of a load is not finite")
-        rows = rows if kind == "pressure" else np.ascontiguousarray(rows[:, 0])
+        rows = rows if columns == 3 else np.ascontiguousarray(rows[:, 0])
         patterns[f"{work}.{k}"] = RecordedLoad(kind, work, rows, weights, (x, y, z), stiffness)
     return patterns, frozenset(others)
