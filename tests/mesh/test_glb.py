@@ -10,6 +10,7 @@ import trimesh
 import supple as sp
 from supple.errors import MeshError
 from supple.mesh.io.models import glb
+from supple.results.export.exporter import export
 
 TURN = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3), (0.1, 0.0, 0.2))
 MIRROR = np.diag([-2.0, 1.0, 1.0, 1.0])
@@ -41,7 +42,7 @@ def test_an_exported_recording_reads_back(tmp_path):
     body = sp.Body("box", sp.shapes.box((0.1, 0.2, 0.3), (1, 1, 1)), sp.EdgesAndVolume(), position=(1, 2, 3))
     sinks = [sp.Recorder(tmp_path / "r.vtkhdf")]
     list(sp.simulate(sp.Scene([body], gravity=(0, 0, 0)), sp.XPBD(substeps=1, contact=None), 0.1, 1, sinks=sinks))
-    surface = sp.SurfaceMesh.load(sp.export(tmp_path / "r.vtkhdf", "glb"))
+    surface = sp.SurfaceMesh.load(export(tmp_path / "r.vtkhdf", "glb"))
     assert surface.volume == pytest.approx(0.006, rel=1e-5)
     np.testing.assert_allclose(np.mean(surface.bounds, axis=0), (1, 2, 3), atol=1e-5)
 

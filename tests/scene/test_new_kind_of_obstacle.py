@@ -109,8 +109,8 @@ def test_a_recording_restores_it(recorded):
 
 def test_the_checker_finds_penetration_and_containment(recorded, tmp_path):
     path, _ = recorded
-    settings = sp.CheckSettings(only=["obstacles", "containment"])
-    report = sp.check_recording(path, settings)
+    only = ["obstacles", "containment"]
+    report = sp.check_recording(path, only=only)
     assert report["containment"].verdict == "pass"
     assert report["obstacles"].worst > -1e-4
     copy = tmp_path / "copy.vtkhdf"
@@ -120,7 +120,7 @@ def test_the_checker_finds_penetration_and_containment(recorded, tmp_path):
         x = file["VTKHDF/Points"][3 * n : 4 * n]
         file["VTKHDF/Points"][3 * n : 4 * n] = x - [0.0, 0.05, 0.0]
         file["VTKHDF/Points"][5 * n : 6 * n] = 20 * (x - x.mean(axis=0))
-    report = sp.check_recording(copy, settings)
+    report = sp.check_recording(copy, only=only)
     assert report["obstacles"].first_failure == 3
     assert report["containment"].where == "RoundedCube 1 in cube"
 
@@ -129,7 +129,8 @@ def test_the_checker_finds_penetration_and_containment(recorded, tmp_path):
 def test_exports_contain_it(recorded, tmp_path, kind):
     path, _ = recorded
     output = tmp_path / ("rounded" if kind == "obj" else f"rounded.{kind}")
-    sp.export(path, to=kind, output=output)
+    with sp.read_recording(path) as recording:
+        recording.export(kind, output)
     files = sorted(output.iterdir()) if output.is_dir() else [output]
     assert b"RoundedCube" in files[0].read_bytes() or kind == "html"
     assert files[0].stat().st_size > 10_000

@@ -67,7 +67,7 @@ class ContactPair(Kind):
         if self.friction is not None and not self.collide:
             raise SceneError(f"{self.label}: friction of a pair that does not collide; remove one of the two")
         if self.friction is None and self.collide:
-            raise SceneError(f"{self.label}: it has no effect; give friction=..., or collide=False")
+            raise SceneError(f"{self.label}: it has no effect; give `friction`, or `collide` as false")
 
     @property
     def label(self) -> str:

@@ -92,16 +92,16 @@ def test_a_scene_file_covers_the_whole_api(load):
     floor, room, bowl, log, drum, ring = scene.obstacles
     assert isinstance(floor, sp.HalfSpace)
     np.testing.assert_allclose(floor.normal, [0, 1, 0])
-    assert isinstance(room, sp.Box)
+    assert isinstance(room, sp.obstacles.Box)
     assert room.inside
-    assert isinstance(bowl, sp.Sphere)
+    assert isinstance(bowl, sp.obstacles.Sphere)
     np.testing.assert_allclose(bowl.pose(0.5)[1], [0, 0.5, 0])
-    assert isinstance(log, sp.Capsule)
+    assert isinstance(log, sp.obstacles.Capsule)
     assert (log.name, log.radius, log.friction, log.inside) == ("log", 0.5, 0.2, False)
     np.testing.assert_array_equal(log.end, [0, -6, 3])
-    assert isinstance(drum, sp.Cylinder)
+    assert isinstance(drum, sp.obstacles.Cylinder)
     np.testing.assert_allclose(drum.pose(1.0)[0][0, 0], np.cos(1.0))
-    assert isinstance(ring, sp.TriangleObstacle)
+    assert isinstance(ring, sp.obstacles.TriangleObstacle)
     np.testing.assert_allclose(ring.surface.bounds[1], [4.4, 0.4, 5.4], atol=0.05)
 
     assert scene.pins[1].name == "left"

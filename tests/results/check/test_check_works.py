@@ -8,8 +8,9 @@ import pytest
 import supple as sp
 from supple.results.check.checks.works import Works
 from supple.results.check.load_forces import load_forces
+from supple.results.check.settings import CheckSettings
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.recording.actions.loads import RecordedLoad
+from supple.results.recording.scene import RecordedLoad
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.4, damping=0.02)
 
@@ -32,7 +33,7 @@ def dragged(request, tmp_path_factory):
 
 
 def checked(path, **options):
-    return sp.check_recording(path, sp.CheckSettings(only=["balance", "works"], **options))
+    return sp.check_recording(path, only=["balance", "works"], **options)
 
 
 @pytest.mark.parametrize("name", ["pins", "friction"])
@@ -101,7 +102,7 @@ def test_the_work_of_pins_is_of_second_order(tmp_path):
         solver = sp.Implicit(integrator="static")
         path = recorded(tmp_path / f"{steps}.vtkhdf", scene, solver, 1.0 / steps, steps)
         with sp.read_recording(path) as recording:
-            check = Works(Scene(recording), sp.CheckSettings())
+            check = Works(Scene(recording), CheckSettings())
             frames = [Snapshot.of(check.scene, frame) for frame in recording]
             for frame in frames:
                 check.see(frame)

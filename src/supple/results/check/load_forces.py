@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
-from supple.results.recording.actions.loads import RecordedLoad
+from supple.results.recording.scene import RecordedLoad
 
 
 def load_forces(

@@ -109,7 +109,7 @@ class Obstacle(Kind, ABC):
 
     @property
     def checked_by_triangles(self) -> bool:
-        """Whether checks compare bodies with `triangles`: these are the surface, or about a solid that is not convex."""
+        """Whether checks compare bodies with `triangles`: the surface, or one about a solid that is not convex."""
         return self.surface_mesh is not None
 
     @abstractmethod

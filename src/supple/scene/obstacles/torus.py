@@ -13,7 +13,7 @@ from supple.kinds.forms import POSITIVE, Direction, Vector
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
 from supple.scene.obstacles.shape import frame_of
 
-# Sides of the polyhedron along the circle, and around the tube: within 0.13 % of the outer radius and 0.5 % of the tube.
+# Sides of the polyhedron along the circle, and around the tube: within 0.13 % of the outer radius, 0.5 % of the tube.
 _ALONG, _AROUND = 64, 32
 
 

@@ -45,7 +45,7 @@ JOINTS = {
     ],
     "obstacle": [sp.HingeJoint("a", "wheel", point=POINT, axis=AXIS, motor=sp.VelocityMotor(3.0))],
 }
-WHEEL = sp.Sphere(radius=0.1, center=(5, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 5]))
+WHEEL = sp.obstacles.Sphere(radius=0.1, center=(5, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 5]))
 
 
 # Control points of the two bodies.

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.results.recording.checked_hdf5 import CheckedFile
-from supple.scene.joints.conditions import FORMS, Conditions, Function
+from supple.results.checkpoint.typed import Rows
+from supple.scene.joints.conditions import Conditions
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
+
+# How many vectors a function of each form has, and the names of those of a joint.
+_VECTORS = {"angle": 3, "product": 2, "cosine": 2, "twist": 4}
+_NAMES = {"apart", *(f"{side}.{k}" for side in ("first", "second") for k in range(3))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,22 +39,28 @@ class RecordedJoint:
     name: str
     kind: str
     sides: tuple[int, int | None]
-    placed: NDArray[np.float64]
-    point: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    placed: Annotated[NDArray[np.float64], Rows(2, 3, 4, finite=True)]
+    point: Annotated[NDArray[np.float64], Rows(3, finite=True)]
+    axes: Annotated[NDArray[np.float64], Rows(3, 3, finite=True)]
     conditions: Conditions
     max_force: float
     max_velocity: float
 
-    def described(self) -> dict[str, Any]:
-        """As the header has it."""
-        arrays = {key: getattr(self, key).tolist() for key in ("placed", "point", "axes")}
-        most = {key: _or_none(getattr(self, key)) for key in ("max_force", "max_velocity")}
-        functions = [
-            [one.form, one.vectors, [*map(_or_none, one.limits)], one.vanishes] for one in self.conditions.functions
-        ]
-        conditions = asdict(self.conditions) | {"functions": functions}
-        return {"name": self.name, "kind": self.kind, "sides": self.sides, "conditions": conditions, **arrays, **most}
+    def check(self, jointed: Sequence[bool], bodies: int) -> None:
+        """Raise `ValueError` where it joins what does not exist or is soft, or a number of it is not finite.
+
+        `jointed` tells of bodies, then obstacles, whether a joint may hold them.
+        """
+        first, second = self.sides
+        ends = [first] if second is None else [first, second]
+        there = first < bodies and all(0 <= end < len(jointed) and jointed[end] for end in ends)
+        holds, upright = self.conditions, np.allclose(self.axes @ self.axes.T, np.eye(3), atol=1e-6)
+        named = {*holds.lines, *(name for one in holds.functions for name in one.vectors)}
+        known = named <= _NAMES and "apart" not in holds.lines and {*holds.parallel} <= {0, 1, 2}
+        if not there or not known or any(len(one.vectors) != _VECTORS.get(one.form) for one in holds.functions):
+            raise ValueError(f"joint {self.name!r} is not between rigid bodies of the scene, or not one that is known")
+        if not upright:
+            raise ValueError(f"the axes of joint {self.name!r} are not perpendicular unit vectors")
 
 
 def joints_of(system: System) -> tuple[RecordedJoint, ...]:
@@ -75,66 +86,3 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
         ends = [np.inf if end is None else float(end) for end in most]
         joints.append(RecordedJoint(str(joint.name), joint.kind, sides, *where, joint.conditions(), *ends))
     return tuple(joints)
-
-
-def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoint, ...]:
-    """The joints of a recording.
-
-    Raises
-    ------
-    OutputError : where one is not described as it should be, or joins what does not exist or is soft.
-    """
-    jointed = [body.get("rigid") is True for body in header["bodies"]] + [True] * len(header["obstacles"])
-    joints = []
-    try:
-        for given in header["physics"]["joints"]:
-            first, second = int(given["sides"][0]), given["sides"][1]
-            shapes = {"placed": (2, 3, 4), "point": (3,), "axes": (3, 3)}
-            arrays = {key: np.array(given[key], dtype=np.float64).reshape(shape) for key, shape in shapes.items()}
-            most = [_end(given[key], np.inf) for key in ("max_force", "max_velocity")]
-            sides = first, None if second is None else int(second)
-            holds = _conditions(given["conditions"])
-            joints.append(
-                RecordedJoint(
-                    str(given["name"]),
-                    str(given["kind"]),
-                    sides,
-                    **arrays,
-                    conditions=holds,
-                    max_force=most[0],
-                    max_velocity=most[1],
-                )
-            )
-            numbers = np.concatenate([array.ravel() for array in arrays.values()])
-            ends = [end for end in sides if end is not None]
-            there = first < len(header["bodies"]) and min(ends) >= 0 and all(jointed[end] for end in ends)
-            upright = np.allclose(arrays["axes"] @ arrays["axes"].T, np.eye(3), atol=1e-6)
-            if not np.isfinite(numbers).all() or not upright or not there:
-                raise ValueError
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
-        raise file.broken("its joints are not described as they should be") from None
-    return tuple(joints)
-
-
-_VECTORS = {"apart", *(f"{side}.{k}" for side in ("first", "second") for k in range(3))}
-
-
-def _conditions(given: dict[str, Any]) -> Conditions:
-    functions = []
-    for form, vectors, (low, high), vanishes in given["functions"]:
-        if form not in FORMS or len(vectors) != {"angle": 3, "twist": 4}.get(form, 2):
-            raise ValueError
-        functions.append(Function(form, tuple(vectors), (_end(low, -np.inf), _end(high, np.inf)), bool(vanishes)))
-    lines, parallel = tuple(given["lines"]), tuple(map(int, given["parallel"]))
-    named = {*lines, *(name for one in functions for name in one.vectors)}
-    if not named <= _VECTORS or "apart" in lines or not {*parallel} <= {0, 1, 2}:
-        raise ValueError
-    return Conditions(bool(given["together"]), parallel, tuple(functions), lines)
-
-
-def _or_none(end: float) -> float | None:
-    return float(end) if np.isfinite(end) else None
-
-
-def _end(given: object, otherwise: float) -> float:
-    return otherwise if given is None else float(given)  # pyright: ignore[reportArgumentType]
