@@ -20,7 +20,7 @@ from supple.scene.selection import OnVertices, Selection, Vertices
 class ForceForm(Form):
     """(3,) or (k, 3), or a function of time; a scene file has one vector."""
 
-    def checked(self, value: Any, what: str) -> ArrayLike | Callable[[float], ArrayLike]:
+    def checked(self, value: Any, what: str) -> Any:
         return value if callable(value) else checked_force(value, what)
 
 

@@ -107,7 +107,7 @@ Motion = Keyframes | Callable[[float], ArrayLike] | None
 class MotionForm(Form):
     """None, `Keyframes`, or a function of time."""
 
-    def checked(self, value: Any, what: str) -> Motion:
+    def checked(self, value: Any, what: str) -> Any:
         if not isinstance(value, Keyframes) and not callable(value):
             raise SceneError(f"{what} is {value!r}; give None, Keyframes, or a function t -> displacement")
         return value

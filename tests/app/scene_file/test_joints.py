@@ -100,10 +100,13 @@ def test_info_run_recording_and_check_know_joints(scene_file, tmp_path, capsys):
     main(["info", str(scene_file)])
     printed = " ".join(capsys.readouterr().out.split())
     assert (
-        "HingeJoint of lower and upper, from -1 to 2, PositionMotor of at most 7, damping 0.5, largest effort 7"
+        "HingeJoint of lower and upper, point (1, 1, 0), limits (-1, 2), motor PositionMotor(target over time, stiffness "
+        "100, damping 10, max force 7), damping 0.5, max effort 7" in printed
+    )
+    assert (
+        "BallJoint of upper and the world, point (0, 1, 0), axis (1, 0, 0), max swing 1, twist limits (-3, 3)"
         in printed
     )
-    assert "BallJoint of upper and the world, swings by 1 rad at most, twists from -3 to 3" in printed
     out = tmp_path / "out"
     main(["run", str(scene_file), "-o", str(out), "--quiet"])
     with sp.read_recording(out / "recording.vtkhdf") as recording:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.loads.applied import DragLoad, LoadPattern
+from supple.model.loads.applied import AppliedLoad, DragLoad, LoadPattern
 from supple.model.loads.pressure import area_vectors
 from supple.model.loads.setting import Setting
 from supple.scene.loads.over_time import script_of
@@ -53,10 +53,11 @@ class WindDrag(DragLoad):
     def coefficients(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         towards = self.velocity(time) - v[self.triangles].mean(axis=1)
         facing = np.maximum(-np.einsum("ti,ti->t", area_vectors(x, self.triangles), towards), 0.0)
-        return np.bincount(self.triangles.ravel(), np.repeat(self.factor / 6.0 * facing, 3), len(x))
+        shares = np.repeat(self.factor / 6.0 * facing, 3)
+        return np.bincount(self.triangles.ravel(), shares, len(x)).astype(np.float64, copy=False)
 
 
-def wind_drag(load: Wind, setting: Setting) -> list[WindDrag]:
+def wind_drag(load: Wind, setting: Setting) -> list[AppliedLoad]:
     """The wind on a body of a scene."""
     body = setting.body(load.body)
     triangles = body.triangles[load.triangles(body)] + setting.begins[load.body]

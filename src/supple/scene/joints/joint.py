@@ -94,4 +94,4 @@ def axes_along(axis: ArrayLike | None) -> NDArray[np.float64]:
     e = np.array([1.0, 0.0, 0.0]) if axis is None else np.asarray(axis, dtype=np.float64)
     across = np.cross(e, np.eye(3)[np.argmin(np.abs(e))])
     across /= np.linalg.norm(across)
-    return np.array([e, across, np.cross(e, across)])
+    return np.array([e, across, np.cross(e, across)], dtype=np.float64)

@@ -84,7 +84,7 @@ class OverTimeOf(Form):
     bounds: Number = ANY_NUMBER
     inputs: bool = False
 
-    def checked(self, value: Any, what: str) -> OverTime:
+    def checked(self, value: Any, what: str) -> Any:
         if callable(value) and not isinstance(value, Curve):
             return value
         known = value.values if isinstance(value, Curve) else [_checked(value, what, self.shape)]

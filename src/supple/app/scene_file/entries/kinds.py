@@ -110,4 +110,5 @@ def built(value: Any, meshes: MeshStore) -> Any:
             with at(i):
                 found.append(built(item, meshes))
         return found
-    return value.build(meshes) if isinstance(value, Model) else value
+    build = getattr(value, "build", None)
+    return value if build is None else build(meshes)

@@ -27,7 +27,7 @@ class JointView(Layer):
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         joints = moment.model.joints
-        self._lines = [_lines(joint, _size(moment.model, joint)) for joint in joints]
+        self._lines = [joint_lines(joint, _size(moment.model, joint)) for joint in joints]
         self.nodes = []
         if joints:
             ends = single(joint_segments(moment, self._lines))
@@ -67,7 +67,7 @@ def _size(model: Model, joint: RecordedJoint) -> float:
     return float(np.ptp(model.rest_positions[model.bodies[joint.sides[0]].vertices], axis=0).max())
 
 
-def _lines(joint: RecordedJoint, size: float) -> Sides:
+def joint_lines(joint: RecordedJoint, size: float) -> Sides:
     """Lines (k, 2, 3) that move with the first side, and with the second, in their coordinates."""
     p, holds = joint.point, joint.conditions
     lines: dict[str, list[Any]] = {"first": [(p - _POINT * size * d, p + _POINT * size * d) for d in np.eye(3)]}
