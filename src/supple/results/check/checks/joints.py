@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.recording.actions.joints import RecordedJoint
-from supple.scene.joints.conditions import Function
+from supple.results.recording.actions.joints import RecordedFunction, RecordedJoint
 
 # Largest violations, as a share of the joint's size: of `Implicit`, and of solvers that correct positions step by step.
 _IMPLICIT, _OTHERS = 1e-6, 1e-3
@@ -122,7 +121,9 @@ class _Frame:
         return max(errors), coordinate, strain
 
     @staticmethod
-    def _value(one: Function, vectors: list[NDArray[np.float64]], R: NDArray[np.float64], near: float | None) -> float:
+    def _value(
+        one: RecordedFunction, vectors: list[NDArray[np.float64]], R: NDArray[np.float64], near: float | None
+    ) -> float:
         """The value of a function; R : (3, 3) the rotation of the first side against the second, in the axes."""
         if one.form == "twist":
             about, _, _, w = Rotation.from_matrix(R).as_quat()

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from supple.model.system import System
 from supple.results.checkpoint.typed import Rows
-from supple.scene.joints.conditions import Conditions
+from supple.scene.joints.conditions import Conditions, Function
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
+
+RecordedFunction = Function
 
 # How many vectors a function of each form has, and the names of those of a joint.
 _VECTORS = {"angle": 3, "product": 2, "cosine": 2, "twist": 4}
