@@ -9,12 +9,13 @@ import h5py
 from numpy.typing import NDArray
 
 from supple.results.checkpoint.values import encoded
+from supple.scene.joints.conditions import Function
 
 
 def set_in_scene(file: h5py.File, where: str, value: Any) -> None:
     """Replace a value of the description, such as "joints/0/limits"; of arrays, see `replace_array`."""
     tree, inner, last = _found(file, where)
-    inner[last] = encoded(value, {})[0]
+    inner[last] = encoded(value, {"Function": Function})[0]
     _write(file, tree)
 
 

@@ -10,6 +10,8 @@ from tests.recordings import replace_array, set_in_scene
 import supple as sp
 from supple.results.drawing import pictures, view_of
 from supple.results.export.exporter import export
+from supple.scene.joints.conditions import Function
+from supple.scene.joints.joint import axes_along
 
 FLOOR = sp.HalfSpace(friction=0.3, name="floor")
 POINTS = "VTKHDF/Points"
@@ -233,7 +235,8 @@ def test_a_recording_keeps_its_joints_and_they_hold(jointed):
     assert 0.0 < report["joints"].worst < 1e-6
     with sp.read_recording(jointed) as recording:
         hinge, ball, slider, clamp = recording.joints
-        assert (hinge.name, hinge.kind, hinge.sides, hinge.limits) == ("hinge", "hinge", (0, None), (-0.3, 8.0))
+        assert (hinge.name, hinge.kind, hinge.sides) == ("hinge", "hinge", (0, None))
+        assert hinge.conditions.coordinate.limits == (-0.3, 8.0)
         assert (ball.sides, slider.max_force, clamp.sides) == ((1, 0), 2.0, (3, 4))
         assert recording[-1].report.joints["hinge"].coordinate == pytest.approx(-0.3, abs=1e-6)
 
@@ -266,11 +269,11 @@ def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, wher
     ("number", "key", "value", "where"),
     [
         (2, "max_force", 1e-3, "slider, its motor exceeds its largest effort"),
-        (2, "limits", (-0.1, 0.01), "slider"),
+        (2, "conditions/functions/0/limits", (-0.1, 0.01), "slider"),
         (2, "max_velocity", 1e-3, "slider, its rate"),
-        (2, "axis", np.array([1.0, 1.0, 0.1]), "slider"),
-        (0, "axis", np.array([0.0, 0.1, 1.0]), "hinge"),
-        (1, "limits", (0.0, 0.01), "ball"),
+        (2, "axes", axes_along(np.array([0.6, 0.8, 0.0])), "slider"),
+        (0, "axes", axes_along(np.array([0.0, 0.1, 0.99**0.5])), "hinge"),
+        (1, "conditions/functions", (Function("cosine", ("first.0", "second.0"), (0.0, 0.01)),), "ball"),
     ],
 )
 def test_joints_beyond_their_limits_and_efforts_are_found(jointed, tmp_path, number, key, value, where):
@@ -298,10 +301,13 @@ def with_joint(recording, folder, number, key, value):
     [
         ("sides", (9, None), "joint 'hinge' is not between rigid bodies of the scene"),
         ("sides", (0, 1, 2), "joints/0/sides is not the tuple"),
-        ("kind", "spring", "of an unknown kind"),
-        ("limits", 3, "joints/0/limits is not the tuple"),
-        ("axis", np.zeros(3), "joint 'hinge'"),
-        ("axis", np.array([0.0, np.nan, 1.0]), "joints/0/axis is not finite"),
+        ("kind", 3, "joints/0/kind is '3', not of the type str"),
+        ("conditions/functions/0/limits", 3, "joints/0/conditions/functions/0/limits is not the tuple"),
+        ("conditions/functions/0/form", "spring", "not one that is known"),
+        ("conditions/functions/0/vectors", ("first.1", "third.1", "second.2"), "not one that is known"),
+        ("conditions/parallel", (3,), "not one that is known"),
+        ("axes", np.zeros((3, 3)), "the axes of joint 'hinge' are not perpendicular"),
+        ("axes", np.full((3, 3), np.nan), "joints/0/axes is not finite"),
         ("point", np.zeros(2), r"joints/0/point has shape \(2,\), not \(3,\)"),
     ],
 )

@@ -31,6 +31,7 @@ from supple.results.recording.details import RecordedDetails, RecordedField
 from supple.results.recording.physics import RecordedLaw, RecordedPhysics, RecordedWeld
 from supple.results.recording.sensors import RecordedSensor
 from supple.results.recording.skinned_surface import SkinnedSurface
+from supple.scene.joints.conditions import Conditions, Function
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS, restored_obstacle
 
@@ -170,7 +171,8 @@ class RecordedScene:
 _CLASSES: dict[str, type] = {
     kind.__name__: kind
     for kind in (
-        ActiveTets, Formula, LoadPattern, QuadraticRows, RecordedBody, RecordedCable, RecordedCavity, RecordedDetails,
+        ActiveTets, Conditions, Formula, Function,
+        LoadPattern, QuadraticRows, RecordedBody, RecordedCable, RecordedCavity, RecordedDetails,
         RecordedField, RecordedJoint, RecordedLaw, RecordedObstacle, RecordedPhysics, RecordedScene, RecordedSensor,
         RecordedStitches, RecordedWeld, SkinnedSurface, StitchLaws,
     )
@@ -265,7 +267,7 @@ def _check_consistency(scene: RecordedScene) -> None:
     for joint in scene.joints:
         joint.check(jointed, len(scene.bodies))
     for name, load in scene.loads.items():
-        shape = (len(load.weights), 3) if load.kind == "pressure" else load.weights.shape
+        shape = (len(load.weights), 3) if load.kind in ("pressure", "drag") else load.weights.shape
         inside = not load.vertices.size or 0 <= load.vertices.min() <= load.vertices.max() < n
         if load.weights.ndim != 1 or load.vertices.shape != shape or not inside:
             raise ValueError(f"load {name} does not act on vertices of the scene")

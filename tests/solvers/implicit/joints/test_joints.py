@@ -270,7 +270,7 @@ def test_the_twist_of_a_ball_is_limited_and_the_check_finds_larger_ones(tmp_path
     assert twists[3.0].max() == pytest.approx(0.4, abs=1e-6)
     assert twists[-3.0].min() == pytest.approx(-0.2, abs=1e-6)
     with h5py.File(path, "r+") as file:
-        set_in_scene(file, "joints/0/twist_limits", (-0.1, 0.4))
+        set_in_scene(file, "joints/0/conditions/functions/1/limits", (-0.1, 0.4))
     found = sp.check_recording(path)["joints"]
     assert (found.verdict, found.worst) == ("fail", pytest.approx(0.1, abs=1e-6))
 

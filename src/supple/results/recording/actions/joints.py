@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 
 from supple.model.system import System
 from supple.results.checkpoint.typed import Rows
-from supple.scene.joints.axis_joint import AxisJoint
-from supple.scene.joints.ball_joint import BallJoint
+from supple.scene.joints.conditions import Conditions, Function
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 
-KINDS = ("fixed", "ball", "hinge", "slider")
+RecordedFunction = Function
+
+# How many vectors a function of each form has, and the names of those of a joint.
+_VECTORS = {"angle": 3, "product": 2, "cosine": 2, "twist": 4}
+_NAMES = {"apart", *(f"{side}.{k}" for side in ("first", "second") for k in range(3))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +28,12 @@ class RecordedJoint:
 
     Attributes
     ----------
-    name : of the joint; kind : one of `KINDS`
+    name : of the joint; kind : as scene files write it
     sides : numbers of what it joins: bodies, then obstacles; None for the world
     placed : (2, 3, 4) rotations and translations of the sides where the scene places everything, where the coordinate
         of the joint is zero
-    point, axis : (3,) there, in the world [m], [-]
-    limits : of its coordinate [rad] or [m]; twist_limits : of the twist of a ball [rad]; infinite where there are none
+    point : (3,) there, in the world [m]; axes : (3, 3) unit vectors there (rows), which `conditions` numbers
+    conditions : what it holds and measures
     max_force : of its motor [N m] or [N]; max_velocity : of its coordinate [rad/s] or [m/s]; infinite where there is
         none
     """
@@ -40,11 +43,10 @@ class RecordedJoint:
     sides: tuple[int, int | None]
     placed: Annotated[NDArray[np.float64], Rows(2, 3, 4, finite=True)]
     point: Annotated[NDArray[np.float64], Rows(3, finite=True)]
-    axis: Annotated[NDArray[np.float64], Rows(3, finite=True)]
-    limits: tuple[float, float]
+    axes: Annotated[NDArray[np.float64], Rows(3, 3, finite=True)]
+    conditions: Conditions
     max_force: float
     max_velocity: float
-    twist_limits: tuple[float, float]
 
     def check(self, jointed: Sequence[bool], bodies: int) -> None:
         """Raise `ValueError` where it joins what does not exist or is soft, or a number of it is not finite.
@@ -54,8 +56,13 @@ class RecordedJoint:
         first, second = self.sides
         ends = [first] if second is None else [first, second]
         there = first < bodies and all(0 <= end < len(jointed) and jointed[end] for end in ends)
-        if self.kind not in KINDS or not self.axis.any() or not there:
-            raise ValueError(f"joint {self.name!r} is not between rigid bodies of the scene, or of an unknown kind")
+        holds, upright = self.conditions, np.allclose(self.axes @ self.axes.T, np.eye(3), atol=1e-6)
+        named = {*holds.lines, *(name for one in holds.functions for name in one.vectors)}
+        known = named <= _NAMES and "apart" not in holds.lines and {*holds.parallel} <= {0, 1, 2}
+        if not there or not known or any(len(one.vectors) != _VECTORS.get(one.form) for one in holds.functions):
+            raise ValueError(f"joint {self.name!r} is not between rigid bodies of the scene, or not one that is known")
+        if not upright:
+            raise ValueError(f"the axes of joint {self.name!r} are not perpendicular unit vectors")
 
 
 def joints_of(system: System) -> tuple[RecordedJoint, ...]:
@@ -75,24 +82,9 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
             placed.append(np.column_stack([R, t]))
         first = bodies[joint.first]
         assert isinstance(first, RigidBody)
-        axis = joint.axis if isinstance(joint, AxisJoint | BallJoint) else None
-        ends = (joint.limits if isinstance(joint, AxisJoint) else None) or (-np.inf, np.inf)
-        if isinstance(joint, BallJoint) and joint.max_swing is not None:
-            ends = 0.0, joint.max_swing
-        most = joint.motor.max_force if isinstance(joint, AxisJoint) and joint.motor is not None else None
-        fastest = joint.max_velocity if isinstance(joint, AxisJoint) else None
-        joints.append(
-            RecordedJoint(
-                str(joint.name),
-                joint.kind,
-                (number[joint.first], number.get(joint.second)),
-                np.array(placed),
-                np.asarray(joint.place(first), dtype=np.float64),
-                np.array([1.0, 0.0, 0.0] if axis is None else axis, dtype=np.float64),
-                ends,
-                np.inf if most is None else most,
-                np.inf if fastest is None else fastest,
-                (joint.twist_limits if isinstance(joint, BallJoint) else None) or (-np.inf, np.inf),
-            )
-        )
+        most = [getattr(getattr(joint, "motor", None), "max_force", None), getattr(joint, "max_velocity", None)]
+        sides = number[joint.first], number.get(joint.second)
+        where = np.array(placed), np.asarray(joint.place(first), dtype=np.float64), joint.axes()
+        ends = [np.inf if end is None else float(end) for end in most]
+        joints.append(RecordedJoint(str(joint.name), joint.kind, sides, *where, joint.conditions(), *ends))
     return tuple(joints)
