@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.results.drawing import pictures, view_of
 from supple.results.export.exporter import export
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.surfaces import body_surface
 
 FLOOR = sp.HalfSpace(friction=0.3, name="floor")
 POINTS = "VTKHDF/Points"
@@ -75,11 +76,13 @@ def test_fields_of_soft_bodies_are_in_the_table(tmp_path):
 def test_the_surface_is_drawn(recorded):
     path, frames = recorded
     with sp.read_recording(path) as recording:
-        picture = pictures(recording)[1]
-        np.testing.assert_array_equal(picture.at(recording[-1]), frames[-1].positions["palm"])
-        np.testing.assert_array_equal(picture.triangles, frames[0].system.bodies[1].body.surface.triangles)
+        model = model_of_recording(recording)
+        surface = body_surface(model, model.bodies[1])
+        drawn = surface.at(moment_of_frame(model, recording[-1]))
+        np.testing.assert_allclose(drawn, frames[-1].positions["palm"], rtol=0, atol=1e-13)
+        np.testing.assert_array_equal(surface.triangles, frames[0].system.bodies[1].body.surface.triangles)
         highest = max(frame.positions["palm"][:, 1].max() for frame in recording)
-        assert view_of(recording).high[1] == highest
+        assert model.view.high[1] == highest
 
 
 def test_a_run_goes_on_from_a_recorded_frame_and_from_a_checkpoint(recorded, tmp_path):

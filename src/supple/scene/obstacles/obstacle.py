@@ -42,8 +42,6 @@ class Obstacle(ABC):
 
     file_kind: ClassVar[str]
     """The value of `kind` in scene files."""
-    smooth: ClassVar[bool] = False
-    """Whether the surface is drawn without edges."""
 
     def __post_init__(self) -> None:
         if self.name is not None:
