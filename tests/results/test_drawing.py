@@ -16,7 +16,7 @@ from supple.results.view.surfaces import body_surface, obstacle_surfaces
 from supple.simulate import simulate
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def model(recording):
     return model_of_recording(recording)
 

@@ -56,7 +56,7 @@ class Glb:
         return next(mesh for mesh in self.json["meshes"] if mesh["name"] == name)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def model(recording):
     return model_of_recording(recording)
 

@@ -148,8 +148,7 @@ def test_pages_draw_it(recorded):
         view = ObstacleView(stage, begins)
         assert stage.name == "/obstacles/0 RoundedCube 1"
         assert np.abs(stage.vertices).max() == pytest.approx(0.5, abs=1e-3)
-        assert stage.options["flat_shading"]
-        (handle, _), *_ = view._handles.values()
+        handle, *_ = view.nodes
         view.update(ends)
         np.testing.assert_allclose(handle.position, [0, 0.1 / 3, 0], atol=1e-12)
 

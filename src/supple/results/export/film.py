@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
 
 from supple.errors import OutputError
 from supple.results.view.camera import PRESETS
@@ -56,7 +55,7 @@ class Film:
             raise OutputError(f"export: size is {self.size!r}; give even pixels from {_LEAST} to {_MOST}, as 1280x720")
         for key, most in (("rate", 240.0), ("slow", 1e4)):
             value = getattr(self, key)
-            if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < value <= most:
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value <= most:
                 raise OutputError(f"export: {key} is {value!r}; give a number above zero, at most {most:g}")
-        if self.time is not None and not isinstance(self.time, Real):
+        if self.time is not None and not isinstance(self.time, (int, float)):
             raise OutputError(f"export: time is {self.time!r}; give seconds")

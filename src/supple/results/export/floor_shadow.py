@@ -30,7 +30,7 @@ class FloorShadow:
     ) -> None:
         across = np.eye(3)[int(np.argmin(np.abs(up)))]
         first = np.cross(up, across) / np.linalg.norm(np.cross(up, across))
-        self._axes = np.stack([first, np.cross(up, first)])
+        self._axes: NDArray[np.float64] = np.stack([first, np.cross(up, first)]).astype(np.float64)
         self._up, self._radius, self._half = up, radius, 2.5 * radius
         self._origin = center - float((center - point) @ up) * up
         raised = self._origin + 5e-3 * radius * up  # two surfaces in the same plane flicker

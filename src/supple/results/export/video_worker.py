@@ -19,6 +19,7 @@ from supple.results.recording.reader import Recording, read_recording
 from supple.results.view.camera import eye_of
 from supple.results.view.color_scale import Limits, Range
 from supple.results.view.creases import vertex_normals
+from supple.results.view.fields import Field
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.model import Model, Moment
 from supple.results.view.surfaces import SoftSurface, Surface, surfaces_of
@@ -28,8 +29,8 @@ _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
 _BACKGROUND, _HORIZON = "#e3e8ef", "#fbfcfd"
 # Direction [share of the radius of the scene, across, up, ahead], color and strength of each light.
 _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4), ((0.5, 1.0, -4.0), "#ffffff", 0.25))
-_BODY = {"ambient": 0.28, "diffuse": 0.8, "specular": 0.25, "specular_power": 30}
-_OBSTACLE = {"ambient": 0.7, "diffuse": 0.55, "specular": 0.0}
+_BODY: Any = {"ambient": 0.28, "diffuse": 0.8, "specular": 0.25, "specular_power": 30}
+_OBSTACLE: Any = {"ambient": 0.7, "diffuse": 0.55, "specular": 0.0}
 _SHADOW = (30, 34, 48)
 _SAMPLED = 24  # moments from which the ends of a color scale are found
 
@@ -51,15 +52,10 @@ class Studio:
         for number, flat in enumerate(surfaces_of(model)):
             surface = flat.creased(model)
             mesh = pyvista.PolyData.from_regular_faces(surface.at(moments[0]), surface.triangles)
-            colored = self._field is not None and isinstance(surface, SoftSurface)
             look: dict[str, Any] = {"color": [c / 255.0 for c in surface.color]}
-            if colored and ends is not None:
+            if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = np.zeros(mesh.n_points)
-                title = f"{self._field.name} [{self._field.unit}]" if self._field.unit else self._field.name
-                colors = "coolwarm" if self._field.center is not None else "viridis"
-                bar = {"title": title, "color": "#30343a", "vertical": True, "fmt": "%.3g"}
-                bar |= {"position_x": 0.86, "position_y": 0.2, "width": 0.06, "height": 0.6, "title_font_size": 18}
-                look = {"scalars": "field", "cmap": colors, "clim": ends, "scalar_bar_args": bar}
+                look = _scale(self._field, ends)
             room = getattr(surface, "room", False)
             opacity = 1.0 if room else getattr(surface, "opacity", 1.0)
             actor = plotter.add_mesh(
@@ -69,7 +65,10 @@ class Studio:
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
         self._bodies = self._meshes[: len(model.bodies)]
-        self._shadow, self._floor_actor = self._floor(model, pyvista) if film.shadows else (None, None)
+        floor = self._floor(model, pyvista) if film.shadows else None
+        self._shadow: FloorShadow | None
+        self._floor_actor: Any
+        self._shadow, self._floor_actor = floor or (None, None)
         plotter.show(auto_close=False, interactive=False)  # pyvista renders nothing before
 
     def _add_lights(self, pyvista: Any) -> None:
@@ -91,12 +90,12 @@ class Studio:
         chosen = [moments[i] for i in evenly(len(moments), _SAMPLED)]
         return Limits(self._field, Range()).follow(np.concatenate([self._field.values(moment) for moment in chosen]))
 
-    def _floor(self, model: Model, pyvista: Any) -> tuple[FloorShadow | None, Any]:
+    def _floor(self, model: Model, pyvista: Any) -> tuple[FloorShadow, Any] | None:
         view = model.view
         planes = [one.obstacle.plane for one in model.obstacles]
         floors = [plane for plane in planes if plane is not None and float(plane[1] @ view.up) > 0.99]
         if not floors:
-            return None, None
+            return None
         point, _ = max(floors, key=lambda plane: float(plane[0] @ view.up))
         shadow = FloorShadow(point, view.up, view.center, view.radius)
         mesh = pyvista.PolyData(shadow.corners, np.array([4, 0, 1, 2, 3]))
@@ -147,19 +146,28 @@ class Studio:
         return self._reach
 
 
+def _scale(field: Field, ends: tuple[float, float]) -> dict[str, Any]:
+    """Colors by a field, and their legend."""
+    title = f"{field.name} [{field.unit}]" if field.unit else field.name
+    bar = {"title": title, "color": "#30343a", "vertical": True, "fmt": "%.3g", "title_font_size": 18}
+    bar |= {"position_x": 0.86, "position_y": 0.2, "width": 0.06, "height": 0.6}
+    colors = "coolwarm" if field.center is not None else "viridis"
+    return {"scalars": "field", "cmap": colors, "clim": ends, "scalar_bar_args": bar}
+
+
 def _nodal(moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Values (n, 3), thrice the mean of the tets around each vertex; middle nodes have that of their neighbours."""
     model = moment.model
-    known = np.isfinite(values)
+    known = np.asarray(np.isfinite(values))
     corners, own = model.tets[known].ravel(), np.repeat(values[known], 4)
     n = len(moment.positions)
     total, count = np.bincount(corners, own, minlength=n), np.bincount(corners, minlength=n)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     for body in model.bodies:
         triangles = body.triangles + body.vertices.start
-        unknown = np.isnan(mean[triangles])
+        unknown = np.asarray(np.isnan(mean[triangles]))
         if unknown.any():
-            around = np.nanmean(np.where(unknown.all(axis=1)[:, None], 0.0, mean[triangles]), axis=1)
+            around = np.nanmean(np.where(np.all(unknown, axis=1, keepdims=True), 0.0, mean[triangles]), axis=1)
             rows = triangles[unknown]
             filled = np.bincount(rows, np.repeat(around, unknown.sum(axis=1)), minlength=n)
             times = np.bincount(rows, minlength=n)

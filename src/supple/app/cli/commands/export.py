@@ -57,7 +57,8 @@ def export(
     """
     from supple.results.export.exporter import export as write
 
-    film = {
+    given = {
+        "size": size,
         "rate": rate,
         "slow": slow,
         "camera": camera,
@@ -66,5 +67,5 @@ def export(
         "shadows": shadows,
         "time": time,
     }
-    given = {key: value for key, value in {"size": size, **film}.items() if value is not None}
+    film = {key: value for key, value in given.items() if value is not None}
     print(write(recording_at(recording), to, output, **film))
