@@ -64,6 +64,7 @@ from .scene.joints.fixed_joint import FixedJoint as FixedJoint
 from .scene.joints.motors import ForceMotor as ForceMotor
 from .scene.joints.motors import PositionMotor as PositionMotor
 from .scene.joints.motors import VelocityMotor as VelocityMotor
+from .scene.joints.universal_joint import UniversalJoint as UniversalJoint
 from .scene.joints.weld import Weld as Weld
 from .scene.loads.body_force import BodyForce as BodyForce
 from .scene.loads.growth import Growth as Growth
@@ -71,6 +72,7 @@ from .scene.loads.over_time import Curve as Curve
 from .scene.loads.spring import Spring as Spring
 from .scene.loads.surface_loads import Pressure as Pressure
 from .scene.loads.surface_loads import Traction as Traction
+from .scene.loads.wind import Wind as Wind
 from .scene.motion import Keyframes as Keyframes
 from .scene.obstacles.half_space import HalfSpace as HalfSpace
 from .scene.pins import Pin as Pin

@@ -5,12 +5,15 @@ import json
 import h5py
 import numpy as np
 import pytest
+from tests.recordings import replace_array, set_in_scene
 
 import supple as sp
 from supple.results.export.exporter import export
 from supple.results.view.creases import split_at_creases
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.surfaces import body_surface
+from supple.scene.joints.conditions import Function
+from supple.scene.joints.joint import axes_along
 
 FLOOR = sp.HalfSpace(friction=0.3, name="floor")
 POINTS = "VTKHDF/Points"
@@ -121,10 +124,7 @@ def test_a_soft_body_that_calls_itself_rigid_is_an_error(recorded, tmp_path):
     copy = tmp_path / "wrong.vtkhdf"
     copy.write_bytes(recorded[0].read_bytes())
     with h5py.File(copy, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        header["bodies"][0]["rigid"] = True
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        set_in_scene(file, "bodies/0/rigid", True)
     with pytest.raises(sp.OutputError, match="rigid body 'soft' does not have four vertices and a surface"):
         sp.read_recording(copy)
 
@@ -241,7 +241,8 @@ def test_a_recording_keeps_its_joints_and_they_hold(jointed):
     assert 0.0 < report["joints"].worst < 1e-6
     with sp.read_recording(jointed) as recording:
         hinge, ball, slider, clamp = recording.joints
-        assert (hinge.name, hinge.kind, hinge.sides, hinge.limits) == ("hinge", "hinge", (0, None), (-0.3, 8.0))
+        assert (hinge.name, hinge.kind, hinge.sides) == ("hinge", "hinge", (0, None))
+        assert hinge.conditions.coordinate.limits == (-0.3, 8.0)
         assert (ball.sides, slider.max_force, clamp.sides) == ((1, 0), 2.0, (3, 4))
         assert recording[-1].report.joints["hinge"].coordinate == pytest.approx(-0.3, abs=1e-6)
 
@@ -274,11 +275,11 @@ def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, wher
     ("number", "key", "value", "where"),
     [
         (2, "max_force", 1e-3, "slider, its motor exceeds its largest effort"),
-        (2, "limits", [-0.1, 0.01], "slider"),
+        (2, "conditions/functions/0/limits", (-0.1, 0.01), "slider"),
         (2, "max_velocity", 1e-3, "slider, its rate"),
-        (2, "axis", [1.0, 1.0, 0.1], "slider"),
-        (0, "axis", [0.0, 0.1, 1.0], "hinge"),
-        (1, "limits", [0.0, 0.01], "ball"),
+        (2, "axes", axes_along(np.array([0.6, 0.8, 0.0])), "slider"),
+        (0, "axes", axes_along(np.array([0.0, 0.1, 0.99**0.5])), "hinge"),
+        (1, "conditions/functions", (Function("cosine", ("first.0", "second.0"), (0.0, 0.01)),), "ball"),
     ],
 )
 def test_joints_beyond_their_limits_and_efforts_are_found(jointed, tmp_path, number, key, value, where):
@@ -294,16 +295,28 @@ def with_joint(recording, folder, number, key, value):
     copy = folder / "changed.vtkhdf"
     copy.write_bytes(recording.read_bytes())
     with h5py.File(copy, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        header["physics"]["joints"][number][key] = value
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        if isinstance(value, np.ndarray):
+            replace_array(file, f"joints/{number}/{key}", value)
+        else:
+            set_in_scene(file, f"joints/{number}/{key}", value)
     return copy
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("sides", [9, None]), ("kind", "spring"), ("limits", 3), ("axis", [0, 0, 0]), ("point", ["x"])]
+    ("key", "value", "message"),
+    [
+        ("sides", (9, None), "joint 'hinge' is not between rigid bodies of the scene"),
+        ("sides", (0, 1, 2), "joints/0/sides is not the tuple"),
+        ("kind", 3, "joints/0/kind is '3', not of the type str"),
+        ("conditions/functions/0/limits", 3, "joints/0/conditions/functions/0/limits is not the tuple"),
+        ("conditions/functions/0/form", "spring", "not one that is known"),
+        ("conditions/functions/0/vectors", ("first.1", "third.1", "second.2"), "not one that is known"),
+        ("conditions/parallel", (3,), "not one that is known"),
+        ("axes", np.zeros((3, 3)), "the axes of joint 'hinge' are not perpendicular"),
+        ("axes", np.full((3, 3), np.nan), "joints/0/axes is not finite"),
+        ("point", np.zeros(2), r"joints/0/point has shape \(2,\), not \(3,\)"),
+    ],
 )
-def test_joints_that_make_no_sense_are_an_error(jointed, tmp_path, key, value):
-    with pytest.raises(sp.OutputError, match="its joints are not described as they should be"):
+def test_joints_that_make_no_sense_are_an_error(jointed, tmp_path, key, value, message):
+    with pytest.raises(sp.OutputError, match=message):
         sp.read_recording(with_joint(jointed, tmp_path, 0, key, value))

@@ -114,5 +114,5 @@ def test_invalid_stitches_in_a_recording_are_an_error(recorded, tmp_path):
     path.write_bytes(recorded[0].read_bytes())
     with h5py.File(path, "r+") as file:
         file["supple/stitches/nodes"][0, 0] = 10_000
-    with pytest.raises(sp.OutputError):
+    with pytest.raises(sp.OutputError, match="a stitch joins node 10000 of"):
         sp.read_recording(path)

@@ -63,7 +63,7 @@ def test_repeating_a_rule_is_allowed():
 
 
 BAD = [
-    (lambda: sp.ContactPair("a1", "b"), "contact pair of 'a1' and 'b': it has no effect; give friction=..., or"),
+    (lambda: sp.ContactPair("a1", "b"), "contact pair of 'a1' and 'b': it has no effect; give `friction`, or"),
     (lambda: sp.ContactPair("a1", "b", friction=-1), "friction is -1; it must be zero or more"),
     (lambda: sp.ContactPair("a1", "b", friction=np.nan), "friction is nan; it must be finite"),
     (lambda: sp.ContactPair("a1", "b", friction=0.2, collide=False), "a pair that does not collide; remove one of the"),

@@ -1,8 +1,8 @@
 """A new kind of obstacle needs one class and one call of `register`, and no change of another file."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import h5py
 import numpy as np
@@ -17,11 +17,11 @@ from supple.app.viewer.engine.simulation_loop import SimulationLoop
 from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
+from supple.kinds.forms import POSITIVE
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.layers.obstacles import ObstacleView
 from supple.results.view.surfaces import obstacle_surfaces
 from supple.scene.obstacles.obstacle import Obstacle
-from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.polyhedra import hull, round_ball
 from supple.scene.obstacles.registry import KINDS, register
 
@@ -30,12 +30,17 @@ RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.
 
 @dataclass(frozen=True, eq=False)
 class RoundedCube(Obstacle):
-    """A cube with rounded edges and corners."""
+    """A cube with rounded edges and corners.
 
-    half: float = field(default=0.5, metadata=parameter("positive", "half the edge length, with the rounded parts [m]"))
-    rounding: float = field(default=0.1, metadata=parameter("positive", "radius of the edges [m]"))
+    Parameters
+    ----------
+    half : half the edge length, with the rounded parts [m]; rounding : radius of the edges [m]
+    """
 
-    file_kind: ClassVar[str] = "rounded_cube"
+    half: Annotated[float, POSITIVE] = 0.5
+    rounding: Annotated[float, POSITIVE] = 0.1
+
+    kind: ClassVar[str] = "rounded_cube"
 
     def signed_distance(self, points):
         h = self.half - self.rounding

@@ -115,7 +115,7 @@ BAD_OBSTACLES = [
     (sp.obstacles.Box, {"rotation": "x"}, "rotation is 'x'"),
     (sp.obstacles.Sphere, {"radius": 0}, "radius is 0"),
     (sp.obstacles.Sphere, {"radius": "1"}, "radius is '1'"),
-    (sp.obstacles.TriangleObstacle, {}, "surface is None"),
+    (sp.obstacles.TriangleObstacle, {}, "there is no surface; give surface="),
     (sp.obstacles.TriangleObstacle, {"surface": MESH}, "give a SurfaceMesh"),
 ]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 
 import h5py
@@ -89,13 +88,6 @@ def failures(path, **settings):
 
 def verdicts(path, **settings):
     return {result.name: str(result.verdict) for result in sp.check_recording(path, **settings).results}
-
-
-def set_header(file, change):
-    header = json.loads(file["supple/header"][()])
-    change(header)
-    del file["supple/header"]
-    file["supple/header"] = json.dumps(header)
 
 
 def nan_position(file, n):

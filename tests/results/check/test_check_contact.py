@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.recordings import replace_array, set_in_scene
 
 import supple as sp
 from supple.results.check.surfaces import Surfaces
 
-from .conftest import JELLY, X, failures, octahedron, recorded, set_header
+from .conftest import JELLY, X, failures, octahedron, recorded
 
 CONTACT = ["intersection", "containment", "distance"]
 
@@ -85,7 +86,7 @@ def test_a_body_completely_inside_another(free, corrupted):
 def test_excluded_pairs_are_left_out(free, corrupted):
     def overlap(file, n):
         apart(file, n, 2, -0.1)
-        set_header(file, lambda header: header["physics"].update(untouching=[[1, 0]]))
+        set_in_scene(file, "untouching", ((1, 0),))
 
     assert failures(corrupted(free, overlap), only=CONTACT) == {}
 
@@ -93,21 +94,21 @@ def test_excluded_pairs_are_left_out(free, corrupted):
 def test_vertices_that_may_touch_a_triangle_are_left_out(free, corrupted):
     def touch(file, n, exempt):
         """One vertex of the right block on the middle of a triangle of the left one."""
-        triangles = file["supple/triangles"][:]
-        half = len(triangles) // 2
+        left, right = (file[f"supple/bodies/{k}/triangles"][:] for k in (0, 1))
         x = file[X][2 * n : 3 * n]
         rest = file["supple/rest_positions"][: n // 2]
-        facing = [t for t in range(half) if (rest[triangles[t], 0] == rest[:, 0].max()).all()]
-        vertex = int(triangles[half:].min()) + int(np.argmin(file["supple/rest_positions"][n // 2 :, 0]))
-        x[vertex] = x[triangles[facing[0]]].mean(axis=0) - [1e-6, 0, 0]
+        facing = [row for row in left if (rest[row, 0] == rest[:, 0].max()).all()]
+        vertex = n // 2 + int(right.min()) + int(np.argmin(file["supple/rest_positions"][n // 2 :, 0]))
+        x[vertex] = x[facing[0]].mean(axis=0) - [1e-6, 0, 0]
         file[X][2 * n : 3 * n] = x
         if exempt:
-            stitches = file.create_group("supple/stitches")
-            stitches["nodes"], stitches["weights"] = np.array([[vertex, *triangles[facing[0]]]]), np.full((1, 3), 1 / 3)
-            stitches["anchors"], stitches["anchor_owners"] = np.zeros((0, 3)), np.zeros(0, dtype=int)
-            stitches["rigid_control"], stitches["rigid_weights"] = np.zeros((0, 4), dtype=int), np.zeros((0, 4))
-            stitches["moduli"], stitches["rest_shape_inverse"] = np.zeros((0, 2)), np.zeros((0, 3, 3))
-            stitches["springs"] = np.ones((1, 2))
+            stitch = {
+                "nodes": np.array([[vertex, *facing[0]]], dtype=np.int32),
+                "weights": np.full((1, 3), 1 / 3),
+                "laws/springs": np.ones((1, 2)),
+            }
+            for name, values in stitch.items():
+                replace_array(file, f"stitches/{name}", values)
 
     assert failures(corrupted(free, lambda file, n: touch(file, n, False)), only=["intersection"]) == {
         "intersection": 2

@@ -5,4 +5,5 @@ from .capsule import Capsule as Capsule
 from .cylinder import Cylinder as Cylinder
 from .half_space import HalfSpace as HalfSpace
 from .sphere import Sphere as Sphere
+from .torus import Torus as Torus
 from .triangle_obstacle import TriangleObstacle as TriangleObstacle
