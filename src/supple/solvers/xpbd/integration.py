@@ -8,7 +8,6 @@ substep of 0.2 ms turns the round-off of a position into 7e-11 m/s.
 import numpy as np
 
 from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import serial_and_parallel
 
 BLOCK = 4096
 # Positions beyond this distance [m] are lost, finite or not: round-off is a tenth of a millimetre there.
@@ -34,7 +33,7 @@ def origins_of_components(positions, components, origins):
             origins[i, j] = np.round(sums[k, j] / sums[k, 3] * 1024.0) / 1024.0
 
 
-@njit(cache=True)
+@njit
 def _predict_block(points, previous, velocities, gravity, h, low, high):
     gx, gy, gz = h * gravity[0], h * gravity[1], h * gravity[2]
     for i in range(low, high):
@@ -46,7 +45,7 @@ def _predict_block(points, previous, velocities, gravity, h, low, high):
             points[i, 0], points[i, 1], points[i, 2] = x + h * vx, y + h * vy, z + h * vz
 
 
-@serial_and_parallel
+@njit(cache=True, parallel=True, rows=0)
 def predict(points, previous, velocities, gravity, h):
     """Begin a substep: x_n = x, v += h g, x += h v.
 

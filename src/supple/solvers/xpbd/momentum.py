@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import serial_and_parallel
 
 BLOCK = 2048
 # Of each block: sum m x_n (3), sum m x (3), sum m d (3), sum m x_n x d (3), sum m x x_n^T (9), with d = x - x*.
@@ -68,7 +67,6 @@ class MomentumRestore:
         previous: NDArray[np.float64],
         velocities: NDArray[np.float64],
         h: float,
-        parallel: bool,
     ) -> None:
         """End the internal part of a substep: v = (x - x_n) / h, and both momenta of every free component restored.
 
@@ -81,13 +79,12 @@ class MomentumRestore:
         previous : (n, 3) positions at the beginning of the substep [m].
         velocities : (n, 3) in: used to predict the positions of the substep; out: at its end [m/s].
         h : length of the substep [s].
-        parallel : whether blocks of vertices run on several threads.
         """
         work = self.members, self.blocks, self.totals, self.free, self._sums, self._motion
-        _restore[parallel](points, previous, velocities, h, self.masses, *work)
+        _restore(points, previous, velocities, h, self.masses, *work)
 
 
-@njit(cache=True)
+@njit
 def _sum_block(points, previous, velocities, h, masses, members, low, high, out):
     cx = cy = cz = 0.0
     sx = sy = sz = 0.0
@@ -135,12 +132,12 @@ def _sum_block(points, previous, velocities, h, masses, members, low, high, out)
     out[18], out[19], out[20] = a20, a21, a22
 
 
-@njit(cache=True)
+@njit
 def _cross(a, b):
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-@njit(cache=True)
+@njit
 def _rigid_corrections(blocks, totals, sums, motion):
     """The translation, rotation vector and center of rotation of every component, from the sums of its blocks."""
     b = 0
@@ -180,7 +177,7 @@ def _rigid_corrections(blocks, totals, sums, motion):
                 motion[component, 3 + i] = 0.0
 
 
-@njit(cache=True)
+@njit
 def _move_block(points, velocities, h, members, low, high, motion):
     for k in range(low, high):
         i = members[k]
@@ -196,7 +193,7 @@ def _move_block(points, velocities, h, members, low, high, motion):
         velocities[i, 2] -= dz / h
 
 
-@serial_and_parallel
+@njit(cache=True, parallel=True, rows=0)
 def _restore(points, previous, velocities, h, masses, members, blocks, totals, free, sums, motion):
     for b in prange(len(blocks)):
         _sum_block(points, previous, velocities, h, masses, members, blocks[b, 1], blocks[b, 2], sums[b])

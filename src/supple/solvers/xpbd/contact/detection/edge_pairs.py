@@ -15,7 +15,6 @@ from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 from supple.solvers.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
 from supple.solvers.xpbd.contact.detection.surface_edges import SurfaceEdges
-from supple.solvers.xpbd.sweeps.compilation import serial_and_parallel
 
 
 @njit(cache=True)
@@ -110,7 +109,7 @@ def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
     return meets
 
 
-@serial_and_parallel
+@njit(cache=True, parallel=True, rows=0)
 def pairs_within_margins(
     x,
     margin,
@@ -212,16 +211,13 @@ class EdgePairs:
         """List pairs of pieces (p, p) that may touch in one direction only."""
         self._together[:] = allowed | allowed.T
 
-    def renew(
-        self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], near: tuple, parallel: bool
-    ) -> None:
+    def renew(self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], near: tuple) -> None:
         """List the pairs that may touch before a point has moved too far.
 
         Parameters
         ----------
         x : (n, 3) [m]; motions : two (n,), how far each point may move, absolutely and relative to its piece [m]
         gaps : (n,) the largest gap that each point keeps [m]; near : see `folded_edges`
-        parallel : whether several threads search
         """
         a, b = self.edges.ends.T
         margin, own = (np.maximum(each[a], each[b]) + 0.5 * gaps[a] for each in motions)
@@ -239,7 +235,7 @@ class EdgePairs:
             rules = (self._pieces, self._together, self.edges.ends, self.edges.triangles, *self._stitched)
             room = self._room
             while True:
-                pairs_within_margins[parallel](
+                pairs_within_margins(
                     x, margin, own, self._boxes, folded, *nodes, *rules, room.start, room.counts, room.pairs
                 )
                 if not room.is_too_small():
