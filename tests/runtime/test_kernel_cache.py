@@ -18,6 +18,7 @@ from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
 import supple
+from supple.materials.isotropic import KernelOfKinds
 from supple.runtime import inner_function, kernel_folder
 from supple.runtime.kernel_cache import KernelCache, njit
 from supple.runtime.kernel_folder import TARGET, note_use, read, write
@@ -192,7 +193,8 @@ def test_every_cached_kernel_of_the_package_uses_this_cache():
         if module.name.endswith("__main__"):
             continue
         for value in vars(importlib.import_module(module.name)).values():
-            for kernel in value if isinstance(value, tuple) else (value,):
+            kernels_of = value.of.values() if isinstance(value, KernelOfKinds) else (value,)
+            for kernel in value if isinstance(value, tuple) else kernels_of:
                 for form in kernel.forms if isinstance(kernel, ParallelKernel) else (kernel,):
                     if isinstance(form, Dispatcher) and not isinstance(form._cache, NullCache):
                         assert isinstance(form._cache, KernelCache), form

@@ -6,6 +6,7 @@ substep of 0.2 ms turns the round-off of a position into 7e-11 m/s.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.runtime.kernel_cache import njit, prange
 
@@ -14,23 +15,15 @@ BLOCK = 4096
 FARTHEST = 1e12
 
 
-@njit(cache=True)
-def origins_of_components(positions, components, origins):
-    """The origin (n, 3) of each vertex: the rounded mean of the vertices of its component."""
-    count = 0
-    for i in range(len(components)):
-        count = max(count, components[i] + 1)
-    sums = np.zeros((count, 4))
-    for i in range(len(components)):
-        k = components[i]
-        sums[k, 3] += 1.0
-        for j in range(3):
-            sums[k, j] += positions[i, j]
-    for i in range(len(components)):
-        k = components[i]
-        for j in range(3):
-            # Whole multiples of 1/1024 m: differences with positions within 8,000 km of the origin are then exact.
-            origins[i, j] = np.round(sums[k, j] / sums[k, 3] * 1024.0) / 1024.0
+def origins_of_components(
+    positions: NDArray[np.float64], components: NDArray[np.integer], origins: NDArray[np.float64]
+) -> None:
+    """Write the origin (n, 3) of each vertex: the rounded mean of the vertices of its component."""
+    counts = np.maximum(1, np.bincount(components))
+    for j in range(3):
+        means = np.bincount(components, positions[:, j]) / counts
+        # Whole multiples of 1/1024 m: differences with positions within 8,000 km of the origin are then exact.
+        origins[:, j] = (np.round(means * 1024.0) / 1024.0)[components]
 
 
 @njit

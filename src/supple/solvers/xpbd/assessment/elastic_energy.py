@@ -78,7 +78,8 @@ class ElasticEnergy:
         With what hard constraints can give out in substeps of `h` [s], where that is finite.
         """
         _energies_of_tets(points, self._tets, self._data, 1.0 / h**2, self._of_tets)
-        _energies_of_edges(points, self._edges, self._springs, 1.0 / h**2, self._of_edges)
+        if len(self._edges):
+            _energies_of_edges(points, self._edges, self._springs, 1.0 / h**2, self._of_edges)
         return _sums(self._of_tets, self._tet_starts) + _sums(self._of_edges, self._edge_starts)
 
 

@@ -83,7 +83,7 @@ class EnergyBalance:
         """The most that violated hard constraints can give out [J]."""
         if not self.elastic.has_hard:
             return 0.0
-        soft, both = (self.elastic.of(moment.points, False, h).sum() for h in (math.inf, self._h))
+        soft, both = (self.elastic.of(moment.points, h).sum() for h in (math.inf, self._h))
         return float(both - soft)
 
     def _measure(self, moment: Moment) -> tuple[NDArray[np.float64], float]:

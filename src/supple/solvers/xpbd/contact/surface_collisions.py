@@ -14,7 +14,7 @@ from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.model.system import System
 from supple.runtime.threads import threads_for
-from supple.solvers.xpbd.contact.contact_rows import ContactRows, LoadedRows, choose_rows, deactivate, push_rows
+from supple.solvers.xpbd.contact.contact_rows import ContactRows, LoadedRows, choose_rows, push_rows
 from supple.solvers.xpbd.contact.detection.edge_contacts import (
     find_edge_contacts,
     find_edge_passages,
@@ -168,7 +168,7 @@ class SurfaceCollisions:
         contacts, smallest = 0, np.inf
         self.parted, self.moved = True, False
         self._look_near()
-        deactivate(self._rows.active)
+        self._rows.active[:] = False
         self._chosen = [chosen[:0] for chosen in self._chosen]
         if not self._lists.near and not self._rows.loads:
             return 0, np.inf
@@ -215,6 +215,8 @@ class SurfaceCollisions:
         self._look_again()
         shapes, lists = (self._x, self._begun), self._lists
         passed = np.zeros_like(self._apart)
+        if not self._lists.near:
+            return passed
         note_point_passages(*shapes, lists.near.points, self._pieces, self._apart, self._stitched, passed)
         edges = (lists.pairs, lists.near.edges, lists.edges.arrays[0], self._edge_rules)
         note_edge_passages(*shapes, *edges, passed)
@@ -238,7 +240,8 @@ class SurfaceCollisions:
 
     def end_substep(self) -> None:
         """Keep the share of the forces with which the next substep begins."""
-        note_shares(self._before, self._predicted, self._points, self._rows.described, self._h)
+        if len(self._rows.keys):
+            note_shares(self._before, self._predicted, self._points, self._rows.described, self._h)
         self._rows.keep()
 
     def _look_near(self) -> None:
@@ -293,7 +296,7 @@ class SurfaceCollisions:
         bodies, near = len(self.surfaces.rows), self._least_gap
         described = rows.described
         smallest = np.inf
-        deactivate(rows.active)
+        rows.active[:] = False
         n_active = lists.near.lists[0]
         if n_active:
             shapes = (self._pieces, (self._depth[kind], self._entered, lists.complete))
@@ -353,6 +356,9 @@ class SurfaceCollisions:
     def _find_overlaps(self) -> None:
         """Set how deep each point is inside other pieces, from positions alone."""
         s = self.surfaces
+        self._depth[:] = 0.0
+        if not (s.allowed & ~np.eye(len(s.allowed), dtype=np.bool_)).any():
+            return
         boxes = np.empty((len(s.closed), 3)), np.empty((len(s.closed), 3))
         boxes_of_pieces(self._x, s.point_piece, np.zeros((len(self._x), 1)), *boxes)
         for kind, part in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):

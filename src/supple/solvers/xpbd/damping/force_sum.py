@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import FLAGS, kernel_with
+from supple.runtime.kernel_copies import kernel_with
+from supple.solvers.xpbd.sweeps.compilation import FLAGS
 from supple.solvers.xpbd.sweeps.groups import WIDTH, Groups
 
 
