@@ -19,7 +19,7 @@ from numba.core.dispatcher import Dispatcher
 
 import supple
 from supple.materials.isotropic import KernelOfKinds
-from supple.runtime import inner_function, kernel_folder
+from supple.runtime import inner_function, kernel_cache, kernel_folder
 from supple.runtime.kernel_cache import KernelCache, njit
 from supple.runtime.kernel_folder import TARGET, note_use, read, write
 from supple.runtime.parallel_kernel import ParallelKernel
@@ -276,6 +276,17 @@ def doubled(x):
 @njit(cache=True)
 def doubled_twice(x):
     return doubled(doubled(x))
+
+
+def test_the_log_says_that_kernels_are_compiled_and_not_that_they_are_loaded(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(kernel_folder, "kernel_folder", lambda: tmp_path)
+    caplog.set_level("INFO", "supple")
+    kernel_cache._announce.cache_clear()
+    for announced in (True, False):  # the second kernel is loaded
+        assert njit(cache=True)(doubled_twice.py_func)(1.5) == 6.0
+        assert [record.message.startswith("compiling kernels") for record in caplog.records] == [True] * announced
+        caplog.clear()
+        kernel_cache._announce.cache_clear()
 
 
 def test_a_function_that_kernels_call_can_be_called_from_python_too():

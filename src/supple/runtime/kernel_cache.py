@@ -12,7 +12,7 @@ import logging
 import pickle
 import sys
 from contextlib import suppress
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -194,7 +194,8 @@ class KernelCache(_Cache):
 
     def _tell(self, stage: str, sig: Any) -> None:
         if stage == "compiling":
-            logger.info("compiling %s, once on this machine", self.name)
+            _announce()
+            logger.debug("compiling %s", self.name)
         for watcher in WATCHERS:
             watcher(stage, self.name, sig)
 
@@ -212,6 +213,11 @@ class KernelCache(_Cache):
     def _code(self) -> bytes:
         # A kernel may call what is defined below it, so that the digest waits for the first call.
         return reached_code(self._kernel)
+
+
+@cache  # once per process
+def _announce() -> None:
+    logger.info("compiling kernels, once on this machine; `supple warm` does so beforehand")
 
 
 def _rebuilt(content: bytes | None, target_context: Any) -> Any:
