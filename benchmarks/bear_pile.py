@@ -27,7 +27,6 @@ from benchmarks.our_beam import peak_megabytes
 from benchmarks.published import publish
 from benchmarks.table import Table
 from supple.results.check.checker import check_recording
-from supple.results.check.settings import CheckSettings
 from supple.solvers.implicit.details import ImplicitDetails
 
 COUNTS = (5, 10, 20, 50, 100)
@@ -97,7 +96,7 @@ def one(count: int) -> dict[str, Any]:
             tets = len(frame.system.tets)
             begin = time.process_time()
         peak = peak_megabytes()
-        checked = check_recording(path, CheckSettings(only=("intersection", "inversion", "containment", "obstacles")))
+        checked = check_recording(path, only=("intersection", "inversion", "containment", "obstacles"))
     return {
         "tets": tets,
         "steps": counts,

@@ -30,7 +30,7 @@ def scene(kind: str, edge: float, path: sp.Keyframes | None = None) -> sp.Scene:
     places = {"lower": ((0, -HEIGHT, 0), None), "upper": ((0, HEIGHT, 0), path)}
     if kind == "obstacles":
         plates = [
-            sp.TriangleObstacle(
+            sp.obstacles.TriangleObstacle(
                 sp.SurfaceMesh(PLATE.vertices + place, PLATE.triangles), friction=0.3, motion=motion, name=name
             )
             for name, (place, motion) in places.items()

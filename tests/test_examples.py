@@ -83,7 +83,7 @@ def test_every_scene_file_loads(path):
 
 
 def test_the_study_of_the_slope_follows_coulomb_s_law(tmp_path):
-    table = sp.load_study(EXAMPLES / "studies" / "slope.yaml").run(tmp_path, workers=1)
+    table = sp.studies.load_study(EXAMPLES / "studies" / "slope.yaml").run(tmp_path, workers=1)
     # s = (g sin 30 - mu g cos 30) t^2 / 2 after one second, and nothing where tan 30 is less than mu
     expected = [max(0.0, 0.5 * (4.905 - mu * 8.495709)) for mu in table["obstacles.slope.friction"]]
     assert table["slid"] == pytest.approx(expected, rel=0.03, abs=2e-3)

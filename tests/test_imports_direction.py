@@ -27,6 +27,7 @@ LAYERS = (
     ("model",),
     ("scene",),
     ("mesh", "materials"),
+    ("kinds",),
     ("numerics",),
     ("runtime",),
     ("errors",),

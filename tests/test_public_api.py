@@ -47,6 +47,22 @@ def test_every_public_name_exists(name):
     assert name in dir(sp)
 
 
+@pytest.mark.parametrize("space", ["obstacles", "studies"])
+def test_every_name_of_a_space_exists(space):
+    names = getattr(sp, space).__all__
+    assert len(names) > 5
+    assert all(getattr(getattr(sp, space), name) is not None for name in names)
+
+
+def test_there_are_at_most_ninety_names():
+    assert len(sp.__all__) <= 90
+
+
+def test_an_obstacle_has_also_a_short_name_that_is_not_listed():
+    assert sp.Box is sp.obstacles.Box  # pyright: ignore[reportAttributeAccessIssue]
+    assert "Box" not in dir(sp)
+
+
 def test_unknown_names_are_attribute_errors():
     with pytest.raises(AttributeError, match="No supple attribute Bodyy"):
         sp.Bodyy  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]

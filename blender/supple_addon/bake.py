@@ -21,6 +21,8 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 import supple as sp
+from supple.errors import MeshingError
+from supple.mesh.skin import Embedding
 
 # Vertices of Blender's mesh that a vertex of the tets follows: enough to determine a rotation on most meshes.
 _GUIDES = 12
@@ -66,7 +68,7 @@ def bake(job: dict[str, Any], folder: Path) -> dict[str, Any]:
     return {"summary": f"{count} frames of {len(bodies)} bodies, {tets} tets", "warnings": bad}
 
 
-def _body(described: dict[str, Any], folder: Path, dt: float) -> tuple[sp.Body, sp.Pin | None, sp.Embedding]:
+def _body(described: dict[str, Any], folder: Path, dt: float) -> tuple[sp.Body, sp.Pin | None, Embedding]:
     """A soft body, the pin of its vertex group, and Blender's vertices in its tets."""
     with np.load(folder / described["arrays"]) as arrays:
         vertices, triangles, pinned, path = (arrays[key] for key in ("vertices", "triangles", "pinned", "path"))
@@ -74,8 +76,8 @@ def _body(described: dict[str, Any], folder: Path, dt: float) -> tuple[sp.Body, 
     surface = sp.SurfaceMesh(vertices, triangles)
     try:
         mesh = sp.tetrahedralize(surface.compact(), tets=described["tets"], repair=described["repair"])
-    except sp.MeshingError as error:
-        raise sp.MeshingError(f"{name}: {error}") from None
+    except MeshingError as error:
+        raise MeshingError(f"{name}: {error}") from None
     material = sp.StableNeoHookean(
         youngs=described["youngs"],
         poisson=described["poisson"],
@@ -83,7 +85,7 @@ def _body(described: dict[str, Any], folder: Path, dt: float) -> tuple[sp.Body, 
         damping=described["damping"],
     )
     body = sp.Body(name, mesh, material, friction=described["friction"])
-    skin = sp.Embedding.of(mesh, vertices)
+    skin = Embedding.of(mesh, vertices)
     if not pinned.any():
         return body, None, skin
     chosen = np.flatnonzero(pinned[KDTree(vertices).query(mesh.vertices)[1]])
@@ -118,7 +120,7 @@ def carried(points: NDArray[np.float64], path: NDArray[np.float64]) -> NDArray[n
     return out
 
 
-def _obstacle(described: dict[str, Any], folder: Path, dt: float) -> sp.TriangleObstacle:
+def _obstacle(described: dict[str, Any], folder: Path, dt: float) -> sp.obstacles.TriangleObstacle:
     with np.load(folder / described["arrays"]) as arrays:
         surface = sp.SurfaceMesh(arrays["vertices"], arrays["triangles"])
         shifts, turns = arrays["path"] - arrays["path"][0], Rotation.from_matrix(arrays["turns"]).as_rotvec()
@@ -126,7 +128,9 @@ def _obstacle(described: dict[str, Any], folder: Path, dt: float) -> sp.Triangle
     still = np.abs(shifts).max() == 0.0 and np.abs(turns).max() < 1e-6  # of matrices in single precision
     times = dt * np.arange(len(shifts))
     motion = None if still else sp.Keyframes(times, shifts, pivot=pivot, rotations=turns)
-    return sp.TriangleObstacle(surface=surface, name=described["name"], friction=described["friction"], motion=motion)
+    return sp.obstacles.TriangleObstacle(
+        surface=surface, name=described["name"], friction=described["friction"], motion=motion
+    )
 
 
 def _motion(shifts: NDArray[np.float64], dt: float) -> Callable[[float], NDArray[np.float64]]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-STUB = Path(__file__).parents[2] / "src" / "supple" / "__init__.pyi"
+PACKAGE = Path(__file__).parents[2] / "src" / "supple"
+# Public names that are packages, and have public names of their own.
+SPACES = ("obstacles", "studies")
 
 # Page, title, and the parts of the package whose public names it has. The longest part that fits decides.
 API = (
@@ -35,8 +37,21 @@ RETURNED = {
 
 
 def public_names() -> dict[str, str]:
-    """By public name, the module below `supple` that it is from."""
-    tree = ast.parse(STUB.read_text(encoding="utf-8"))
+    """By public name, such as `Body` and `studies.Grid`, the module below `supple` that it is from."""
+    top = _names_of(PACKAGE)
+    homes = {space: f"{top.pop(space)}.{space}" for space in SPACES}
+    inner = {
+        f"{space}.{name}": f"{home}.{module}"
+        for space, home in homes.items()
+        for name, module in _names_of(PACKAGE.joinpath(*home.split("."))).items()
+        if name not in top
+    }
+    return top | inner
+
+
+def _names_of(package: Path) -> dict[str, str]:
+    """By public name of a package, the module within it that it is from."""
+    tree = ast.parse((package / "__init__.pyi").read_text(encoding="utf-8"))
     return {
         alias.asname or alias.name: str(node.module)
         for node in tree.body

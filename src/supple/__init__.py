@@ -4,14 +4,28 @@ Everything public is here: `import supple as sp`. The names are listed in `__ini
 when the name is first used, so that the import of `supple` is quick.
 """
 
+from typing import Any
+
 import lazy_loader
 
 from .runtime.displayed import supply
 
 __version__ = "0.1.0"
-__getattr__, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_listed, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __all__ += ["__version__"]
-supply(player="supple.results.player:player_of", progress="supple.results.progress:ProgressBar")
+_OBSTACLES = ("Box", "Capsule", "Cylinder", "Sphere", "TriangleObstacle")
+supply(
+    check="supple.results.check.checker:check_recording",
+    export="supple.results.export.exporter:export",
+    player="supple.results.player:player_of",
+    plot="supple.results.plots:Plot",
+    progress="supple.results.progress:ProgressBar",
+)
+
+
+def __getattr__(name: str) -> Any:
+    # `sp.Box` is short for `sp.obstacles.Box`. It is not listed, because a box can also be a body: `sp.shapes.box`.
+    return getattr(_listed("obstacles"), name) if name in _OBSTACLES else _listed(name)
 
 
 def __dir__() -> list[str]:

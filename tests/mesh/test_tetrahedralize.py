@@ -25,6 +25,7 @@ from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
 from supple.mesh.shapes import box_surface
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
+from supple.runtime.memory import limit_process
 
 SPHERE = sphere_surface(radius=0.5, edge_length=0.15)
 SMALL = sphere_surface(radius=0.2, edge_length=0.15)
@@ -347,7 +348,7 @@ def test_an_interrupt_ends_the_child(tmp_path: Path) -> None:
 
 def test_a_missing_memory_limit_is_a_log_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "resource", None)  # as on Windows
-    assert "no memory limit" in mesher_worker.limit_process(10.0, 2**30)[0]
+    assert "no memory limit" in limit_process(10.0, 2**30)[0]
 
 
 def test_two_threads_can_mesh_at_once() -> None:

@@ -89,13 +89,13 @@ def small_scene(divisions: int = 2, material=None) -> sp.Scene:
         ],
         obstacles=[
             sp.HalfSpace(),
-            sp.Sphere(center=(0.5, 0.3, 2.0), radius=0.3),
-            sp.Box(
+            sp.obstacles.Sphere(center=(0.5, 0.3, 2.0), radius=0.3),
+            sp.obstacles.Box(
                 center=(-1.0, 0.5, 0.0),
                 size=(0.5, 1.0, 0.5),
                 motion=sp.Keyframes(times=[0.0, 1.0], displacements=[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
             ),
-            sp.TriangleObstacle(surface=octahedron(0.2, (2.0, 2.0, 0.5))),
+            sp.obstacles.TriangleObstacle(surface=octahedron(0.2, (2.0, 2.0, 0.5))),
         ],
     )
 

@@ -72,8 +72,8 @@ def test_obstacles_that_would_hide_the_bodies_are_transparent(tmp_path, tools):
             sp.HalfSpace(name="floor"),
             sp.HalfSpace(name="wall", point=(0, 0, 2), normal=(0, 0, -1)),
             sp.HalfSpace(name="lid", point=(0, 2, 0), normal=(0, -1, 0)),
-            sp.Box(name="room", center=(0.5, 0.5, 0.5), size=(3, 3, 3), inside=True),
-            sp.Sphere(name="ball", center=(5, 0, 0)),
+            sp.obstacles.Box(name="room", center=(0.5, 0.5, 0.5), size=(3, 3, 3), inside=True),
+            sp.obstacles.Sphere(name="ball", center=(5, 0, 0)),
         ],
     )
     path = tmp_path / "walls.vtkhdf"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import shutil
@@ -11,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from tests.recordings import set_in_scene
 
 from supple.errors import OutputError
 from supple.model.state import Status
@@ -18,14 +18,8 @@ from supple.results.export.exporter import export
 from supple.results.recording.reader import read_recording
 
 
-def _header(**changes):
-    def change(file):
-        header = json.loads(file["supple/header"][()])
-        header.update(changes)
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
-
-    return change
+def _scene(where, value):
+    return lambda file: set_in_scene(file, where, value)
 
 
 def _set(path, value):
@@ -47,7 +41,7 @@ def _claim_many_rows(file):
 
 
 def _far_triangle(file):
-    file["supple/triangles"][0, 0] = 10_000
+    file["supple/bodies/0/triangles"][0, 0] = 10_000
 
 
 def _delete(path):
@@ -64,44 +58,40 @@ def _of_format(version):
     return change
 
 
-def _swap_bodies(file):
-    header = json.loads(file["supple/header"][()])
-    header["bodies"][0]["vertices"] = [0, 10_000]
-    del file["supple/header"]
-    file["supple/header"] = json.dumps(header)
-
-
 DAMAGES = {
     "more frames than rows": (_set("supple/frames_written", np.int64(26)), "26 frames need"),
     "no frames": (_set("supple/frames_written", np.int64(0)), "number of frames is 0"),
     "negative frames": (_set("supple/frames_written", np.int64(-3)), "number of frames is -3"),
     "huge count": (_set("supple/frames_written", np.int64(1 << 62)), "frames need"),
-    "huge array": (_claim_many_values, "has shape"),
+    "huge array": (_claim_many_values, "claims more data than the file can contain"),
     "huge rest shape": (_claim_many_rows, "claims more data than the file can contain"),
     "triangle out of range": (_far_triangle, "points to row 10000"),
-    "rows out of range": (_swap_bodies, "outside of 54 vertices"),
+    "rows out of range": (_scene("bodies/0/vertices", slice(0, 10_000)), "outside of 54 vertices"),
+    "rows of another body": (_scene("bodies/0/vertices", slice(0, 2)), "points to row"),
     "no header": (_delete("supple/header"), "supple/header is missing"),
-    "header is no JSON": (_set("supple/header", "{"), "header is not the expected JSON"),
+    "header is no JSON": (_set("supple/header", "{"), "its description of the scene"),
     "header is a number": (_set("supple/header", 3.0), "is no text"),
-    "no bodies": (_header(bodies=[]), "no bodies"),
-    "no time step": (_header(dt=0.0), "no time step"),
-    "bodies are no list of bodies": (_header(bodies=[1, 2]), "bodies in its header"),
-    "obstacles are none": (_header(obstacles=[{}]), "obstacles in its header"),
+    "header is deep": (_set("supple/header", '{"tuple": [' * 60 + "]}" * 60), "nested too deeply"),
+    "header of another class": (_set("supple/header", '{"class": "System", "fields": {}}'), "'System'"),
+    "no bodies": (_scene("bodies", ()), "no bodies"),
+    "no time step": (_scene("dt", 0.0), "no time step"),
+    "time step of text": (_scene("dt", "1"), "dt is '1', not of the type float"),
+    "bodies are no bodies": (_scene("bodies", (1, 2)), "bodies/0 is '1', not of the type RecordedBody"),
+    "obstacles are none": (_scene("obstacles", (None,)), "obstacles/0 is 'None'"),
     "obstacles of no known kind": (
-        _header(obstacles=[{"name": "x", "kind": "Cone", "parameters": {}}]),
-        "obstacle 'x' is of an unknown kind, 'Cone'; register",
+        _scene("obstacles/0/kind", "Cone"),
+        "is of an unknown kind, 'Cone'; register",
     ),
-    "obstacles with impossible numbers": (
-        _header(obstacles=[{"name": "x", "kind": "Sphere", "parameters": {"radius": -1}}]),
-        "obstacles in its header",
-    ),
+    "obstacles with impossible numbers": (_scene("obstacles/1/parameters/radius", -1), "radius"),
+    "a skin of integers": (_set("supple/bodies/0/skin/weights", np.zeros((1, 4), dtype=int)), "holds int64, not float"),
+    "an array that is missing": (_delete("supple/tets"), "supple/tets is missing"),
     "no points": (_delete("VTKHDF/Points"), "VTKHDF/Points is missing"),
     "points of text": (_set("VTKHDF/Points", "here"), "has shape"),
     "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),
     "times are not finite": (_set("supple/frames/time", np.full(25, np.nan)), "time is not finite"),
     "unknown status": (_set("supple/frames/status", np.full(25, len(Status), dtype=np.uint8)), "another version"),
-    "newer format": (_of_format(99), "another version (format 99, this one reads 3); simulate it again"),
-    "earlier format": (_of_format(2), "another version (format 2, this one reads 3); simulate it again"),
+    "newer format": (_of_format(99), "another version (format 99, this one reads 4); simulate it again"),
+    "earlier format": (_of_format(3), "another version (format 3, this one reads 4); simulate it again"),
     "another program's": (_delete("supple"), "a VTKHDF UnstructuredGrid of another program"),
 }
 

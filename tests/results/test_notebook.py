@@ -103,6 +103,20 @@ def test_a_player_draws_in_a_notebook_s_output(shown, browser, pixels, tmp_path)
     assert red > 100, "the first body, which is red, was not drawn"
 
 
+def test_a_recording_has_its_check_its_plot_and_its_exports(recorded, shown, tmp_path):
+    recording = shown["Recording"]
+    report = recording.check(only=["inversion", "sequence"])
+    assert str(report) == str(sp.check_recording(recorded[0], only=["inversion", "sequence"]))
+    assert [result.name for result in report.results] == ["sequence", "inversion"]
+    assert "pass: " in report._repr_html_()
+    plot = recording.plot()
+    assert plot._repr_png_().startswith(b"\x89PNG")
+    assert plot.save(tmp_path / "p.pdf").read_bytes().startswith(b"%PDF")
+    assert recording.export("csv", tmp_path / "t.csv").read_text().startswith("frame,time,status")
+    with pytest.raises(OutputError, match="no format 'mp5'"):
+        recording.export("mp5")
+
+
 @pytest.mark.parametrize("height", [0, 99, 5000, 300.5, True, "300"])
 def test_a_height_that_cannot_be_is_an_error(shown, height):
     with pytest.raises(OutputError, match="show: height is"):

@@ -119,8 +119,8 @@ def test_the_check_finds_a_fold_between_positive_corners(made, tmp_path):
 @pytest.mark.parametrize(
     ("name", "change", "expected"),
     [
-        ("rows", lambda rows: rows - 1, "do not have the corners"),
-        ("rows", lambda rows: rows[::-1], "ascending order"),
+        ("rows", lambda rows: rows - 1, "not ascending rows of its tets, with their corners"),
+        ("rows", lambda rows: rows[::-1], "not ascending rows of its tets"),
         ("nodes", lambda nodes: nodes + 1000, "points to row"),
     ],
 )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, fields, replace
 
 import h5py
 import numpy as np
 import pytest
+from tests.recordings import set_in_scene
 
 import supple as sp
 from supple.errors import OutputError
@@ -30,7 +30,7 @@ def touching_scene() -> sp.Scene:
         ],
         obstacles=[
             sp.HalfSpace(friction=0.5),
-            sp.Box(name="table", center=(0.2, 0.05, 0.0), size=(0.2, 0.1, 0.2), friction=0.3),
+            sp.obstacles.Box(name="table", center=(0.2, 0.05, 0.0), size=(0.2, 0.1, 0.2), friction=0.3),
         ],
         pins=[sp.Pin("held", [0, 1], name="nail"), sp.Pin("held", [2])],
     )
@@ -111,27 +111,12 @@ def test_details_of_an_unknown_class_are_recorded_as_those_of_the_known_base(tmp
         assert recording[-1].report.details == XPBDDetails(7, 0.5)
 
 
-def _described(change):
-    def damage(header):
-        change(header["details"])
-
-    return damage
-
-
-def _rename(details):
-    details["fields"][0]["name"] = "colour"
-
-
-def _retype(details):
-    details["fields"][0]["dtype"] = "O"
-
-
 DAMAGES = {
-    "unknown kind": (_described(lambda details: details.update(kind="os.system")), "are not described"),
-    "no fields": (_described(lambda details: details.pop("fields")), "are not described"),
-    "unknown field": (_described(_rename), "another version"),
-    "unknown type": (_described(_retype), "are not described"),
-    "no mapping": (lambda header: header.update(details=3), "are not described"),
+    "unknown kind": ("details/kind", "os.system", "fields that are not known here"),
+    "no fields": ("details/fields", 3, "details/fields is not the tuple"),
+    "unknown field": ("details/fields/0/name", "colour", "fields that are not known here"),
+    "unknown type": ("details/fields/0/dtype", "O", "dtype is 'O', not one of"),
+    "no mapping": ("details", 3, "details is '3', not of the type RecordedDetails"),
 }
 
 
@@ -139,12 +124,9 @@ DAMAGES = {
 def test_a_damaged_description_is_one_line(tmp_path, tools, damage):
     path = tmp_path / "r.vtkhdf"
     tools.record(path, 1)
-    change, text = DAMAGES[damage]
+    where, value, text = DAMAGES[damage]
     with h5py.File(path, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        change(header)
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        set_in_scene(file, where, value)
     with pytest.raises(OutputError, match=text) as caught:
         read_recording(path)
     assert "\n" not in str(caught.value)

@@ -70,12 +70,12 @@ def test_the_solver_of_the_simulation_is_recorded(tmp_path, tools):
 def test_every_kind_of_obstacle_reads_back_equal(tmp_path, tools):
     obstacles = [
         sp.HalfSpace(name="floor", point=(0.1, -1, 0), normal=(0.1, 1, 0.2), friction=0.3),
-        sp.Box(center=(9, 0, 0), size=(1, 2, 3), rotation=(0.3, -0.2, 0.1)),
-        sp.Box(size=(99, 99, 99), inside=True),
-        sp.Sphere(center=(0, 9, 0), radius=0.3),
-        sp.Capsule(start=(0, 0, 9), end=(0.1, 0.2, 9.3), radius=0.2),
-        sp.Cylinder(start=(0, 0, -9), end=(1, 0.2, -9), radius=0.7, friction=0.1),
-        sp.TriangleObstacle(surface=tools.octahedron(0.2, (2.0, 2.0, 9.5))),
+        sp.obstacles.Box(center=(9, 0, 0), size=(1, 2, 3), rotation=(0.3, -0.2, 0.1)),
+        sp.obstacles.Box(size=(99, 99, 99), inside=True),
+        sp.obstacles.Sphere(center=(0, 9, 0), radius=0.3),
+        sp.obstacles.Capsule(start=(0, 0, 9), end=(0.1, 0.2, 9.3), radius=0.2),
+        sp.obstacles.Cylinder(start=(0, 0, -9), end=(1, 0.2, -9), radius=0.7, friction=0.1),
+        sp.obstacles.TriangleObstacle(surface=tools.octahedron(0.2, (2.0, 2.0, 9.5))),
     ]
     scene = sp.Scene([sp.Body("cube", tools.box(), sp.EdgesAndVolume(density=1000.0))], obstacles)
     path = tmp_path / "kinds.vtkhdf"

@@ -5,10 +5,13 @@ import json
 import h5py
 import numpy as np
 import pytest
+from tests.recordings import replace_array, set_in_scene
 
 import supple as sp
 from supple.results.drawing import pictures, view_of
 from supple.results.export.exporter import export
+from supple.scene.joints.conditions import Function
+from supple.scene.joints.joint import axes_along
 
 FLOOR = sp.HalfSpace(friction=0.3, name="floor")
 POINTS = "VTKHDF/Points"
@@ -117,10 +120,7 @@ def test_a_soft_body_that_calls_itself_rigid_is_an_error(recorded, tmp_path):
     copy = tmp_path / "wrong.vtkhdf"
     copy.write_bytes(recorded[0].read_bytes())
     with h5py.File(copy, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        header["bodies"][0]["rigid"] = True
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        set_in_scene(file, "bodies/0/rigid", True)
     with pytest.raises(sp.OutputError, match="rigid body 'soft' does not have four vertices and a surface"):
         sp.read_recording(copy)
 
@@ -209,7 +209,9 @@ def jointed_scene():
     bar = sp.shapes.box_surface((0.2, 0.02, 0.02), (1, 1, 1))
     places = {"a": (0.1, 0, 0), "b": (0.3, 0, 0), "c": (0, 0.5, 0), "d": (0.6, 0.5, 0)}
     bodies = [sp.RigidBody(name, bar, density=1000.0, position=place) for name, place in places.items()]
-    wheel = sp.Sphere(radius=0.1, center=(0.7, 0.8, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0]))
+    wheel = sp.obstacles.Sphere(
+        radius=0.1, center=(0.7, 0.8, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0])
+    )
     motor = sp.PositionMotor(0.05, stiffness=50.0, damping=5.0, max_force=2.0)
     joints = [
         sp.HingeJoint("a", point=(0, 0, 0), limits=(-0.3, 8.0), name="hinge"),
@@ -233,7 +235,8 @@ def test_a_recording_keeps_its_joints_and_they_hold(jointed):
     assert 0.0 < report["joints"].worst < 1e-6
     with sp.read_recording(jointed) as recording:
         hinge, ball, slider, clamp = recording.joints
-        assert (hinge.name, hinge.kind, hinge.sides, hinge.limits) == ("hinge", "hinge", (0, None), (-0.3, 8.0))
+        assert (hinge.name, hinge.kind, hinge.sides) == ("hinge", "hinge", (0, None))
+        assert hinge.conditions.coordinate.limits == (-0.3, 8.0)
         assert (ball.sides, slider.max_force, clamp.sides) == ((1, 0), 2.0, (3, 4))
         assert recording[-1].report.joints["hinge"].coordinate == pytest.approx(-0.3, abs=1e-6)
 
@@ -256,7 +259,7 @@ def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, wher
     with h5py.File(copy, "r+") as file:
         rows = slice(4 * "abcd".index(body), 4 * "abcd".index(body) + 4)
         file[POINTS][rows] = change(file[POINTS][rows])
-    found = sp.check_recording(copy, sp.CheckSettings(only=["joints"]))["joints"]
+    found = sp.check_recording(copy, only=["joints"])["joints"]
     assert (found.failed_frames, found.first_failure) == (1, 0)
     assert found.where.startswith(where)
     assert found.worst == pytest.approx(worst, rel=1e-3)
@@ -266,17 +269,17 @@ def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, wher
     ("number", "key", "value", "where"),
     [
         (2, "max_force", 1e-3, "slider, its motor exceeds its largest effort"),
-        (2, "limits", [-0.1, 0.01], "slider"),
+        (2, "conditions/functions/0/limits", (-0.1, 0.01), "slider"),
         (2, "max_velocity", 1e-3, "slider, its rate"),
-        (2, "axis", [1.0, 1.0, 0.1], "slider"),
-        (0, "axis", [0.0, 0.1, 1.0], "hinge"),
-        (1, "limits", [0.0, 0.01], "ball"),
+        (2, "axes", axes_along(np.array([0.6, 0.8, 0.0])), "slider"),
+        (0, "axes", axes_along(np.array([0.0, 0.1, 0.99**0.5])), "hinge"),
+        (1, "conditions/functions", (Function("cosine", ("first.0", "second.0"), (0.0, 0.01)),), "ball"),
     ],
 )
 def test_joints_beyond_their_limits_and_efforts_are_found(jointed, tmp_path, number, key, value, where):
     """The recording is left as it is, and what it says about a joint changed."""
     changed = with_joint(jointed, tmp_path, number, key, value)
-    report = sp.check_recording(changed, sp.CheckSettings(only=["joints"]))
+    report = sp.check_recording(changed, only=["joints"])
     assert not report.ok
     assert report["joints"].where == where
 
@@ -286,16 +289,28 @@ def with_joint(recording, folder, number, key, value):
     copy = folder / "changed.vtkhdf"
     copy.write_bytes(recording.read_bytes())
     with h5py.File(copy, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        header["physics"]["joints"][number][key] = value
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        if isinstance(value, np.ndarray):
+            replace_array(file, f"joints/{number}/{key}", value)
+        else:
+            set_in_scene(file, f"joints/{number}/{key}", value)
     return copy
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("sides", [9, None]), ("kind", "spring"), ("limits", 3), ("axis", [0, 0, 0]), ("point", ["x"])]
+    ("key", "value", "message"),
+    [
+        ("sides", (9, None), "joint 'hinge' is not between rigid bodies of the scene"),
+        ("sides", (0, 1, 2), "joints/0/sides is not the tuple"),
+        ("kind", 3, "joints/0/kind is '3', not of the type str"),
+        ("conditions/functions/0/limits", 3, "joints/0/conditions/functions/0/limits is not the tuple"),
+        ("conditions/functions/0/form", "spring", "not one that is known"),
+        ("conditions/functions/0/vectors", ("first.1", "third.1", "second.2"), "not one that is known"),
+        ("conditions/parallel", (3,), "not one that is known"),
+        ("axes", np.zeros((3, 3)), "the axes of joint 'hinge' are not perpendicular"),
+        ("axes", np.full((3, 3), np.nan), "joints/0/axes is not finite"),
+        ("point", np.zeros(2), r"joints/0/point has shape \(2,\), not \(3,\)"),
+    ],
 )
-def test_joints_that_make_no_sense_are_an_error(jointed, tmp_path, key, value):
-    with pytest.raises(sp.OutputError, match="its joints are not described as they should be"):
+def test_joints_that_make_no_sense_are_an_error(jointed, tmp_path, key, value, message):
+    with pytest.raises(sp.OutputError, match=message):
         sp.read_recording(with_joint(jointed, tmp_path, 0, key, value))

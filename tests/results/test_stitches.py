@@ -24,7 +24,7 @@ def scene():
         sp.SoftVertexTriangleStitch("low", "sheet", max_distance=0.0101, youngs=1e4, poisson=0.3),
         sp.VertexEdgeStitch("high", "low", max_distance=0.0201, stiffness=10.0),
     ]
-    return sp.Scene(bodies, [sp.TriangleObstacle(name="sheet", surface=SHEET, motion=up)], stitches=stitches)
+    return sp.Scene(bodies, [sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET, motion=up)], stitches=stitches)
 
 
 @pytest.fixture(scope="module")
@@ -114,5 +114,5 @@ def test_invalid_stitches_in_a_recording_are_an_error(recorded, tmp_path):
     path.write_bytes(recorded[0].read_bytes())
     with h5py.File(path, "r+") as file:
         file["supple/stitches/nodes"][0, 0] = 10_000
-    with pytest.raises(sp.OutputError):
+    with pytest.raises(sp.OutputError, match="a stitch joins node 10000 of"):
         sp.read_recording(path)

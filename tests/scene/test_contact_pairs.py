@@ -12,7 +12,7 @@ CUBE = sp.shapes.box(divisions=(1, 1, 1))
 
 def scene(*pairs):
     bodies = [sp.Body(name, CUBE, RUBBER, friction=mu) for name, mu in (("a1", 0.4), ("a2", 0.9), ("b", 0.0))]
-    obstacles = [sp.HalfSpace(friction=0.3, name="floor"), sp.Sphere(friction=0.7)]
+    obstacles = [sp.HalfSpace(friction=0.3, name="floor"), sp.obstacles.Sphere(friction=0.7)]
     return sp.Scene(bodies, obstacles, contact_pairs=pairs)
 
 
@@ -63,7 +63,7 @@ def test_repeating_a_rule_is_allowed():
 
 
 BAD = [
-    (lambda: sp.ContactPair("a1", "b"), "contact pair of 'a1' and 'b': it has no effect; give friction=..., or"),
+    (lambda: sp.ContactPair("a1", "b"), "contact pair of 'a1' and 'b': it has no effect; give `friction`, or"),
     (lambda: sp.ContactPair("a1", "b", friction=-1), "friction is -1; it must be zero or more"),
     (lambda: sp.ContactPair("a1", "b", friction=np.nan), "friction is nan; it must be finite"),
     (lambda: sp.ContactPair("a1", "b", friction=0.2, collide=False), "a pair that does not collide; remove one of the"),

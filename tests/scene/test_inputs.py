@@ -66,7 +66,7 @@ def test_a_gripper_closes_until_it_feels_a_force():
     """Two plates press on a cube, each by a step a frame, until the force on one of them is above 2 N."""
     cube = sp.Body("cube", MESH, SOFT, friction=0.5)
     left, right = (
-        sp.Box(center=(x, 0, 0), size=(0.04, 0.2, 0.2), friction=0.5, motion=sp.MotionInput(name), name=name)
+        sp.obstacles.Box(center=(x, 0, 0), size=(0.04, 0.2, 0.2), friction=0.5, motion=sp.MotionInput(name), name=name)
         for name, x in (("left", -0.08), ("right", 0.08))
     )
     scene = sp.Scene([cube], obstacles=[left, right], gravity=(0, 0, 0))

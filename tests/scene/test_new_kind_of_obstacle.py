@@ -1,8 +1,8 @@
 """A new kind of obstacle needs one class and one call of `register`, and no change of another file."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import h5py
 import numpy as np
@@ -17,11 +17,11 @@ from supple.app.viewer.engine.simulation_loop import SimulationLoop
 from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
+from supple.kinds.forms import POSITIVE
 from supple.results.drawing import obstacle_pictures, view_of
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.layers.obstacles import ObstacleView
 from supple.scene.obstacles.obstacle import Obstacle
-from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.polyhedra import hull, round_ball
 from supple.scene.obstacles.registry import KINDS, register
 
@@ -30,12 +30,17 @@ RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.
 
 @dataclass(frozen=True, eq=False)
 class RoundedCube(Obstacle):
-    """A cube with rounded edges and corners."""
+    """A cube with rounded edges and corners.
 
-    half: float = field(default=0.5, metadata=parameter("positive", "half the edge length, with the rounded parts [m]"))
-    rounding: float = field(default=0.1, metadata=parameter("positive", "radius of the edges [m]"))
+    Parameters
+    ----------
+    half : half the edge length, with the rounded parts [m]; rounding : radius of the edges [m]
+    """
 
-    file_kind: ClassVar[str] = "rounded_cube"
+    half: Annotated[float, POSITIVE] = 0.5
+    rounding: Annotated[float, POSITIVE] = 0.1
+
+    kind: ClassVar[str] = "rounded_cube"
 
     def signed_distance(self, points):
         h = self.half - self.rounding
@@ -104,8 +109,8 @@ def test_a_recording_restores_it(recorded):
 
 def test_the_checker_finds_penetration_and_containment(recorded, tmp_path):
     path, _ = recorded
-    settings = sp.CheckSettings(only=["obstacles", "containment"])
-    report = sp.check_recording(path, settings)
+    only = ["obstacles", "containment"]
+    report = sp.check_recording(path, only=only)
     assert report["containment"].verdict == "pass"
     assert report["obstacles"].worst > -1e-4
     copy = tmp_path / "copy.vtkhdf"
@@ -115,7 +120,7 @@ def test_the_checker_finds_penetration_and_containment(recorded, tmp_path):
         x = file["VTKHDF/Points"][3 * n : 4 * n]
         file["VTKHDF/Points"][3 * n : 4 * n] = x - [0.0, 0.05, 0.0]
         file["VTKHDF/Points"][5 * n : 6 * n] = 20 * (x - x.mean(axis=0))
-    report = sp.check_recording(copy, settings)
+    report = sp.check_recording(copy, only=only)
     assert report["obstacles"].first_failure == 3
     assert report["containment"].where == "RoundedCube 1 in cube"
 
@@ -124,7 +129,8 @@ def test_the_checker_finds_penetration_and_containment(recorded, tmp_path):
 def test_exports_contain_it(recorded, tmp_path, kind):
     path, _ = recorded
     output = tmp_path / ("rounded" if kind == "obj" else f"rounded.{kind}")
-    sp.export(path, to=kind, output=output)
+    with sp.read_recording(path) as recording:
+        recording.export(kind, output)
     files = sorted(output.iterdir()) if output.is_dir() else [output]
     assert b"RoundedCube" in files[0].read_bytes() or kind == "html"
     assert files[0].stat().st_size > 10_000

@@ -19,11 +19,11 @@ def rails(kind, tilt=0.0, **obstacle):
 
 HEIGHT = np.sqrt(0.6**2 - 0.52**2)  # of a ball's center that lies between the bars
 SUPPORTS = {
-    "capsules": (rails(sp.Capsule), HEIGHT),
-    "cylinders": (rails(sp.Cylinder), HEIGHT),
-    "end of a cylinder": ([sp.Cylinder(start=(0, -1, 0), end=(0, 0, 0), radius=0.5)], 0.1),
-    "room of a cylinder": ([sp.Cylinder(start=(0, 0, 0), end=(0, 1, 0), radius=0.4, inside=True)], 0.1),
-    "room of a capsule": ([sp.Capsule(start=(0, 0.5, -1), end=(0, 0.5, 1), radius=0.5, inside=True)], 0.1),
+    "capsules": (rails(sp.obstacles.Capsule), HEIGHT),
+    "cylinders": (rails(sp.obstacles.Cylinder), HEIGHT),
+    "end of a cylinder": ([sp.obstacles.Cylinder(start=(0, -1, 0), end=(0, 0, 0), radius=0.5)], 0.1),
+    "room of a cylinder": ([sp.obstacles.Cylinder(start=(0, 0, 0), end=(0, 1, 0), radius=0.4, inside=True)], 0.1),
+    "room of a capsule": ([sp.obstacles.Capsule(start=(0, 0.5, -1), end=(0, 0.5, 1), radius=0.5, inside=True)], 0.1),
 }
 
 
@@ -46,7 +46,7 @@ def test_a_ball_comes_to_rest(support, solver):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("kind", [sp.Capsule, sp.Cylinder])
+@pytest.mark.parametrize("kind", [sp.obstacles.Capsule, sp.obstacles.Cylinder])
 def test_a_ball_slides_along_bars_without_friction(kind, solver):
     tilt, steps = 0.2, 30
     normal, along = np.array([0, np.cos(tilt), np.sin(tilt)]), np.array([0, -np.sin(tilt), np.cos(tilt)])
@@ -63,7 +63,7 @@ def test_a_ball_slides_along_bars_without_friction(kind, solver):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("kind", [sp.Capsule, sp.Cylinder])
+@pytest.mark.parametrize("kind", [sp.obstacles.Capsule, sp.obstacles.Cylinder])
 def test_a_ball_rolls_along_bars_with_friction(kind, solver):
     """Rolling without slipping: a ball of radius R on contacts at height h = R HEIGHT / .6 below its center turns at
     v / h and has the acceleration g sin(tilt) / (1 + 2/5 (R / h)^2)."""
@@ -95,7 +95,7 @@ def test_a_ball_rolls_along_bars_with_friction(kind, solver):
 def test_turning_rollers_carry_a_plate(solver):
     """Friction carries a plate at the surface speed of the rollers below it."""
     rollers = [
-        sp.Cylinder(
+        sp.obstacles.Cylinder(
             start=(x, -0.2, -1),
             end=(x, -0.2, 1),
             radius=0.2,
@@ -114,7 +114,7 @@ def test_turning_rollers_carry_a_plate(solver):
 def test_thin_bars_support_a_coarse_body_in_xpbd():
     """No vertex of the body is near the bar: points of its axis support the faces."""
     soft = sp.EdgesAndVolume(edge_compliance=5e-5, volume_compliance=0.0, density=1000, damping=0.01)
-    for kind in (sp.Capsule, sp.Cylinder):
+    for kind in (sp.obstacles.Capsule, sp.obstacles.Cylinder):
         bar = kind(start=(-1, -0.03, 0.02), end=(1, -0.03, 0.02), radius=0.03)
         body = sp.Body(
             "b", sp.shapes.box((0.4, 0.1, 0.4), (1, 1, 1)), soft, position=(0, 0.055, 0), velocity=(0, -1, 0)

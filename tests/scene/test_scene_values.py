@@ -110,13 +110,13 @@ BAD_OBSTACLES = [
     (sp.HalfSpace, {"friction": np.inf}, "friction is inf"),
     (sp.HalfSpace, {"motion": 3}, "motion is 3"),
     (sp.HalfSpace, {"name": "a:b"}, "a name is at most"),
-    (sp.Box, {"size": (1, 0, 1)}, "every edge must be above zero"),
-    (sp.Box, {"size": (1, 1)}, r"size has shape \(2,\)"),
-    (sp.Box, {"rotation": "x"}, "rotation is 'x'"),
-    (sp.Sphere, {"radius": 0}, "radius is 0"),
-    (sp.Sphere, {"radius": "1"}, "radius is '1'"),
-    (sp.TriangleObstacle, {}, "surface is None"),
-    (sp.TriangleObstacle, {"surface": MESH}, "give a SurfaceMesh"),
+    (sp.obstacles.Box, {"size": (1, 0, 1)}, "every edge must be above zero"),
+    (sp.obstacles.Box, {"size": (1, 1)}, r"size has shape \(2,\)"),
+    (sp.obstacles.Box, {"rotation": "x"}, "rotation is 'x'"),
+    (sp.obstacles.Sphere, {"radius": 0}, "radius is 0"),
+    (sp.obstacles.Sphere, {"radius": "1"}, "radius is '1'"),
+    (sp.obstacles.TriangleObstacle, {}, "there is no surface; give surface="),
+    (sp.obstacles.TriangleObstacle, {"surface": MESH}, "give a SurfaceMesh"),
 ]
 
 
@@ -156,7 +156,7 @@ BAD_SCENES = [
     ({"bodies": [body(), body()]}, "body 'cube' and body 'cube' have the same name; give each"),
     ({"obstacles": [sp.Pin("cube", [0])]}, r"obstacles\[0\] is a Pin; give a Obstacle"),
     (
-        {"obstacles": [sp.HalfSpace(name="floor"), sp.Sphere(name="floor")]},
+        {"obstacles": [sp.HalfSpace(name="floor"), sp.obstacles.Sphere(name="floor")]},
         "obstacle 'floor' and obstacle 'floor' have the same name",
     ),
     ({"obstacles": [sp.HalfSpace(name="cube")]}, "body 'cube' and obstacle 'cube' have the same name; give each body"),
@@ -179,14 +179,17 @@ def test_bad_scenes(changes, words):
 def test_unnamed_obstacles_get_their_kind_and_number():
     floor, wall = sp.HalfSpace(), sp.HalfSpace(friction=0.5)
     named = sp.HalfSpace(name="HalfSpace 2")
-    scene = sp.Scene([body()], [floor, wall, sp.Sphere(), named])
+    scene = sp.Scene([body()], [floor, wall, sp.obstacles.Sphere(), named])
     assert [o.name for o in scene.obstacles] == ["HalfSpace 1", "HalfSpace 3", "Sphere 1", "HalfSpace 2"]
     assert [o.friction for o in scene.obstacles] == [0.0, 0.5, 0.0, 0.0]
     assert floor.name is None
 
 
 def test_unnamed_obstacles_get_a_name_that_no_body_has():
-    scene = sp.Scene([body(name="HalfSpace 1"), body(name="Sphere 2")], [sp.HalfSpace(), sp.Sphere(), sp.Sphere()])
+    scene = sp.Scene(
+        [body(name="HalfSpace 1"), body(name="Sphere 2")],
+        [sp.HalfSpace(), sp.obstacles.Sphere(), sp.obstacles.Sphere()],
+    )
     assert [o.name for o in scene.obstacles] == ["HalfSpace 2", "Sphere 1", "Sphere 3"]
 
 
@@ -224,4 +227,4 @@ def test_obstacle_poses_follow_functions_and_keyframes():
     lift = sp.HalfSpace(motion=lambda t: (0, 2 * t, 0))
     np.testing.assert_allclose(lift.pose(1.5)[1], [0, 3, 0])
     with pytest.raises(sp.SceneError, match="shape"):
-        sp.Sphere(motion=lambda t: np.zeros((8, 3))).pose(0.0)
+        sp.obstacles.Sphere(motion=lambda t: np.zeros((8, 3))).pose(0.0)

@@ -202,15 +202,15 @@ def test_welds_of_scene_files(tmp_path):
         assert len(scene.welding) == 4
         assert scene.welds[0].name == "Weld 1"
     path.write_text(SCENE.replace("1e-4}", "1e-4, box: {low: [0, 0, 0], high: [1, 1, 1]}}"))
-    with pytest.raises(sp.SceneError, match=r"scene.yaml:10: welds\[0\]: give the vertices by one of"):
+    with pytest.raises(sp.SceneError, match=r"scene.yaml:10: welds\[0\].box: weld of .*: give the vertices by one of"):
         sp.load_scene(path)
 
 
 @pytest.mark.parametrize(
     ("make", "problem"),
     [
-        (lambda: sp.Weld("beam", "cube"), "give its vertices by either `vertices` or `max_distance`"),
-        (lambda: sp.Weld("beam", "cube", [0], 0.1), "give its vertices by either `vertices` or `max_distance`"),
+        (lambda: sp.Weld("beam", "cube"), "give the vertices by one of `vertices`, `box` and `max_distance`"),
+        (lambda: sp.Weld("beam", "cube", [0], 0.1), "give the vertices by one of `vertices`, `box` and `max_distance`"),
         (lambda: sp.Weld("beam", "cube", max_distance=-1), "max_distance is -1; it must be above zero"),
         (lambda: welded(sp.Weld("bean", "cube", [0])), "there is no body 'bean'; did you mean 'beam'?"),
         (lambda: welded(sp.Weld("cube", "beam", [0])), "body 'cube' is rigid; a weld is of a soft body to a rigid"),

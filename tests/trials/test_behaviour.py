@@ -98,7 +98,7 @@ def test_ten_boxes_stand_on_each_other() -> None:
 
 
 def test_a_box_rides_on_an_obstacle_that_moves() -> None:
-    lift = sp.Box(
+    lift = sp.obstacles.Box(
         name="lift",
         center=(0, -0.05, 0),
         size=(0.4, 0.1, 0.4),

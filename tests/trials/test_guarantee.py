@@ -44,14 +44,16 @@ def heap() -> sp.Scene:
         at = np.array([0.0, 0.06, 0.0]) + 0.085 * np.array([k % 2 - 0.5, k // 4, k // 2 % 2 - 0.5])
         at += generator.normal(scale=0.001, size=3)
         bodies.append(sp.Body(f"ball{k}", ball, material(1e5), position=at, velocity=(0, -1.0, 0)))
-    return sp.Scene(bodies=bodies, obstacles=[sp.Sphere(name="bowl", center=(0, 0.3, 0), radius=0.3, inside=True)])
+    return sp.Scene(
+        bodies=bodies, obstacles=[sp.obstacles.Sphere(name="bowl", center=(0, 0.3, 0), radius=0.3, inside=True)]
+    )
 
 
 def on_triangles() -> sp.Scene:
     """A box falls onto the edge of a wedge."""
     points = np.array([[-0.2, 0, -0.2], [0.2, 0, -0.2], [0.2, 0, 0.2], [-0.2, 0, 0.2], [0, 0.1, -0.2], [0, 0.1, 0.2]])
     faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 5], [0, 5, 4], [1, 4, 5], [1, 5, 2], [0, 4, 1], [3, 2, 5]])
-    wedge = sp.TriangleObstacle(name="wedge", surface=sp.SurfaceMesh(points, faces), friction=0.3)
+    wedge = sp.obstacles.TriangleObstacle(name="wedge", surface=sp.SurfaceMesh(points, faces), friction=0.3)
     box = shapes.box((0.1, 0.1, 0.1), (3, 3, 3))
     return sp.Scene(
         bodies=[sp.Body("box", box, material(), position=(0.01, 0.16, 0), velocity=(0, -3, 0))], obstacles=[wedge]
@@ -60,7 +62,9 @@ def on_triangles() -> sp.Scene:
 
 def pushed() -> sp.Scene:
     """A box obstacle drives into a ball at 2 m/s."""
-    pusher = sp.Box(name="pusher", center=(-0.12, 0, 0), size=(0.1, 0.1, 0.1), motion=lambda t: ((2.0 * t, 0, 0)))
+    pusher = sp.obstacles.Box(
+        name="pusher", center=(-0.12, 0, 0), size=(0.1, 0.1, 0.1), motion=lambda t: ((2.0 * t, 0, 0))
+    )
     ball = sp.Body("ball", shapes.sphere(0.05, 0.02), material())
     return sp.Scene(bodies=[ball], obstacles=[pusher], gravity=(0, 0, 0))
 
@@ -78,7 +82,7 @@ def pinned() -> sp.Scene:
 def squeezed() -> sp.Scene:
     """Two obstacles meet where a ball is."""
     walls = [
-        sp.Box(
+        sp.obstacles.Box(
             name=name, center=(side * 0.11, 0, 0), size=(0.1, 0.2, 0.2), motion=lambda t, s=side: (-s * 2.0 * t, 0, 0)
         )
         for name, side in (("left", -1.0), ("right", 1.0))

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.mesh.io.cells import FormatError
+from supple.mesh.io import abaqus
+from supple.mesh.io.cells import FormatError, MeshFile, tets_of
 from supple.mesh.io.file_contents import file_contents
-from supple.mesh.io.models import abaqus_sets, gmsh_groups
-from supple.mesh.io.models.named_sets import NamedSets
+from supple.mesh.io.libraries.meshio import read_msh
 from supple.runtime.displayed import Displayed
 
-_READERS: dict[str, Callable[[bytes], NamedSets]] = {".inp": abaqus_sets.read, ".msh": gmsh_groups.read}
+_READERS: dict[str, Callable[[bytes], MeshFile]] = {".inp": abaqus.read, ".msh": read_msh}
 SETS_EXTENSIONS = tuple(_READERS)
 
 
@@ -105,15 +105,16 @@ def read_sets(path: str | Path) -> MeshSets:
     data = file_contents(path)
     try:
         found = reader(data)
+        tets = tets_of(found.soup)
     except FormatError as error:
         where = f"{path}:{error.line}" if error.line is not None else str(path)
         raise MeshError(f"{where}: {error.reason}") from None
-    used = np.zeros(found.node_count, dtype=bool)
-    used[found.tets] = True
+    used = np.zeros(len(found.soup.points), dtype=bool)
+    used[tets] = True
     place = np.cumsum(used) - 1
     of_nodes = {name: place[rows[used[rows]]].astype(np.int32) for name, rows in found.node_sets.items()}
     of_tets = {name: rows.astype(np.int32) for name, rows in found.tet_sets.items()}
     for name, rows in of_tets.items():
-        of_nodes.setdefault(name, place[np.unique(found.tets[rows])].astype(np.int32))
+        of_nodes.setdefault(name, place[np.unique(tets[rows])].astype(np.int32))
     vertices = {name: rows for name, rows in of_nodes.items() if len(rows)}
-    return MeshSets(vertices, of_tets, len(found.tets))
+    return MeshSets(vertices, of_tets, len(tets))

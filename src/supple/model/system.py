@@ -24,6 +24,7 @@ from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.build import actuators_of
 from supple.model.loads.applied import ActiveLoad, AppliedLoad, DeadLoad
 from supple.model.loads.build import applied, applied_force
+from supple.model.loads.setting import Setting
 from supple.model.state import State
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
@@ -243,7 +244,8 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     begins = {part.name: part.vertices.start for part in ranges}
     forces = [_applied_force(force, next(part for part in ranges if part.name == force.body)) for force in scene.forces]
     x_start = start_states[0].positions
-    given = [applied(load, scene.bodies, begins, all_masses, x_start) for load in scene.loads]
+    setting = Setting(scene.bodies, begins, all_masses, x_start)
+    given = [applied(load, setting) for load in scene.loads]
     return System(
         scene=scene,
         bodies=tuple(ranges),

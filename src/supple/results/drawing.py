@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.recording.frame import RecordedFrame
-from supple.results.recording.reader import Recording, read_recording
+from supple.results.recording.reader import Recording
 from supple.results.recording.scene import RecordedBody, RecordedObstacle
 
 # Colors that can also be distinguished with color blindness (after Okabe and Ito, brightened).
@@ -199,11 +197,6 @@ def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDAr
     )
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), [0.0, 1.0, 0.0])
-
-
-def opened(recording: Recording | str | Path) -> AbstractContextManager[Recording]:
-    """The recording itself if it is open, otherwise one that is opened for this block."""
-    return nullcontext(recording) if isinstance(recording, Recording) else read_recording(recording)
 
 
 def evenly(recording: Sequence[RecordedFrame], most: int) -> list[RecordedFrame]:

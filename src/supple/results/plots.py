@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.drawing import body_color, opened
-from supple.results.recording.reader import Recording
+from supple.results.drawing import body_color
+from supple.results.recording.reader import Recording, opened
 from supple.runtime.figures import MOST_ENTRIES, legend_below, paper_figure, spans_decades
 
 STITCH_LINE = "#c77700"
@@ -22,6 +24,36 @@ _MAPPINGS = {
     "cable_length": "length of cables [m]",
 }
 _AXES = (("x", "#d1495b"), ("y", "#3a7d44"), ("z", "#30638e"))
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """What a recording has measured over time, which a notebook shows as the output of a cell.
+
+    Attributes
+    ----------
+    recording : that is plotted; it must be open
+    """
+
+    recording: Recording
+
+    def __repr__(self) -> str:
+        return (
+            f"Plot of {self.recording.path.name}: the last line of a notebook's cell shows it; save('p.png') writes it"
+        )
+
+    def _repr_png_(self) -> bytes:
+        with tempfile.TemporaryDirectory() as folder:
+            return self.save(Path(folder, "plot.png")).read_bytes()
+
+    def save(self, path: str | Path) -> Path:
+        """Write the plot to a PNG, PDF or SVG file.
+
+        Raises
+        ------
+        OutputError : where it cannot be written.
+        """
+        return plot_recording(self.recording, path)
 
 
 def plot_recording(recording: Recording | str | Path, output: str | Path) -> Path:

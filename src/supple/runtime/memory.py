@@ -1,4 +1,4 @@
-"""How much memory this process can still use, and a clear refusal of what would need more."""
+"""How much memory this process can still use, a clear refusal of what would need more, and the limits of a child."""
 
 from __future__ import annotations
 
@@ -119,3 +119,38 @@ def _lines(path: Path) -> list[str]:
         return path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError):
         return []
+
+
+def end_with_parent(parent: int) -> None:
+    """Let the system kill this process when its parent, of this number, ends, even while a mesher runs; on Linux."""
+    if not sys.platform.startswith("linux"):
+        return
+    import ctypes
+    import signal
+
+    set_parent_death_signal = 1  # PR_SET_PDEATHSIG of <linux/prctl.h>
+    ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
+    if os.getppid() != parent:  # it ended before
+        os._exit(1)
+
+
+def limit_process(cpu_seconds: float, memory_limit: int | None) -> list[str]:
+    """Limit this process's memory and CPU time where the platform can; returns a note where it cannot.
+
+    Where the system does not end this process with its parent, the limit on CPU time does after a while.
+    """
+    try:
+        import resource
+    except ImportError:
+        return ["this platform has no memory limit for processes" if memory_limit is not None else ""]
+    notes = []
+    for kind, limit in ((resource.RLIMIT_CPU, cpu_seconds), (resource.RLIMIT_AS, memory_limit)):
+        if limit is None:
+            continue
+        hard = resource.getrlimit(kind)[1]
+        soft = int(limit) if hard == resource.RLIM_INFINITY else min(int(limit), hard)
+        try:
+            resource.setrlimit(kind, (soft, hard))
+        except (ValueError, OSError) as error:
+            notes.append(f"the system does not allow a limit of {soft} for this process: {error}")
+    return notes

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import check_name, finite_vector, float_array, non_negative
 from supple.materials.material import Material
 from supple.materials.per_tet import NO_REGION
 from supple.mesh.quadratic import node_volumes
@@ -20,7 +21,6 @@ from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.closed_surface import require_closed
 from supple.scene.rotation import rotation_matrix
-from supple.scene.values import check_name, finite_vector, float_array, non_negative
 
 
 class PlacedBody(ABC):

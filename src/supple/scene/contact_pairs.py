@@ -5,23 +5,41 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import NON_NEGATIVE, Flag, Form
+from supple.kinds.kind import Kind
 from supple.scene.body import PlacedBody
 from supple.scene.joints.joint import Joint
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.suggestion import suggestion
-from supple.scene.values import non_negative
+
+
+@dataclass(frozen=True)
+class NameList(Form):
+    """A name, or a list of names, which may have `*` and `?`."""
+
+    def checked(self, value: Any, what: str) -> tuple[str, ...]:
+        try:
+            names = (value,) if isinstance(value, str) else tuple(value)
+        except TypeError:
+            raise SceneError(f"{what} is {value!r}; give a name or a list of names") from None
+        if not names:
+            raise SceneError(f"{what} is empty; give a name or a list of names")
+        for name in names:
+            if not isinstance(name, str) or not name:
+                raise SceneError(f"{what} holds {name!r}; give names of bodies and obstacles")
+        return names
 
 
 @dataclass(frozen=True, eq=False)
-class ContactPair:
+class ContactPair(Kind):
     """A rule for the contact of two bodies, of a body and an obstacle, or of a body with itself.
 
     Parameters
@@ -37,22 +55,19 @@ class ContactPair:
     SceneError : where a value is of the wrong kind, or the rule has no effect.
     """
 
-    first: str | Sequence[str]
-    second: str | Sequence[str]
-    friction: float | None = None
-    collide: bool = True
+    kind: ClassVar[str] = "contact_pair"
+
+    first: Annotated[str | Sequence[str], NameList()]
+    second: Annotated[str | Sequence[str], NameList()]
+    friction: Annotated[float | None, NON_NEGATIVE] = None
+    collide: Annotated[bool, Flag()] = True
 
     def __post_init__(self) -> None:
-        for key in ("first", "second"):
-            object.__setattr__(self, key, _names(getattr(self, key), key))
-        if not isinstance(self.collide, bool):
-            raise SceneError(f"{self.label}: collide is {self.collide!r}; give True or False")
-        if self.friction is not None:
-            object.__setattr__(self, "friction", non_negative(self.friction, f"{self.label}: friction"))
-            if not self.collide:
-                raise SceneError(f"{self.label}: friction of a pair that does not collide; remove one of the two")
-        elif self.collide:
-            raise SceneError(f"{self.label}: it has no effect; give friction=..., or collide=False")
+        super().__post_init__()
+        if self.friction is not None and not self.collide:
+            raise SceneError(f"{self.label}: friction of a pair that does not collide; remove one of the two")
+        if self.friction is None and self.collide:
+            raise SceneError(f"{self.label}: it has no effect; give `friction`, or `collide` as false")
 
     @property
     def label(self) -> str:
@@ -156,20 +171,6 @@ def _found(pair: ContactPair, key: str, names: list[str]) -> list[int]:
     return sorted(numbers)
 
 
-def _names(value: object, key: str) -> tuple[str, ...]:
-    names = (value,) if isinstance(value, str) else value
-    try:
-        names = tuple(names)  # pyright: ignore[reportArgumentType]
-    except TypeError:
-        raise SceneError(f"contact pair: {key} is {value!r}; give a name or a list of names") from None
-    if not names:
-        raise SceneError(f"contact pair: {key} is empty; give a name or a list of names")
-    for name in names:
-        if not isinstance(name, str) or not name:
-            raise SceneError(f"contact pair: {key} holds {name!r}; give names of bodies and obstacles")
-    return names
-
-
 def _matches(pattern: str, name: str) -> bool:
     """Whether a name matches. Names contain no `*` and no `?`; they may contain `[`, which is not a pattern here."""
     if "*" in pattern or "?" in pattern:
@@ -177,6 +178,6 @@ def _matches(pattern: str, name: str) -> bool:
     return pattern == name
 
 
-def _listed(names: str | Sequence[str]) -> str:
-    names = (names,) if isinstance(names, str) else names
+def _listed(given: object) -> str:
+    names = tuple(given) if isinstance(given, (tuple, list)) else (given,)
     return ", ".join(map(repr, names[:3])) + (", ..." if len(names) > 3 else "")

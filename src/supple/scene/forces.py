@@ -4,15 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.scene.motion import Motion, check_motion
-from supple.scene.selection import OnVertices, Selection
-from supple.scene.values import float_array, positive
+from supple.kinds.checks import float_array
+from supple.kinds.forms import POSITIVE, Form, Name
+from supple.scene.motion import Motion, MotionForm
+from supple.scene.selection import OnVertices, Selection, Vertices
+
+
+@dataclass(frozen=True)
+class ForceForm(Form):
+    """(3,) or (k, 3), or a function of time; a scene file has one vector."""
+
+    def checked(self, value: Any, what: str) -> Any:
+        return value if callable(value) else checked_force(value, what)
+
+
+def checked_force(value: ArrayLike, what: str) -> NDArray[np.float64]:
+    """A force [N]: (3,), or (k, 3).
+
+    Raises
+    ------
+    SceneError : where it has another shape, or is not finite.
+    """
+    array = float_array(value, what)
+    if array.shape != (3,) and (array.ndim != 2 or array.shape[1] != 3):
+        raise SceneError(f"{what} has shape {array.shape}; give (3,) in total or (k, 3) per vertex")
+    if not np.isfinite(array).all():
+        raise SceneError(f"{what} is not finite")
+    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +59,10 @@ class Force(OnVertices):
     kind: ClassVar[str] = "force"
     joint: ClassVar[str] = "on"
 
-    body: str
-    vertices: Selection
-    force: ArrayLike | Callable[[float], ArrayLike]
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not callable(self.force):
-            object.__setattr__(self, "force", self._checked(self.force, "force"))
+    body: Annotated[str, Name()]
+    vertices: Annotated[Selection, Vertices()]
+    force: Annotated[ArrayLike | Callable[[float], ArrayLike], ForceForm()]
+    name: Annotated[str | None, Name()] = None
 
     @property
     def is_total(self) -> bool:
@@ -77,15 +96,9 @@ class Force(OnVertices):
         return given
 
     def _given(self, time: float) -> NDArray[np.float64]:
-        return self._checked(self.force(time), f"force({time:g})") if callable(self.force) else np.asarray(self.force)
-
-    def _checked(self, value: ArrayLike, what: str) -> NDArray[np.float64]:
-        array = float_array(value, f"{self.label}: {what}")
-        if array.shape != (3,) and (array.ndim != 2 or array.shape[1] != 3):
-            raise SceneError(f"{self.label}: {what} has shape {array.shape}; give (3,) in total or (k, 3) per vertex")
-        if not np.isfinite(array).all():
-            raise SceneError(f"{self.label}: {what} is not finite")
-        return array
+        if callable(self.force):
+            return checked_force(self.force(time), f"{self.label}: force({time:g})")
+        return np.asarray(self.force)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,18 +118,13 @@ class SoftTarget(OnVertices):
     SceneError : where a value is of the wrong kind, not finite or out of range; the text names the body.
     """
 
-    kind: ClassVar[str] = "soft target"
+    kind: ClassVar[str] = "soft_target"
 
-    body: str
-    vertices: Selection
-    stiffness: float
-    motion: Motion = None
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_motion(self.motion, self.label)
-        object.__setattr__(self, "stiffness", positive(self.stiffness, f"{self.label}: stiffness"))
+    body: Annotated[str, Name()]
+    vertices: Annotated[Selection, Vertices()]
+    stiffness: Annotated[float, POSITIVE]
+    motion: Annotated[Motion, MotionForm()] = None
+    name: Annotated[str | None, Name()] = None
 
     def check_kind_of_body(self, rigid: bool) -> None:
         """Raise `SceneError` for a rigid body: the springs pull vertices of tets."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.scene.values import check_name, float_array
+from supple.kinds.checks import check_name, float_array
 
 
 @dataclass(frozen=True, eq=False)

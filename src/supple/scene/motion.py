@@ -8,18 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
+from supple.kinds.checks import float_array
+from supple.kinds.forms import NUMBERS, VECTORS, Direction, Form, Vector
+from supple.kinds.kind import Kind
 from supple.scene.rotation import rotation_matrix
-from supple.scene.values import float_array, unit_vector
 
 
 @dataclass(frozen=True, eq=False)
-class Keyframes:
+class Keyframes(Kind):
     """Piecewise linear motion through keyframes; constant before the first and after the last.
 
     Parameters
@@ -36,14 +39,18 @@ class Keyframes:
     SceneError : where shapes disagree, times do not increase, or a value is not finite.
     """
 
-    times: ArrayLike
-    displacements: ArrayLike | None = None
-    angles: ArrayLike | None = None
-    axis: ArrayLike = (0.0, 0.0, 1.0)
-    pivot: ArrayLike = (0.0, 0.0, 0.0)
-    rotations: ArrayLike | None = None
+    kind: ClassVar[str] = "keyframes"
+    title: ClassVar[str] = "Keyframes"
+
+    times: Annotated[ArrayLike, NUMBERS]
+    displacements: Annotated[ArrayLike | None, VECTORS] = None
+    angles: Annotated[ArrayLike | None, NUMBERS] = None
+    axis: Annotated[ArrayLike, Direction()] = (0.0, 0.0, 1.0)
+    pivot: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    rotations: Annotated[ArrayLike | None, VECTORS] = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         times = self._array("times", self.times, (-1,))
         k = len(times)
         if k == 0:
@@ -57,17 +64,14 @@ class Keyframes:
             raise SceneError("Keyframes: angles and rotations are both given; give one of them")
         displacements = np.zeros((k, 3)) if self.displacements is None else self.displacements
         angles = np.zeros(k) if self.angles is None else self.angles
-        object.__setattr__(self, "times", times)
         object.__setattr__(self, "displacements", self._array("displacements", displacements, (k, 3)))
         object.__setattr__(self, "angles", self._array("angles", angles, (k,)))
-        object.__setattr__(self, "axis", unit_vector(self.axis, "Keyframes: axis"))
-        object.__setattr__(self, "pivot", self._array("pivot", self.pivot, (3,)))
         if self.rotations is not None:
-            object.__setattr__(self, "rotations", self._array("rotations", self.rotations, (k, 3)))
+            self._array("rotations", self.rotations, (k, 3))
 
     @staticmethod
     def _array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-        array = float_array(value, f"Keyframes: {name}")
+        array = np.asarray(value, dtype=np.float64)
         if array.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, array.shape, strict=True)):
             want = tuple("k" if s == -1 else s for s in shape)
             raise SceneError(f"Keyframes: {name} has shape {array.shape}; it must have shape {want}, one per keyframe")
@@ -99,10 +103,14 @@ class Keyframes:
 Motion = Keyframes | Callable[[float], ArrayLike] | None
 
 
-def check_motion(motion: object, owner: str) -> None:
-    """Raise `SceneError` unless `motion` is None, `Keyframes` or a function of time."""
-    if motion is not None and not isinstance(motion, Keyframes) and not callable(motion):
-        raise SceneError(f"{owner}: motion is {motion!r}; give None, Keyframes, or a function t -> displacement")
+@dataclass(frozen=True)
+class MotionForm(Form):
+    """None, `Keyframes`, or a function of time."""
+
+    def checked(self, value: Any, what: str) -> Any:
+        if not isinstance(value, Keyframes) and not callable(value):
+            raise SceneError(f"{what} is {value!r}; give None, Keyframes, or a function t -> displacement")
+        return value
 
 
 def displacement_at(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from supple.errors import SceneError
-from supple.scene.motion import Motion, check_motion
-from supple.scene.selection import OnVertices, Selection
+from supple.kinds.forms import Name
+from supple.scene.motion import Motion, MotionForm
+from supple.scene.selection import OnVertices, Selection, Vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +30,11 @@ class Pin(OnVertices):
     """
 
     kind: ClassVar[str] = "pin"
-    takes_all: ClassVar[bool] = True
 
-    body: str
-    vertices: Selection | None = None
-    motion: Motion = None
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_motion(self.motion, self.label)
+    body: Annotated[str, Name()]
+    vertices: Annotated[Selection | None, Vertices()] = None
+    motion: Annotated[Motion, MotionForm()] = None
+    name: Annotated[str | None, Name()] = None
 
     def check_kind_of_body(self, rigid: bool) -> None:
         """Raise `SceneError` unless this selects vertices of a soft body, or all of a rigid one."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import finite_vector
 from supple.runtime.displayed import Showable, short_list
 from supple.scene.actuators.cable import Cable
 from supple.scene.actuators.cavity import Cavity
@@ -35,7 +36,6 @@ from supple.scene.sensors import Sensor
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
 from supple.scene.suggestion import suggestion
-from supple.scene.values import finite_vector
 
 Named = TypeVar("Named", Obstacle, Joint, Weld)
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.scene.values import check_name, finite_vector
+from supple.kinds.forms import Form, Vector
+from supple.kinds.kind import Kind
 
 
 @dataclass(frozen=True, eq=False)
-class InBox:
+class InBox(Kind):
     """Selects the vertices inside an axis-aligned box, in world coordinates at the start.
 
     Parameters
@@ -25,15 +26,17 @@ class InBox:
     SceneError : where a corner is not finite, or `low` is above `high`.
     """
 
-    low: ArrayLike
-    high: ArrayLike
+    kind: ClassVar[str] = "in_box"
+    title: ClassVar[str] = "InBox"
+
+    low: Annotated[ArrayLike, Vector()]
+    high: Annotated[ArrayLike, Vector()]
 
     def __post_init__(self) -> None:
-        low, high = finite_vector(self.low, "InBox: low"), finite_vector(self.high, "InBox: high")
+        super().__post_init__()
+        low, high = np.asarray(self.low), np.asarray(self.high)
         if np.any(low > high):
             raise SceneError(f"InBox: low {low.tolist()} is above high {high.tolist()}; swap them")
-        object.__setattr__(self, "low", low)
-        object.__setattr__(self, "high", high)
 
     def select(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
         """Indices of the points (k, 3) inside."""
@@ -44,27 +47,48 @@ class InBox:
 Selection = ArrayLike | InBox
 
 
-class OnVertices:
+@dataclass(frozen=True)
+class Vertices(Form):
+    """Numbers of vertices, or an `InBox`, checked as far as possible without their body.
+
+    Attributes
+    ----------
+    sets : whether a scene file may name a set of the body's mesh file
+    """
+
+    sets: bool = True
+
+    def checked(self, value: Any, what: str) -> NDArray[np.int32] | InBox:
+        if isinstance(value, InBox):
+            return value
+        try:
+            indices = np.atleast_1d(np.asarray(value))
+        except (TypeError, ValueError):
+            raise SceneError(f"{what} is {value!r}; give indices or an InBox") from None
+        if indices.ndim != 1 or indices.size == 0 or not np.issubdtype(indices.dtype, np.integer):
+            raise SceneError(f"{what} must be a non-empty list of whole numbers, or an InBox")
+        if len(np.unique(indices)) != len(indices):
+            raise SceneError(f"{what} names a vertex twice; name each once")
+        if indices.min() < 0:
+            raise SceneError(f"{what} holds {indices.min()}, which is negative; indices begin at 0")
+        if indices.max() > np.iinfo(np.int32).max:
+            raise SceneError(f"{what} holds {indices.max()}, which is more than any mesh has")
+        return indices.astype(np.int32)
+
+
+class OnVertices(Kind):
     """The base class of what acts on vertices of one body: the selection, and the name in messages."""
 
-    kind: ClassVar[str]
     joint: ClassVar[str] = "of"
-    takes_all: ClassVar[bool] = False  # whether vertices=None selects all of a rigid body
 
     body: str
     vertices: Selection | None
     name: str | None
 
-    def __post_init__(self) -> None:
-        check_name(self.body, f"{self.kind}: body")
-        if self.name is not None:
-            check_name(self.name, self.kind)
-        object.__setattr__(self, "vertices", self._checked_selection())
-
     @property
     def label(self) -> str:
         """The name of this object in messages."""
-        return f"{self.kind}{f' {self.name!r}' if self.name else ''} {self.joint} body {self.body!r}"
+        return f"{self.word}{f' {self.name!r}' if self.name else ''} {self.joint} body {self.body!r}"
 
     def check_kind_of_body(self, rigid: bool) -> None:
         """Raise `SceneError` where this cannot act on a soft, or a rigid, body."""
@@ -92,21 +116,3 @@ class OnVertices:
         if indices.max() >= len(placed):
             raise SceneError(f"{self.label}: vertex {indices.max()} does not exist; the body has {len(placed)}")
         return indices
-
-    def _checked_selection(self) -> NDArray[np.int32] | InBox | None:
-        """The selection, checked as far as possible without its body."""
-        if isinstance(self.vertices, InBox) or (self.vertices is None and self.takes_all):
-            return self.vertices
-        try:
-            indices = np.atleast_1d(np.asarray(self.vertices))
-        except (TypeError, ValueError):
-            raise SceneError(f"{self.label}: vertices is {self.vertices!r}; give indices or an InBox") from None
-        if indices.ndim != 1 or indices.size == 0 or not np.issubdtype(indices.dtype, np.integer):
-            raise SceneError(f"{self.label}: vertices must be a non-empty list of whole numbers, or an InBox")
-        if len(np.unique(indices)) != len(indices):
-            raise SceneError(f"{self.label}: vertices names a vertex twice; name each once")
-        if indices.min() < 0:
-            raise SceneError(f"{self.label}: vertices holds {indices.min()}, which is negative; indices begin at 0")
-        if indices.max() > np.iinfo(np.int32).max:
-            raise SceneError(f"{self.label}: vertices holds {indices.max()}, which is more than any mesh has")
-        return indices.astype(np.int32)

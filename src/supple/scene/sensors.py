@@ -5,36 +5,26 @@ from __future__ import annotations
 from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import Counts, Name, Vector
+from supple.kinds.kind import Kind
 from supple.scene.body import PlacedBody
-from supple.scene.loads.load import Region, body_of, checked_region, surface_region
-from supple.scene.values import check_name, finite_vector
+from supple.scene.loads.load import TRIANGLES, Region, body_of, surface_region
 
 MOST_CELLS = 1_000_000
 
 
-class Sensor(ABC):
+class Sensor(Kind, ABC):
     """The base class of sensors: a name, and a region of the surface of one body; see `OnSurface`."""
 
-    kind: ClassVar[str]
     name: str
     body: str
     region: Region
-
-    def __post_init__(self) -> None:
-        check_name(self.name, self.kind)
-        check_name(self.body, f"{self.label}: body")
-        object.__setattr__(self, "region", checked_region(self.region, self.label))
-
-    @property
-    def label(self) -> str:
-        """The name of this sensor in messages."""
-        return f"{self.kind} {self.name!r}"
 
     def triangles(self, bodies: Sequence[PlacedBody]) -> NDArray[np.int64]:
         """The rows (t,) of the surface's triangles that it feels.
@@ -62,11 +52,12 @@ class ForceSensor(Sensor):
     SceneError : where a value is of the wrong kind.
     """
 
-    kind: ClassVar[str] = "force sensor"
+    kind: ClassVar[str] = "force"
+    title: ClassVar[str] = "force sensor"
 
-    name: str
-    body: str
-    region: Region = None
+    name: Annotated[str, Name()]
+    body: Annotated[str, Name()]
+    region: Annotated[Region, TRIANGLES] = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,27 +82,21 @@ class Taxels(Sensor):
 
     kind: ClassVar[str] = "taxels"
 
-    name: str
-    body: str
-    corner: ArrayLike
-    first: ArrayLike
-    second: ArrayLike
-    cells: tuple[int, int]
-    region: Region = None
+    name: Annotated[str, Name()]
+    body: Annotated[str, Name()]
+    corner: Annotated[ArrayLike, Vector()]
+    first: Annotated[ArrayLike, Vector()]
+    second: Annotated[ArrayLike, Vector()]
+    cells: Annotated[tuple[int, int], Counts(2)]
+    region: Annotated[Region, TRIANGLES] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key in ("corner", "first", "second"):
-            object.__setattr__(self, key, finite_vector(getattr(self, key), f"{self.label}: {key}"))
         a, b = np.asarray(self.first), np.asarray(self.second)
         if not np.linalg.norm(np.cross(a, b)) > 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
             raise SceneError(f"{self.label}: first and second are parallel or zero; give two sides of a grid")
-        try:
-            cells = tuple(self.cells)
-        except TypeError:
-            cells = ()
-        if len(cells) != 2 or not all(isinstance(n, (int, np.integer)) and n >= 1 for n in cells):
-            raise SceneError(f"{self.label}: cells is {self.cells!r}; give (rows, columns), whole numbers of 1 or more")
-        if cells[0] * cells[1] > MOST_CELLS:
+        if self.cells[0] * self.cells[1] > MOST_CELLS:
             raise SceneError(f"{self.label}: cells is {self.cells!r}; give at most {MOST_CELLS} cells")
-        object.__setattr__(self, "cells", (int(cells[0]), int(cells[1])))
+
+
+SENSORS: tuple[type[Sensor], ...] = (ForceSensor, Taxels)

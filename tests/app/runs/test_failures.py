@@ -10,6 +10,7 @@ import supple as sp
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import read_journal
 from supple.errors import OutputError, SceneError, SuppleError
+from supple.model.state import State
 from supple.numerics.sparse.pcg import CGResult
 from supple.results.checkpoint.file import read_checkpoint
 from supple.runtime.lock import is_locked
@@ -120,7 +121,7 @@ def test_nan_in_the_start_leaves_no_folder(out, given):
     scene, solver = sensed_scene("pin", None), sp.XPBD()
     options = {f"initial_{given}": {"cube": values}} if given != "state" else {}
     if given == "state":
-        options["start"] = sp.State(0.0, MESH.vertices, values)
+        options["start"] = State(0.0, MESH.vertices, values)
     with pytest.raises(SceneError, match="not finite"):
         sp.simulate(scene, solver, DT, 5, sinks=[sp.RunFolder(out, solver)], **options)
     assert not out.exists()

@@ -99,11 +99,11 @@ def test_motors_of_a_file_share_inputs_which_a_program_sets(scene_file):
 def test_info_run_recording_and_check_know_joints(scene_file, tmp_path, capsys):
     main(["info", str(scene_file)])
     printed = " ".join(capsys.readouterr().out.split())
-    assert (
-        "HingeJoint of lower and upper, from -1 to 2, PositionMotor of at most 7, damping 0.5, largest effort 7"
-        in printed
-    )
-    assert "BallJoint of upper and the world, swings by 1 rad at most, twists from -3 to 3" in printed
+    hinge = "HingeJoint of lower and upper, point (1, 1, 0), limits (-1, 2), motor PositionMotor(target Curve(times "
+    motor = "(0, 1), values (0, 0.5)), stiffness 100, damping 10, max force 7), damping 0.5, max effort 7"
+    assert hinge + motor in printed
+    ball = "BallJoint of upper and the world, point (0, 1, 0), axis (1, 0, 0), max swing 1, "
+    assert f"{ball}twist limits (-3, 3)" in printed
     out = tmp_path / "out"
     main(["run", str(scene_file), "-o", str(out), "--quiet"])
     with sp.read_recording(out / "recording.vtkhdf") as recording:

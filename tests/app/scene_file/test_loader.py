@@ -10,14 +10,13 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import supple as sp
-from supple.app.scene_file.document import SceneFileModel, json_schema
+from supple.app.scene_file.document import KINDS_OF_LISTS, SceneFileModel, json_schema
 from supple.app.scene_file.entries.materials import ELASTIC_KINDS
 from supple.app.scene_file.entries.solvers import solver_of_kind
 from supple.app.scene_file.loader import load_scene
 from supple.app.scene_file.yaml_reader import read_yaml
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
-from supple.scene.obstacles.registry import KINDS
 
 RUBBER = "{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}"
 BODY = f"{{name: cube, shape: {{kind: box, divisions: [1, 1, 1]}}, material: {RUBBER}}}"
@@ -92,16 +91,16 @@ def test_a_scene_file_covers_the_whole_api(load):
     floor, room, bowl, log, drum, ring = scene.obstacles
     assert isinstance(floor, sp.HalfSpace)
     np.testing.assert_allclose(floor.normal, [0, 1, 0])
-    assert isinstance(room, sp.Box)
+    assert isinstance(room, sp.obstacles.Box)
     assert room.inside
-    assert isinstance(bowl, sp.Sphere)
+    assert isinstance(bowl, sp.obstacles.Sphere)
     np.testing.assert_allclose(bowl.pose(0.5)[1], [0, 0.5, 0])
-    assert isinstance(log, sp.Capsule)
+    assert isinstance(log, sp.obstacles.Capsule)
     assert (log.name, log.radius, log.friction, log.inside) == ("log", 0.5, 0.2, False)
     np.testing.assert_array_equal(log.end, [0, -6, 3])
-    assert isinstance(drum, sp.Cylinder)
+    assert isinstance(drum, sp.obstacles.Cylinder)
     np.testing.assert_allclose(drum.pose(1.0)[0][0, 0], np.cos(1.0))
-    assert isinstance(ring, sp.TriangleObstacle)
+    assert isinstance(ring, sp.obstacles.TriangleObstacle)
     np.testing.assert_allclose(ring.surface.bounds[1], [4.4, 0.4, 5.4], atol=0.05)
 
     assert scene.pins[1].name == "left"
@@ -302,22 +301,14 @@ def test_the_manual_lists_every_kind(kinds):
 
 
 def _family(name):
-    if name in ("TractionModel", "PressureModel", "BodyForceModel", "SpringModel", "MuscleModel", "GrowthModel"):
-        return "load"
-    if name in ("ForceSensorModel", "TaxelsModel"):
-        return "sensor"
+    for family in ("obstacles", "stitches", "loads", "sensors", "joints"):
+        if name.removesuffix("Model") in {kind.__name__ for kind in KINDS_OF_LISTS[family]}:
+            return {"stitches": "stitch"}.get(family, family[:-1])
     if name.endswith("ShapeModel") or name == "GummyBearSurfaceModel":
         return "shape"
     if name in ("XPBDModel", "ImplicitModel"):
         return "solver"
-    if name.removesuffix("Model") in KINDS:
-        return "obstacle"
-    if name in ("SoftVertexTriangleModel", "VertexVertexModel", "VertexEdgeModel"):
-        return "stitch"
-    for family in ("joint", "motor"):
-        if name.endswith(f"{family.capitalize()}Model"):
-            return family
-    return "material"
+    return "motor" if name.endswith("MotorModel") else "material"
 
 
 def test_contact_of_the_implicit_solver(load):

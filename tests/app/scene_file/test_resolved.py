@@ -130,7 +130,7 @@ def test_functions_of_time_are_compared_by_their_values():
     def hash_of(speed, target=1.0, pull=1.0, moves=1.0):
         scene = sp.Scene(
             [body],
-            obstacles=[sp.Sphere(radius=0.1, center=(0, 9, 0), motion=lambda time: (moves * time, 0, 0))],
+            obstacles=[sp.obstacles.Sphere(radius=0.1, center=(0, 9, 0), motion=lambda time: (moves * time, 0, 0))],
             pins=[sp.Pin("b", [0], lambda time: (speed * time, 0, 0))],
             forces=[sp.Force("b", [1], lambda time: (0, pull * time, 0))],
             soft_targets=[sp.SoftTarget("b", [2], 5.0, lambda time: (0, target * time, 0))],

@@ -167,7 +167,7 @@ CASES = [
     (
         "dt: 1/60",
         "contact_pairs: [{first: cube, second: cube}]",
-        "13: contact_pairs[0]: this rule has no effect; give `friction`, or `collide: false`",
+        "13: contact_pairs[0]: contact pair of 'cube' and 'cube': it has no effect; give `friction`, or `collide` as ",
     ),
     (
         "dt: 1/60",

@@ -17,7 +17,7 @@ def test_the_files_of_the_page(tmp_path):
     (tmp_path / "bar.yaml").write_text(scene, encoding="utf-8")
     (tmp_path / "study.yaml").write_text(study, encoding="utf-8")
     assert load_run(tmp_path / "bar.yaml").steps == 10
-    described = sp.load_study(tmp_path / "study.yaml")
+    described = sp.studies.load_study(tmp_path / "study.yaml")
     points = described.design.points(described.factors)
     assert len(points) == 12
     for point in points:

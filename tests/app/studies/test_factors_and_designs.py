@@ -10,41 +10,43 @@ FACTORS = {"a": Levels((1, 2, 3)), "b": Levels(("x", "y"))}
 
 
 def test_a_grid_has_every_combination_once_and_the_last_factor_is_fastest():
-    points = sp.Grid().points(FACTORS)
+    points = sp.studies.Grid().points(FACTORS)
     assert [(p["a"], p["b"]) for p in points] == [(1, "x"), (1, "y"), (2, "x"), (2, "y"), (3, "x"), (3, "y")]
 
 
 def test_levels_of_ranges_have_exact_ends_and_constant_differences_or_ratios():
-    even = sp.uniform(0.1, 1.0, 4).levels("f")
+    even = sp.studies.uniform(0.1, 1.0, 4).levels("f")
     assert (even[0], even[-1]) == (0.1, 1.0)
     np.testing.assert_allclose(even, [0.1, 0.4, 0.7, 1.0], rtol=1e-15)
-    ratios = sp.loguniform(1e3, 1e6, 4).levels("f")
+    ratios = sp.studies.loguniform(1e3, 1e6, 4).levels("f")
     assert (ratios[0], ratios[-1]) == (1e3, 1e6)
     np.testing.assert_allclose(ratios, [1e3, 1e4, 1e5, 1e6], rtol=1e-14)
-    assert sp.uniform(2, 3, 1).levels("f") == [2.0]
-    assert sp.loguniform(2, 3, 1).levels("f") == [2.0]
+    assert sp.studies.uniform(2, 3, 1).levels("f") == [2.0]
+    assert sp.studies.loguniform(2, 3, 1).levels("f") == [2.0]
 
 
 def test_a_latin_hypercube_has_one_point_in_each_stratum():
-    factors = {"u": sp.uniform(-1.0, 3.0), "v": sp.loguniform(1.0, 1024.0), "w": Levels(("p", "q"))}
-    points = sp.LatinHypercube(16, seed=3).points(factors)
+    factors = {"u": sp.studies.uniform(-1.0, 3.0), "v": sp.studies.loguniform(1.0, 1024.0), "w": Levels(("p", "q"))}
+    points = sp.studies.LatinHypercube(16, seed=3).points(factors)
     u = np.sort([p["u"] for p in points])
     v = np.sort(np.log2([p["v"] for p in points]))
     assert np.array_equal(np.floor((u + 1.0) / 4.0 * 16), np.arange(16))
     assert np.array_equal(np.floor(v / 10.0 * 16), np.arange(16))
     assert sorted(p["w"] for p in points) == ["p"] * 8 + ["q"] * 8
-    assert points == sp.LatinHypercube(16, seed=3).points(factors)
-    assert points != sp.LatinHypercube(16, seed=4).points(factors)
+    assert points == sp.studies.LatinHypercube(16, seed=3).points(factors)
+    assert points != sp.studies.LatinHypercube(16, seed=4).points(factors)
 
 
 def test_sobol_points_are_balanced_in_every_elementary_square():
-    points = sp.Sobol(16, seed=1).points({"u": sp.uniform(0.0, 1.0), "v": sp.uniform(0.0, 1.0)})
+    points = sp.studies.Sobol(16, seed=1).points({"u": sp.studies.uniform(0.0, 1.0), "v": sp.studies.uniform(0.0, 1.0)})
     cells = {(int(4 * p["u"]), int(4 * p["v"])) for p in points}
     assert len(cells) == 16  # a (0, 4, 2)-net: exactly one point in each of the 16 squares
 
 
 def test_one_at_a_time_changes_one_factor_of_the_base():
-    points = sp.OneAtATime().points({"a": Levels((1, 2, 3)), "u": sp.uniform(0.0, 1.0), "v": sp.loguniform(1.0, 100.0)})
+    points = sp.studies.OneAtATime().points(
+        {"a": Levels((1, 2, 3)), "u": sp.studies.uniform(0.0, 1.0), "v": sp.studies.loguniform(1.0, 100.0)}
+    )
     base = points[0]
     assert base == {"a": 2, "u": 0.5, "v": 10.0}
     changed = [{name: value for name, value in p.items() if value != base[name]} for p in points[1:]]
@@ -52,24 +54,30 @@ def test_one_at_a_time_changes_one_factor_of_the_base():
 
 
 def test_paired_takes_the_values_together():
-    assert sp.Paired().points({"a": Levels((1, 2)), "b": Levels((3, 4))}) == [{"a": 1, "b": 3}, {"a": 2, "b": 4}]
+    assert sp.studies.Paired().points({"a": Levels((1, 2)), "b": Levels((3, 4))}) == [
+        {"a": 1, "b": 3},
+        {"a": 2, "b": 4},
+    ]
     with pytest.raises(sp.StudyError, match="'a' has 3, 'b' has 2"):
-        sp.Paired().points(FACTORS)
+        sp.studies.Paired().points(FACTORS)
 
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: sp.uniform(1.0, 1.0), "the lower one first"),
-        (lambda: sp.uniform(0.0, float("inf")), "finite"),
-        (lambda: sp.uniform("0", 1), "two numbers"),  # pyright: ignore[reportArgumentType]
-        (lambda: sp.loguniform(0.0, 1.0), "above zero"),
-        (lambda: sp.loguniform(1.0, 2.0, 0), "count is 0"),
-        (lambda: sp.Grid().points({"f": sp.uniform(0.0, 1.0)}), r"'f': a grid needs .* uniform\(0, 1, count\)"),
-        (lambda: sp.Grid().points({k: Levels(tuple(range(200))) for k in "abc"}), "8e\\+06 cases"),
-        (lambda: sp.Sobol(12), "8 or 16"),
-        (lambda: sp.Sobol(0), "samples is 0"),
-        (lambda: sp.LatinHypercube(8, seed=-1), "seed is -1"),
+        (lambda: sp.studies.uniform(1.0, 1.0), "the lower one first"),
+        (lambda: sp.studies.uniform(0.0, float("inf")), "finite"),
+        (lambda: sp.studies.uniform("0", 1), "two numbers"),  # pyright: ignore[reportArgumentType]
+        (lambda: sp.studies.loguniform(0.0, 1.0), "above zero"),
+        (lambda: sp.studies.loguniform(1.0, 2.0, 0), "count is 0"),
+        (
+            lambda: sp.studies.Grid().points({"f": sp.studies.uniform(0.0, 1.0)}),
+            r"'f': a grid needs .* uniform\(0, 1, count\)",
+        ),
+        (lambda: sp.studies.Grid().points({k: Levels(tuple(range(200))) for k in "abc"}), "8e\\+06 cases"),
+        (lambda: sp.studies.Sobol(12), "8 or 16"),
+        (lambda: sp.studies.Sobol(0), "samples is 0"),
+        (lambda: sp.studies.LatinHypercube(8, seed=-1), "seed is -1"),
         (lambda: Levels(()), "empty"),
         (lambda: Levels((float("nan"),)), "not finite"),
         (lambda: Levels((object(),)), "give numbers, texts"),

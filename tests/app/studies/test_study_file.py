@@ -34,11 +34,11 @@ def write(tmp_path):
 
 
 def test_the_contents_of_a_study_file(write):
-    study = sp.load_study(write(STUDY))
+    study = sp.studies.load_study(write(STUDY))
     assert study.factors == {"gravity.1": Levels((-1.0, -2.0)), "size": LogUniform(0.1, 1.0, 2)}
     assert study.paths["size"] == ("bodies.cube.shape.size.0", "bodies.cube.shape.size.1")
     assert study.paths["gravity.1"] == ("gravity.1",)
-    assert study.design == sp.Grid()
+    assert study.design == sp.studies.Grid()
     assert study.units == {"drop": "m", "energy": "J"}
     assert len(study.design.points(study.factors)) == 4
     assert Draft202012Validator(study_schema()).is_valid(yaml.safe_load(STUDY))
@@ -61,20 +61,20 @@ def test_the_schema_rejects_what_the_loader_rejects(write, old, new):
     text = STUDY.replace(old, new)
     assert not Draft202012Validator(study_schema()).is_valid(yaml.safe_load(text))
     with pytest.raises(sp.SuppleError):
-        sp.load_study(write(text))
+        sp.studies.load_study(write(text))
 
 
 @pytest.mark.parametrize(
     ("text", "design"),
     [
-        ("{kind: latin_hypercube, samples: 8, seed: 2}", sp.LatinHypercube(8, 2)),
-        ("{kind: sobol, samples: 8}", sp.Sobol(8)),
-        ("{kind: paired}", sp.Paired()),
-        ("{kind: one_at_a_time}", sp.OneAtATime()),
+        ("{kind: latin_hypercube, samples: 8, seed: 2}", sp.studies.LatinHypercube(8, 2)),
+        ("{kind: sobol, samples: 8}", sp.studies.Sobol(8)),
+        ("{kind: paired}", sp.studies.Paired()),
+        ("{kind: one_at_a_time}", sp.studies.OneAtATime()),
     ],
 )
 def test_designs(write, text, design):
-    assert sp.load_study(write(STUDY.replace("{kind: grid}", text))).design == design
+    assert sp.studies.load_study(write(STUDY.replace("{kind: grid}", text))).design == design
 
 
 @pytest.mark.parametrize(
@@ -96,5 +96,5 @@ def test_designs(write, text, design):
 def test_a_study_file_that_is_wrong_is_one_line_with_its_place(write, old, new, words):
     assert old in STUDY
     with pytest.raises(sp.SuppleError, match=words) as caught:
-        sp.load_study(write(STUDY.replace(old, new)))
+        sp.studies.load_study(write(STUDY.replace(old, new)))
     assert "\n" not in str(caught.value)

@@ -25,7 +25,9 @@ def table_of(points, measure, failed=(), units=None):
     return StudyTable.of(Path("s"), tuple(points[0]), units or {}, cases, results)
 
 
-GRID = sp.Grid().points({"a": Levels((1, 2, 4)), "b": sp.uniform(0.0, 1.0, 3), "kind": Levels(("soft", "hard"))})
+GRID = sp.studies.Grid().points(
+    {"a": Levels((1, 2, 4)), "b": sp.studies.uniform(0.0, 1.0, 3), "kind": Levels(("soft", "hard"))}
+)
 
 
 def linear(a, b, kind):
@@ -55,9 +57,9 @@ def test_the_effects_of_a_linear_function_in_a_grid_are_exact():
     assert (effects[0].low_label, effects[2].high_label) == ("1", "hard")
 
 
-@pytest.mark.parametrize("design", [sp.LatinHypercube(32, seed=1), sp.Sobol(32, seed=1)])
+@pytest.mark.parametrize("design", [sp.studies.LatinHypercube(32, seed=1), sp.studies.Sobol(32, seed=1)])
 def test_the_effects_of_a_linear_function_on_samples_are_exact(design):
-    points = design.points({"u": sp.uniform(0.0, 2.0), "v": sp.uniform(-1.0, 1.0)})
+    points = design.points({"u": sp.studies.uniform(0.0, 2.0), "v": sp.studies.uniform(-1.0, 1.0)})
     effects = main_effects(table_of(points, lambda u, v: 5.0 * v - u), "y")
     spans = [np.ptp([point[effect.factor] for point in points]) for effect in effects]
     assert [effect.factor for effect in effects] == ["v", "u"]
@@ -65,7 +67,7 @@ def test_the_effects_of_a_linear_function_on_samples_are_exact(design):
 
 
 def test_the_effects_of_one_factor_at_a_time_are_those_of_its_two_cases():
-    points = sp.OneAtATime().points({"u": sp.uniform(0.0, 2.0), "v": Levels((1, 2, 3))})
+    points = sp.studies.OneAtATime().points({"u": sp.studies.uniform(0.0, 2.0), "v": Levels((1, 2, 3))})
     effects = main_effects(table_of(points, lambda u, v: u**2 * v), "y")
     assert [(e.factor, e.low, e.high) for e in effects] == [("u", 0.0, 8.0), ("v", 1.0, 3.0)]
 
@@ -87,9 +89,9 @@ def test_factors_that_do_not_vary_have_no_effect():
     ],
 )
 def test_the_plots_that_fit_the_number_of_factors(tmp_path, factors, files):
-    points = sp.Grid().points(factors)
+    points = sp.studies.Grid().points(factors)
     table = table_of(points, lambda **values: float(len(str(values))), failed=(1,))
-    written = sp.plot_study(table, tmp_path / "plots")
+    written = sp.studies.plot_study(table, tmp_path / "plots")
     assert {path.name for path in written} == files
     for path in written:
         assert path.read_bytes().startswith(b"\x89PNG")
@@ -108,7 +110,7 @@ def test_a_curve_and_a_map_have_the_table_s_numbers(tmp_path, drawn):
     plot_one_factor(table, "y", "a", tmp_path / "a.png")
     (line,) = drawn[0].axes[0].lines
     assert line.get_xydata().tolist() == [[1, 1], [2, 4], [3, 9]]
-    points = sp.Grid().points({"a": Levels((1, 2, 3)), "b": Levels((10, 20))})
+    points = sp.studies.Grid().points({"a": Levels((1, 2, 3)), "b": Levels((10, 20))})
     plot_two_factors(table_of(points, lambda a, b: a + b), "y", "a", "b", tmp_path / "b.png")
     (mesh,) = drawn[1].axes[0].collections
     assert mesh.get_array().reshape(2, 3).tolist() == [[11, 12, 13], [21, 22, 23]]
@@ -118,7 +120,7 @@ def test_values_over_decades_have_logarithmic_axes(tmp_path, drawn):
     decades, linear = [{"a": 10.0**k, "b": k} for k in range(3)], [{"a": 1.0 + k} for k in range(3)]
     plot_one_factor(table_of(decades, lambda a, b: a), "y", "a", tmp_path / "a.png")
     plot_one_factor(table_of(linear, lambda a: -a), "y", "a", tmp_path / "a.png")
-    points = sp.Grid().points({"a": Levels((1, 2, 3)), "b": Levels((1, 1000))})
+    points = sp.studies.Grid().points({"a": Levels((1, 2, 3)), "b": Levels((1, 1000))})
     plot_two_factors(table_of(points, lambda a, b: a * b), "y", "a", "b", tmp_path / "b.png")
     assert [(figure.axes[0].get_xscale(), figure.axes[0].get_yscale()) for figure in drawn[:2]] == [
         ("log", "log"),
@@ -129,7 +131,7 @@ def test_values_over_decades_have_logarithmic_axes(tmp_path, drawn):
 
 def test_a_table_without_a_case_that_is_done_cannot_be_plotted(tmp_path):
     table = table_of([{"a": 1}], lambda a: a, failed=(0,))
-    assert sp.plot_study(table, tmp_path) == []
+    assert sp.studies.plot_study(table, tmp_path) == []
     with pytest.raises(sp.StudyError, match="no case is done"):
         plot_one_factor(table, "y", "a", tmp_path / "a.png")
 

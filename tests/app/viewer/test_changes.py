@@ -346,7 +346,7 @@ def test_after_a_reset_added_bodies_do_not_overlap_others(live):
 
 def test_free_names_differ_from_those_of_bodies_and_obstacles(live):
     scene = live.setup.scene
-    named = dataclasses.replace(scene, obstacles=[sp.Sphere(name="cube 1", center=(0, -9, 0))])
+    named = dataclasses.replace(scene, obstacles=[sp.obstacles.Sphere(name="cube 1", center=(0, -9, 0))])
     assert (unused_name(scene, "cube"), unused_name(named, "cube")) == ("cube 1", "cube 2")
 
 

@@ -120,7 +120,7 @@ def test_a_dragged_bar_turns_about_its_hinge_and_stops_at_the_limit():
     moment, snapshot = moment_of(live)
     assert "hinge: at 0.5, force" in measures_text(replace(snapshot, description=describe(live)))
     (joint,) = moment.model.joints
-    assert joint.limits == (-0.5, 0.5)
+    assert joint.conditions.coordinate.limits == (-0.5, 0.5)
     drawn.update(moment)
     lines = page.points
     assert lines.shape == before.shape

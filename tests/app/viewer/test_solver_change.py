@@ -74,11 +74,11 @@ class TestSolverChange:
     ("obstacle", "point"),
     [
         (sp.HalfSpace(), (0.3, -0.2, 0.1)),
-        (sp.Sphere(radius=0.5), (0.1, 0.2, 0.0)),
-        (sp.Sphere(radius=0.5, inside=True), (0.9, 0.2, 0.0)),
-        (sp.Box(size=(1, 1, 1)), (0.45, 0.1, 0.0)),
-        (sp.Box(size=(1, 1, 1), rotation=(0, 0, 0.5)), (0.3, 0.3, 0.3)),
-        (sp.Box(size=(1, 1, 1), inside=True), (0.6, 0.7, 0.0)),
+        (sp.obstacles.Sphere(radius=0.5), (0.1, 0.2, 0.0)),
+        (sp.obstacles.Sphere(radius=0.5, inside=True), (0.9, 0.2, 0.0)),
+        (sp.obstacles.Box(size=(1, 1, 1)), (0.45, 0.1, 0.0)),
+        (sp.obstacles.Box(size=(1, 1, 1), rotation=(0, 0, 0.5)), (0.3, 0.3, 0.3)),
+        (sp.obstacles.Box(size=(1, 1, 1), inside=True), (0.6, 0.7, 0.0)),
     ],
 )
 def test_points_in_an_obstacle_are_moved_out_along_the_normal(obstacle, point):
@@ -87,6 +87,6 @@ def test_points_in_an_obstacle_are_moved_out_along_the_normal(obstacle, point):
     assert depth > 0.0
     after = moved_out(obstacle, before, 0.0, 0.01)
     assert signed_distance(obstacle, after, 0.0)[0][0] == pytest.approx(0.01, rel=0.02)
-    if not (isinstance(obstacle, sp.Box) and obstacle.inside):  # from a corner, points move along two faces
+    if not (isinstance(obstacle, sp.obstacles.Box) and obstacle.inside):  # from a corner, points move along two faces
         assert np.linalg.norm(after[0] - before[0]) == pytest.approx(depth + 0.01, rel=0.02)
     assert np.array_equal(after[1], before[1])

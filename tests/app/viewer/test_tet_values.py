@@ -78,10 +78,10 @@ def test_the_energy_of_volumes_is_that_of_the_report():
 
 OBSTACLES = {
     "floor": sp.HalfSpace(point=(0, -0.5, 0)),
-    "ball": sp.Sphere(center=(0, -1.5, 0), radius=1.0),
-    "bowl": sp.Sphere(radius=np.sqrt(0.75), inside=True),
-    "box": sp.Box(center=(0, -1.0, 0), size=(3, 1, 3)),
-    "turned box": sp.Box(center=(0, -1.0, 0), size=(3, 3, 1), rotation=(np.pi / 2, 0, 0)),
+    "ball": sp.obstacles.Sphere(center=(0, -1.5, 0), radius=1.0),
+    "bowl": sp.obstacles.Sphere(radius=np.sqrt(0.75), inside=True),
+    "box": sp.obstacles.Box(center=(0, -1.0, 0), size=(3, 1, 3)),
+    "turned box": sp.obstacles.Box(center=(0, -1.0, 0), size=(3, 3, 1), rotation=(np.pi / 2, 0, 0)),
     "moving floor": sp.HalfSpace(point=(0, -2.5, 0), motion=sp.Keyframes([0, 1], [[0, 0, 0], [0, 2, 0]])),
 }
 
@@ -101,7 +101,7 @@ def test_vertices_on_obstacles_are_contact_points(name):
 def test_contact_points_between_bodies():
     mesh = sp.shapes.box((1, 1, 1), (2, 2, 2))
     bodies = [sp.Body(name, mesh, RUBBER, position=(0, y, 0)) for name, y in (("low", 0.0), ("high", 1.01))]
-    sheet = sp.TriangleObstacle(
+    sheet = sp.obstacles.TriangleObstacle(
         surface=sp.shapes.box_surface((4, 1, 4), (1, 1, 1)), motion=sp.Keyframes([0], [[0, -1.01, 0]])
     )
     system = build_system(sp.Scene(bodies, [sheet]))

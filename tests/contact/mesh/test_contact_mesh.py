@@ -105,7 +105,7 @@ def test_a_scene_with_obstacles():
     box = sp.shapes.box((1, 1, 1), (2, 2, 2))
     scene = sp.Scene(
         [sp.Body("a", box, RUBBER), sp.Body("b", box, RUBBER, position=(0, 2, 0))],
-        [sp.HalfSpace(), sp.Box(center=(0, -1.5, 0), name="table")],
+        [sp.HalfSpace(), sp.obstacles.Box(center=(0, -1.5, 0), name="table")],
     )
     mesh, system, start = mesh_of(scene)
     assert mesh.names[:2] == ("a", "b")

@@ -84,7 +84,7 @@ def test_crossing_triangles_are_those_of_brute_force_in_random_scenes(seed):
     rng = np.random.default_rng(seed)
     bodies = [cube(f"c{i}", rng.uniform(-0.4, 0.4, 3), 1, size=0.7, rotation=rng.uniform(-3, 3, 3)) for i in range(3)]
     sheet = sp.SurfaceMesh(rng.uniform(-1, 1, (6, 3)), [[0, 1, 2], [3, 4, 5]])
-    scene = sp.Scene(bodies, [sp.TriangleObstacle(surface=sheet, name="sheet")])
+    scene = sp.Scene(bodies, [sp.obstacles.TriangleObstacle(surface=sheet, name="sheet")])
     soup = [body.place(body.mesh.vertices)[body.mesh.surface.triangles] for body in bodies] + [
         sheet.vertices[sheet.triangles]
     ]
@@ -109,8 +109,8 @@ def test_crossing_triangles_are_those_of_brute_force_in_random_scenes(seed):
 
 def test_bodies_far_from_the_origin_do_not_intersect():
     bodies = [cube("a", (0, 0.6, 0)), cube("b", (1.0 + 1e-12, 0.6, 0)), cube("c", (0, 2.0, 0), rotation=(0.3, 0, 0.1))]
-    obstacles = [sp.HalfSpace(), sp.Sphere(center=(0, 3.9, 0)), sp.Box(size=(9, 9, 9), inside=True)]
-    obstacles += [sp.Sphere(radius=9, inside=True), sp.Box(center=(2.6, 0, 0), rotation=(0, 1, 0))]
+    obstacles = [sp.HalfSpace(), sp.obstacles.Sphere(center=(0, 3.9, 0)), sp.obstacles.Box(size=(9, 9, 9), inside=True)]
+    obstacles += [sp.obstacles.Sphere(radius=9, inside=True), sp.obstacles.Box(center=(2.6, 0, 0), rotation=(0, 1, 0))]
     scene = sp.Scene(bodies, obstacles)
     assert found_in(scene) == []
     raise_if_intersecting(build_system(scene), initial_state(scene).positions, 0.0, pair_table(scene))
@@ -144,14 +144,14 @@ def test_aligned_cubes_overlap_though_no_edge_goes_through_a_face():
 
 
 INSIDE = {
-    "solid sphere": (sp.Sphere(), "is inside"),
-    "solid box": (sp.Box(), "is inside"),
-    "solid triangles": (sp.TriangleObstacle(surface=sp.shapes.sphere_surface(1.0, 0.5)), "is inside"),
+    "solid sphere": (sp.obstacles.Sphere(), "is inside"),
+    "solid box": (sp.obstacles.Box(), "is inside"),
+    "solid triangles": (sp.obstacles.TriangleObstacle(surface=sp.shapes.sphere_surface(1.0, 0.5)), "is inside"),
     "half-space": (sp.HalfSpace(point=(0, 3, 0)), "is inside"),
-    "small sphere in the body": (sp.Sphere(radius=0.05), "is around"),
-    "room elsewhere": (sp.Box(center=(5, 0, 0), inside=True), "is outside"),
-    "bowl elsewhere": (sp.Sphere(center=(0, 5, 0), inside=True), "is outside"),
-    "bowl too small": (sp.Sphere(radius=0.05, inside=True), "is outside"),
+    "small sphere in the body": (sp.obstacles.Sphere(radius=0.05), "is around"),
+    "room elsewhere": (sp.obstacles.Box(center=(5, 0, 0), inside=True), "is outside"),
+    "bowl elsewhere": (sp.obstacles.Sphere(center=(0, 5, 0), inside=True), "is outside"),
+    "bowl too small": (sp.obstacles.Sphere(radius=0.05, inside=True), "is outside"),
 }
 
 
@@ -169,8 +169,8 @@ def test_bodies_completely_inside_a_solid_or_outside_a_room(what):
 
 def test_a_body_completely_inside_another_and_one_in_a_room():
     assert one(sp.Scene([cube("a", (0, 0, 0), size=0.3), cube("b", (0, 0, 0))])).kind == "is inside"
-    assert found_in(sp.Scene([cube("a", (0, 0, 0), size=0.3)], [sp.Sphere(inside=True)])) == []
-    assert one(sp.Scene([cube("a", (0, 0.9, 0), size=0.3)], [sp.Sphere(inside=True)])).kind == "overlaps"
+    assert found_in(sp.Scene([cube("a", (0, 0, 0), size=0.3)], [sp.obstacles.Sphere(inside=True)])) == []
+    assert one(sp.Scene([cube("a", (0, 0.9, 0), size=0.3)], [sp.obstacles.Sphere(inside=True)])).kind == "overlaps"
 
 
 def test_a_cube_half_in_the_floor_names_its_triangles_and_the_way_out():

@@ -54,12 +54,12 @@ def test_a_stack_rises_from_the_floor():
 @pytest.mark.parametrize(
     ("obstacle", "position", "up"),
     [
-        (sp.Box(center=(0, -0.5, 0), size=(4, 1, 4)), (0, 0.4, 0), True),
-        (sp.Sphere(center=(0, -2, 0), radius=2), (0, 0.4, 0), True),
-        (sp.Sphere(center=(0, 0, 0), radius=2, inside=True), (0, 1.5, 0), False),
-        (sp.Box(center=(0, 2, 0), size=(4, 4, 4), inside=True), (0, 0.4, 0), True),
+        (sp.obstacles.Box(center=(0, -0.5, 0), size=(4, 1, 4)), (0, 0.4, 0), True),
+        (sp.obstacles.Sphere(center=(0, -2, 0), radius=2), (0, 0.4, 0), True),
+        (sp.obstacles.Sphere(center=(0, 0, 0), radius=2, inside=True), (0, 1.5, 0), False),
+        (sp.obstacles.Box(center=(0, 2, 0), size=(4, 4, 4), inside=True), (0, 0.4, 0), True),
         (
-            sp.TriangleObstacle(surface=sp.SurfaceMesh([(-5, 0, -5), (0, 0, 9), (9, 0, -5)], [[0, 1, 2]])),
+            sp.obstacles.TriangleObstacle(surface=sp.SurfaceMesh([(-5, 0, -5), (0, 0, 9), (9, 0, -5)], [[0, 1, 2]])),
             (0, 0.4, 0),
             True,
         ),
@@ -185,7 +185,7 @@ def test_bodies_stitched_to_a_pinned_one_stay():
 
 def test_bodies_stitched_to_an_obstacle_stay():
     corners = [(-5, -0.51, -5), (0, -0.51, 9), (9, -0.51, -5)]
-    sheet = sp.TriangleObstacle(surface=sp.SurfaceMesh(corners, [[0, 1, 2]]), name="sheet")
+    sheet = sp.obstacles.TriangleObstacle(surface=sp.SurfaceMesh(corners, [[0, 1, 2]]), name="sheet")
     stitch = sp.SoftVertexTriangleStitch("a", "sheet", max_distance=0.05, youngs=1e5, poisson=0.4)
     scene = sp.Scene([cube("a", (0, 0, 0))], [sheet, sp.HalfSpace(point=(0, -0.4, 0))], stitches=[stitch])
     with pytest.raises(SceneError, match="pins or stitches hold what would have to move"):

@@ -1,11 +1,10 @@
 """Growth: no stress where it is free, the stress of closed forms where it is not, derivatives, recordings, errors."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
 from tests.derivatives import differences, gradient_of
+from tests.recordings import set_in_scene
 
 import supple as sp
 from supple.app.scene_file.loader import load_scene
@@ -122,17 +121,14 @@ def test_gradient_and_hessian_have_slope_two():
 
 @pytest.mark.parametrize(
     ("described", "message"),
-    [([["melting", 0.0]], "'melting' that this version does not know"), ([3], "growths and muscles are not described")],
+    [("melting", "'melting' that this version does not know"), (3, "active/0/kind is '3'")],
 )
 def test_recordings_of_what_is_not_known_are_refused(tmp_path, described, message):
     path = tmp_path / "run.vtkhdf"
     scene = sp.Scene([sp.Body("bar", BAR, RUBBER)], loads=[sp.Growth("bar", 1.1)], **STILL)
     last_of(scene, sp.XPBD(substeps=1, contact=None), 1, sinks=[sp.Recorder(path)])
     with h5py.File(path, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        header["physics"]["active"] = described
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        set_in_scene(file, "physics/active/0/kind", described)
     with pytest.raises(OutputError, match=message):
         read_recording(path)
 

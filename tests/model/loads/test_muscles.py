@@ -110,7 +110,7 @@ def test_scene_files_describe_muscles(tmp_path):
     np.testing.assert_array_equal(directions[3], [1, 0, 0])
     assert muscle.force_length[1].tolist() == [0, 1]
     path.write_text(FILE.format(more="strength: 2e4, activation: 1.5"))
-    with pytest.raises(sp.SceneError, match=r"scene.yaml:7.*activation is 1.5; it must be from 0 to 1"):
+    with pytest.raises(sp.SceneError, match=r"scene.yaml:7.*activation: is 1.5; it must be at most 1"):
         sp.load_scene(path)
 
 
@@ -122,7 +122,7 @@ def test_scene_files_describe_muscles(tmp_path):
         (lambda: sp.Muscle("bar", 1.0, (1, 0)), "direction has shape .2,.; give .3,., or .m, 3."),
         (lambda: sp.Muscle("bar", 1.0, np.ones((2, 3))), "there are 2 directions for 96 tets"),
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), 1.1), "activation is 1.1; it must be from 0 to 1"),
-        (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), -0.1), "activation is -0.1; it must be zero or more"),
+        (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), -0.1), "activation is -0.1; it must be from 0 to 1"),
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), tets=[999]), "tet 999 does not exist; the body has 96"),
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), tets=[1, 1]), "names a tet twice"),
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), tets=[]), "must be a non-empty list"),

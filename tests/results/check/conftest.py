@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 
 import h5py
@@ -53,14 +52,14 @@ def around(folder):
         sp.HalfSpace(name="floor"),
         sp.HalfSpace(name="slope", point=(3, 0, 0), normal=(-1, 1, 0.3)),
         sp.HalfSpace(name="door", point=(-2, 0, 0), normal=(1, 0, 0), motion=away),
-        sp.Box(name="room", center=(0, 0, 5), size=(20, 20, 20), rotation=(0.1, 0.2, 0.3), inside=True),
-        sp.Sphere(name="bowl", radius=9, inside=True),
-        sp.Sphere(name="ball", center=(0, 1, 2), radius=0.4),
-        sp.Box(name="crate", center=(0, 1, -2), size=(0.5, 0.5, 0.5), rotation=(0, 0.4, 0), motion=away),
-        sp.Capsule(name="log", start=(-3, 1, 4), end=(3, 1.5, 4), radius=0.4, motion=away),
-        sp.Cylinder(name="drum", start=(0, 3, 3), end=(0.5, 4, 3), radius=0.5),
-        sp.Cylinder(name="tank", start=(0, -12, 0), end=(0, 12, 0), radius=6, inside=True),
-        sp.TriangleObstacle(name="rock", surface=octahedron((0.3, 3.0, 0.2), 0.4)),
+        sp.obstacles.Box(name="room", center=(0, 0, 5), size=(20, 20, 20), rotation=(0.1, 0.2, 0.3), inside=True),
+        sp.obstacles.Sphere(name="bowl", radius=9, inside=True),
+        sp.obstacles.Sphere(name="ball", center=(0, 1, 2), radius=0.4),
+        sp.obstacles.Box(name="crate", center=(0, 1, -2), size=(0.5, 0.5, 0.5), rotation=(0, 0.4, 0), motion=away),
+        sp.obstacles.Capsule(name="log", start=(-3, 1, 4), end=(3, 1.5, 4), radius=0.4, motion=away),
+        sp.obstacles.Cylinder(name="drum", start=(0, 3, 3), end=(0.5, 4, 3), radius=0.5),
+        sp.obstacles.Cylinder(name="tank", start=(0, -12, 0), end=(0, 12, 0), radius=6, inside=True),
+        sp.obstacles.TriangleObstacle(name="rock", surface=octahedron((0.3, 3.0, 0.2), 0.4)),
     ]
     scene = sp.Scene([sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), JELLY, position=(0, 1, 0))], obstacles)
     return recorded(folder / "around.vtkhdf", scene, sp.XPBD(substeps=5))
@@ -82,22 +81,13 @@ def corrupted(tmp_path):
 
 def failures(path, **settings):
     """Which checks fail, and in which frame first."""
-    report = sp.check_recording(path, sp.CheckSettings(**settings))
+    report = sp.check_recording(path, **settings)
     assert report.ok == (not report.failures)
     return {result.name: result.first_failure for result in report.failures}
 
 
 def verdicts(path, **settings):
-    return {
-        result.name: str(result.verdict) for result in sp.check_recording(path, sp.CheckSettings(**settings)).results
-    }
-
-
-def set_header(file, change):
-    header = json.loads(file["supple/header"][()])
-    change(header)
-    del file["supple/header"]
-    file["supple/header"] = json.dumps(header)
+    return {result.name: str(result.verdict) for result in sp.check_recording(path, **settings).results}
 
 
 def nan_position(file, n):

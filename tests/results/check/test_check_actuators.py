@@ -12,7 +12,7 @@ def check(path, cavity, height):
     shell = sp.Body("shell", SHELL, sp.StableNeoHookean(youngs=2e5, poisson=0.4), position=(0, height, 0))
     scene = sp.Scene([shell], [sp.HalfSpace()], cavities=[cavity])
     frames = list(sp.simulate(scene, SOLVER, 1 / 60, 8, sinks=[sp.Recorder(path)]))
-    return frames, sp.check_recording(path, sp.CheckSettings(only=["works"]))
+    return frames, sp.check_recording(path, only=["works"])
 
 
 def test_a_given_volume_that_begins_with_a_jump(tmp_path):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.recordings import replace_array, set_in_scene
 
 import supple as sp
 from supple.results.check.surfaces import Surfaces
 
-from .conftest import JELLY, X, failures, octahedron, recorded, set_header
+from .conftest import JELLY, X, failures, octahedron, recorded
 
 CONTACT = ["intersection", "containment", "distance"]
 
@@ -77,7 +78,7 @@ def test_a_body_completely_inside_another(free, corrupted):
         x[n // 2 :] = (right - right.mean(axis=0)) * 0.3 + left.mean(axis=0)
         file[X][2 * n : 3 * n] = x
 
-    report = sp.check_recording(corrupted(free, change), sp.CheckSettings(only=CONTACT))
+    report = sp.check_recording(corrupted(free, change), only=CONTACT)
     assert [(result.name, result.first_failure) for result in report.failures] == [("containment", 2)]
     assert report["containment"].where == "right in left"
 
@@ -85,7 +86,7 @@ def test_a_body_completely_inside_another(free, corrupted):
 def test_excluded_pairs_are_left_out(free, corrupted):
     def overlap(file, n):
         apart(file, n, 2, -0.1)
-        set_header(file, lambda header: header["physics"].update(untouching=[[1, 0]]))
+        set_in_scene(file, "untouching", ((1, 0),))
 
     assert failures(corrupted(free, overlap), only=CONTACT) == {}
 
@@ -93,21 +94,21 @@ def test_excluded_pairs_are_left_out(free, corrupted):
 def test_vertices_that_may_touch_a_triangle_are_left_out(free, corrupted):
     def touch(file, n, exempt):
         """One vertex of the right block on the middle of a triangle of the left one."""
-        triangles = file["supple/triangles"][:]
-        half = len(triangles) // 2
+        left, right = (file[f"supple/bodies/{k}/triangles"][:] for k in (0, 1))
         x = file[X][2 * n : 3 * n]
         rest = file["supple/rest_positions"][: n // 2]
-        facing = [t for t in range(half) if (rest[triangles[t], 0] == rest[:, 0].max()).all()]
-        vertex = int(triangles[half:].min()) + int(np.argmin(file["supple/rest_positions"][n // 2 :, 0]))
-        x[vertex] = x[triangles[facing[0]]].mean(axis=0) - [1e-6, 0, 0]
+        facing = [row for row in left if (rest[row, 0] == rest[:, 0].max()).all()]
+        vertex = n // 2 + int(right.min()) + int(np.argmin(file["supple/rest_positions"][n // 2 :, 0]))
+        x[vertex] = x[facing[0]].mean(axis=0) - [1e-6, 0, 0]
         file[X][2 * n : 3 * n] = x
         if exempt:
-            stitches = file.create_group("supple/stitches")
-            stitches["nodes"], stitches["weights"] = np.array([[vertex, *triangles[facing[0]]]]), np.full((1, 3), 1 / 3)
-            stitches["anchors"], stitches["anchor_owners"] = np.zeros((0, 3)), np.zeros(0, dtype=int)
-            stitches["rigid_control"], stitches["rigid_weights"] = np.zeros((0, 4), dtype=int), np.zeros((0, 4))
-            stitches["moduli"], stitches["rest_shape_inverse"] = np.zeros((0, 2)), np.zeros((0, 3, 3))
-            stitches["springs"] = np.ones((1, 2))
+            stitch = {
+                "nodes": np.array([[vertex, *facing[0]]], dtype=np.int32),
+                "weights": np.full((1, 3), 1 / 3),
+                "laws/springs": np.ones((1, 2)),
+            }
+            for name, values in stitch.items():
+                replace_array(file, f"stitches/{name}", values)
 
     assert failures(corrupted(free, lambda file, n: touch(file, n, False)), only=["intersection"]) == {
         "intersection": 2
@@ -140,7 +141,7 @@ BY_FORMULA = {
 
 @pytest.mark.parametrize("name", BY_FORMULA)
 def test_a_body_in_an_obstacle_that_is_a_formula(around, corrupted, name):
-    report = sp.check_recording(corrupted(around, move_to(BY_FORMULA[name])), sp.CheckSettings(only=["obstacles"]))
+    report = sp.check_recording(corrupted(around, move_to(BY_FORMULA[name])), only=["obstacles"])
     found = report["obstacles"]
     assert (found.verdict, found.first_failure, found.failed_frames) == ("fail", 3, 1)
     assert name in found.where
@@ -156,7 +157,7 @@ def test_a_body_just_above_the_floor_and_just_beside_the_moving_door_passes(arou
 
 @pytest.mark.parametrize(("lowest", "name"), [([-0.2, 0.9, -2.3], "crate"), ([0.3, 2.0, 0.2], "rock")])
 def test_a_body_that_meets_an_obstacle_made_of_triangles(around, corrupted, lowest, name):
-    report = sp.check_recording(corrupted(around, move_to(lowest)), sp.CheckSettings(only=["intersection"]))
+    report = sp.check_recording(corrupted(around, move_to(lowest)), only=["intersection"])
     assert report["intersection"].first_failure == 3
     assert f"obstacle {name}" in report["intersection"].where
 
@@ -177,7 +178,7 @@ def test_bodies_inside_obstacles_and_obstacles_inside_bodies(around, corrupted, 
         x = (x - x.min(axis=0)) * size + np.asarray(lowest)
         file[X][5 * n : 6 * n] = x
 
-    report = sp.check_recording(corrupted(around, change), sp.CheckSettings(only=["containment"]))
+    report = sp.check_recording(corrupted(around, change), only=["containment"])
     assert report["containment"].first_failure == 5
     assert report["containment"].where == where
 
@@ -207,7 +208,7 @@ def test_excluded_and_stitched_pairs_are_recorded(tmp_path):
             sp.Body("b", cube, JELLY, position=(0.9, 0, 0)),
             sp.Body("c", cube, JELLY, position=(0, 3, 0)),
         ],
-        [sp.HalfSpace(name="floor", point=(0, -1, 0)), sp.TriangleObstacle(name="rock", surface=rock)],
+        [sp.HalfSpace(name="floor", point=(0, -1, 0)), sp.obstacles.TriangleObstacle(name="rock", surface=rock)],
         contact_pairs=[sp.ContactPair("a", "b", collide=False), sp.ContactPair("c", "*", collide=False)],
         stitches=[
             sp.SoftVertexTriangleStitch("c", "a", pairs=[(0, 3)], youngs=1e3, poisson=0.3),

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.recordings import remove_from_scene, set_in_scene
 
 import supple as sp
 from supple.app.cli.app import main
@@ -16,7 +17,7 @@ from supple.errors import OutputError
 from supple.results import check as check_package
 from supple.results.check.settings import NAMES
 
-from .conftest import FRAMES, JELLY, failures, nan_position, recorded, set_header, verdicts
+from .conftest import FRAMES, JELLY, failures, nan_position, recorded, verdicts
 
 
 def test_a_good_recording_passes_everything_that_can_be_checked(free, around):
@@ -61,38 +62,37 @@ def test_bodies_of_edges_and_volumes_pass(tmp_path):
 
 def test_without_works_energy_is_judged_only_where_nothing_does_work(free, around, corrupted):
     def forget(file, n):
-        def drop(header):
-            header["details"]["fields"] = [f for f in header["details"]["fields"] if f["name"] != "work"]
-
-        set_header(file, drop)
+        with_work = json.loads(file["supple/header"][()])["fields"]["details"]["fields"]["fields"]["tuple"]
+        number = next(k for k, field in enumerate(with_work) if field["fields"]["name"] == "work")
+        remove_from_scene(file, f"details/fields/{number}")
 
     assert verdicts(corrupted(free, forget), only=["energy", "balance"]) == {"energy": "pass", "balance": "skipped"}
-    report = sp.check_recording(corrupted(around, forget), sp.CheckSettings(only=["energy"]))
+    report = sp.check_recording(corrupted(around, forget), only=["energy"])
     assert report["energy"].message == "obstacles move, which does work"
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("where", "value", "message"),
     [
-        (lambda header: header["physics"].update(untouching=[[0, 7]]), "does not exist"),
-        (lambda header: header["physics"].update(untouching=3), "not described"),
-        (lambda header: header["physics"].pop("laws"), "not described"),
-        (lambda header: header.pop("physics"), "not the expected JSON"),
-        (lambda header: header["physics"].update(compliances=[]), "another number of bodies"),
+        ("untouching", ((0, 7),), "does not exist"),
+        ("untouching", 3, "untouching is not the tuple"),
+        ("untouching", ((0, 1, 2),), "untouching/0 is not the tuple"),
+        ("physics", None, "physics is 'None', not of the type RecordedPhysics"),
+        ("physics/compliances", (), "another number of bodies"),
     ],
 )
-def test_inconsistent_physics_is_an_error(free, corrupted, change, message):
+def test_inconsistent_physics_is_an_error(free, corrupted, where, value, message):
     with pytest.raises(OutputError, match=message):
-        sp.check_recording(corrupted(free, lambda file, n: set_header(file, change)))
+        sp.check_recording(corrupted(free, lambda file, n: set_in_scene(file, where, value)))
 
 
 def test_every_kth_frame_and_the_last(free, corrupted):
     path = corrupted(free, nan_position)
-    report = sp.check_recording(path, sp.CheckSettings(every=4))
+    report = sp.check_recording(path, every=4)
     assert (report.frames, report.frames_checked, report.ok) == (FRAMES, 3, True)
     assert failures(path, every=3) == {"finite": 3}
     seen = []
-    sp.check_recording(path, sp.CheckSettings(every=4, only=["finite"]), progress=lambda *done: seen.append(done))
+    sp.check_recording(path, every=4, only=["finite"], progress=lambda *done: seen.append(done))
     assert seen == [(1, 3), (2, 3), (3, 3)]
 
 
@@ -107,7 +107,7 @@ def test_every_kth_frame_and_the_last(free, corrupted):
 )
 def test_invalid_settings(settings, message):
     with pytest.raises(OutputError, match=message):
-        sp.CheckSettings(**settings)
+        sp.check_recording("missing.vtkhdf", **settings)
 
 
 def test_the_shell(free, corrupted, tmp_path, capsys, monkeypatch):

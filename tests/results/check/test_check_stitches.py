@@ -43,7 +43,7 @@ def test_good_recordings_pass(tmp_path, solver, gap):
 
 
 def test_energy_of_stitches_to_an_obstacle_is_counted(tmp_path):
-    sheet = sp.TriangleObstacle(
+    sheet = sp.obstacles.TriangleObstacle(
         name="sheet", surface=sp.SurfaceMesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 2, 1], [0, 3, 2]])
     )
     seam = sp.SoftVertexTriangleStitch("a", "sheet", max_distance=0.021, youngs=1e4, poisson=0.3)

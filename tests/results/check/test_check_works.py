@@ -8,8 +8,9 @@ import pytest
 import supple as sp
 from supple.results.check.checks.works import Works
 from supple.results.check.load_forces import load_forces
+from supple.results.check.settings import CheckSettings
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.recording.actions.loads import RecordedLoad
+from supple.results.recording.scene import RecordedLoad
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.4, damping=0.02)
 
@@ -32,7 +33,7 @@ def dragged(request, tmp_path_factory):
 
 
 def checked(path, **options):
-    return sp.check_recording(path, sp.CheckSettings(only=["balance", "works"], **options))
+    return sp.check_recording(path, only=["balance", "works"], **options)
 
 
 @pytest.mark.parametrize("name", ["pins", "friction"])
@@ -101,7 +102,7 @@ def test_the_work_of_pins_is_of_second_order(tmp_path):
         solver = sp.Implicit(integrator="static")
         path = recorded(tmp_path / f"{steps}.vtkhdf", scene, solver, 1.0 / steps, steps)
         with sp.read_recording(path) as recording:
-            check = Works(Scene(recording), sp.CheckSettings())
+            check = Works(Scene(recording), CheckSettings())
             frames = [Snapshot.of(check.scene, frame) for frame in recording]
             for frame in frames:
                 check.see(frame)
@@ -218,7 +219,7 @@ def test_works_of_loads_converge_to_the_changes_of_their_potentials():
     errors = []
     for parts in (2, 4):
         places = [ends[0] + t * (ends[1] - ends[0]) for t in np.linspace(0, 1, parts + 1)]
-        forces = [load_forces(loads, values, x) for x in places]
+        forces = [load_forces(loads, values, x, np.zeros_like(x)) for x in places]
         moved = (ends[1] - ends[0]) / parts
         works = {name: sum(0.5 * ((a[name] + b[name]) * moved).sum() for a, b in pairwise(forces)) for name in exact}
         errors.append({name: works[name] - exact[name] for name in exact})

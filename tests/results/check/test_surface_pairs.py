@@ -79,7 +79,7 @@ def test_distances_of_triangles():
         point = x[3]
         from_point = np.sqrt(point_triangle(*(tuple(corner) for corner in (point, *x[s]))))
         assert from_point <= np.linalg.norm(weights @ x[s] - point, axis=1).min() + 1e-12
-        ball = sp.Sphere(center=point, radius=0.1)
+        ball = sp.obstacles.Sphere(center=point, radius=0.1)
         assert smallest_on_triangles(ball.signed_distance, x[s][None])[0] == pytest.approx(from_point - 0.1, abs=1e-12)
 
 

@@ -28,7 +28,7 @@ CLASSES = {"Inner": Inner, "Outer": Outer}
 
 def back(value):
     tree, arrays = encoded(value, CLASSES)
-    data = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
+    data = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays.values())
     description = json.loads(json.dumps(described(arrays)))
     return decoded(json.loads(json.dumps(tree)), restored(description, memoryview(data)), CLASSES)
 
@@ -98,7 +98,7 @@ class Inherited(Inner):
     ids=lambda value: type(value).__name__,
 )
 def test_a_value_of_an_unknown_kind_is_one_line(value):
-    with pytest.raises(OutputError, match=r"a checkpoint cannot hold a .*; register its class in .*memories") as caught:
+    with pytest.raises(OutputError, match="cannot be written to a file; register its class") as caught:
         encoded((value,), CLASSES)
     assert "\n" not in str(caught.value)
 
@@ -132,26 +132,26 @@ def nested(depth):
 )
 def test_other_trees_are_errors(tree):
     with pytest.raises((ValueError, TypeError, KeyError, IndexError, AttributeError)):
-        decoded(tree, [], CLASSES)
+        decoded(tree, {}, CLASSES)
 
 
 @pytest.mark.parametrize(
     ("description", "size"),
     [
-        ([["<f8", [2]]], 15),
-        ([["<f8", [2]]], 17),
-        ([["|O", [1]]], 8),
-        ([["<U4", [1]]], 16),
-        ([["<M8[s]", [1]]], 8),
-        ([["<f8", [-1]]], 8),
-        ([["<f8", [1 << 39, 1 << 39]]], 8),
-        ([["<f8", [1.0]]], 8),
-        ([["<f9", [1]]], 9),
-        ([["<f8"]], 8),
-        ([[None, [1]]], 8),
+        ({"a": ["<f8", [2]]}, 15),
+        ({"a": ["<f8", [2]]}, 17),
+        ({"a": ["|O", [1]]}, 8),
+        ({"a": ["<U4", [1]]}, 16),
+        ({"a": ["<M8[s]", [1]]}, 8),
+        ({"a": ["<f8", [-1]]}, 8),
+        ({"a": ["<f8", [1 << 39, 1 << 39]]}, 8),
+        ({"a": ["<f8", [1.0]]}, 8),
+        ({"a": ["<f9", [1]]}, 9),
+        ({"a": ["<f8"]}, 8),
+        ({"a": [None, [1]]}, 8),
         (5, 0),
     ],
 )
 def test_arrays_that_do_not_fit_the_bytes_are_errors(description, size):
-    with pytest.raises((ValueError, TypeError)):
+    with pytest.raises((ValueError, TypeError, AttributeError)):
         restored(description, memoryview(bytes(size)))

@@ -15,7 +15,7 @@ from supple.solvers.xpbd.contact.movers import Movers
 from supple.solvers.xpbd.contact.shape_kernels import kernels_of
 
 for name in sys.argv[1:]:
-    obstacle = sp.Sphere(radius=0.5, inside=True) if name == "Sphere" else KINDS[name](inside=True)
+    obstacle = sp.obstacles.Sphere(radius=0.5, inside=True) if name == "Sphere" else KINDS[name](inside=True)
     (shape,) = obstacle.shapes()
     x = np.array([[0.55, 0.1, 0.0]])
     numbers = np.zeros((1, 4))

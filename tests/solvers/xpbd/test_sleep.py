@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.model.state import State
 from supple.model.system import build_system
 from supple.results.checkpoint.file import Checkpoint, RunFacts, read_checkpoint, write_checkpoint
 
@@ -43,7 +44,7 @@ def settled() -> sp.Frame:
     raise AssertionError("nothing fell asleep")
 
 
-def continued(frame: sp.Frame, scene: sp.Scene, state: sp.State | None = None, steps: int = 1) -> list[sp.Frame]:
+def continued(frame: sp.Frame, scene: sp.Scene, state: State | None = None, steps: int = 1) -> list[sp.Frame]:
     return list(sp.simulate(scene, sp.XPBD(), DT, steps, start=state or frame.state))[-steps:]
 
 

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
 
-from supple.app.scene_file.entries.actuators.cables import CableModel
-from supple.app.scene_file.entries.actuators.cavities import CavityModel
+from supple.app.scene_file.entries import spelling as spelling  # registers how values are written
 from supple.app.scene_file.entries.bodies import BodyModel
-from supple.app.scene_file.entries.contact_pairs import ContactPairModel
-from supple.app.scene_file.entries.joints import JointModel, WeldModel
-from supple.app.scene_file.entries.loads import LoadModel
-from supple.app.scene_file.entries.obstacles import ObstacleModel
-from supple.app.scene_file.entries.selections import ForceModel, PinModel, SoftTargetModel
-from supple.app.scene_file.entries.sensors import SensorModel
+from supple.app.scene_file.entries.kinds import KindModel, entry_of
 from supple.app.scene_file.entries.solvers import SolverModel, XPBDModel
-from supple.app.scene_file.entries.stitches import StitchModel
 from supple.app.scene_file.fraction import number_or_fraction
 from supple.app.scene_file.model import Model, Vector
+from supple.kinds.kind import Kind
+from supple.model.loads.build import LOADS
 from supple.results.readings.fields import FIELDS
+from supple.scene.actuators.cable import Cable
+from supple.scene.actuators.cavity import Cavity
+from supple.scene.contact_pairs import ContactPair
+from supple.scene.forces import Force, SoftTarget
+from supple.scene.joints.registry import JOINTS
+from supple.scene.joints.weld import Weld
+from supple.scene.obstacles.registry import KINDS as OBSTACLES
+from supple.scene.pins import Pin
+from supple.scene.sensors import SENSORS
+from supple.scene.stitches.registry import STITCHES
 from supple.simulate import DT_RANGE
 
 MAX_STEPS = 10_000_000
@@ -64,28 +70,48 @@ class OutputModel(Model):
     plot: bool = Field(default=True, description="plot.png: energies, momentum, volume ratio and smallest J over time")
 
 
-class SceneFileModel(Model):
+# The lists of a scene file and the kinds of their entries; the scene has a parameter of each name.
+KINDS_OF_LISTS: dict[str, Sequence[type[Kind]]] = {
+    "obstacles": tuple(OBSTACLES.values()),
+    "pins": (Pin,),
+    "forces": (Force,),
+    "loads": tuple(LOADS),
+    "cavities": (Cavity,),
+    "cables": (Cable,),
+    "sensors": SENSORS,
+    "soft_targets": (SoftTarget,),
+    "contact_pairs": (ContactPair,),
+    "stitches": STITCHES,
+    "joints": JOINTS,
+    "welds": (Weld,),
+}
+
+
+class _SceneFileModel(Model):
     """Bodies, obstacles and pins under gravity, the solver, and the timing of a run. SI units; y is up."""
 
     supple: Literal[1] = Field(default=1, description="version of this format")
     bodies: list[BodyModel] = Field(min_length=1, max_length=10_000)
-    obstacles: list[ObstacleModel] = Field(default=[], max_length=10_000)
-    pins: list[PinModel] = Field(default=[], max_length=10_000)
-    forces: list[ForceModel] = Field(default=[], max_length=10_000)
-    loads: list[LoadModel] = Field(default=[], max_length=10_000)
-    cavities: list[CavityModel] = Field(default=[], max_length=10_000)
-    cables: list[CableModel] = Field(default=[], max_length=10_000)
-    sensors: list[SensorModel] = Field(default=[], max_length=10_000)
-    soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
-    contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)
-    stitches: list[StitchModel] = Field(default=[], max_length=10_000)
-    joints: list[JointModel] = Field(default=[], max_length=10_000)
-    welds: list[WeldModel] = Field(default=[], max_length=10_000)
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
     solver: SolverModel = Field(default_factory=lambda: XPBDModel(kind="xpbd"))
     dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s], or a fraction such as 1/60")
     steps: int = Field(default=300, ge=0, le=MAX_STEPS, description="number of frames")
     output: OutputModel = Field(default_factory=OutputModel)
+
+    def entries(self, key: str) -> list[KindModel]:
+        """Those of one of the lists."""
+        return getattr(self, key)
+
+
+if TYPE_CHECKING:
+    SceneFileModel = _SceneFileModel
+else:
+    _LISTS = {
+        key: (list[entry_of(kinds)], Field(default=[], max_length=10_000)) for key, kinds in KINDS_OF_LISTS.items()
+    }
+    SceneFileModel = create_model(
+        "SceneFileModel", __base__=_SceneFileModel, __doc__=_SceneFileModel.__doc__, __module__=__name__, **_LISTS
+    )
 
 
 def json_schema() -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from supple.app.scene_file.document import OutputModel, SceneFileModel
-from supple.app.scene_file.entries.joints import with_shared_inputs
+from supple.app.scene_file.document import KINDS_OF_LISTS, OutputModel, SceneFileModel
+from supple.app.scene_file.entries.kinds import built
 from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES, MeshStore
 from supple.app.scene_file.from_surface import read_surface_scene
+from supple.app.scene_file.inputs import with_shared_inputs
 from supple.app.scene_file.mesh_sets import with_numbers
 from supple.app.scene_file.urdf.document import read_urdf
 from supple.app.scene_file.validation_errors import scene_error
@@ -100,8 +101,8 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
     model = validated(document)
     try:
         with spelled_for("yaml"):
-            built = _built(model, meshes(Path(path).parent))
-        return replace(built, text=document.text, description=model, folder=Path(path).parent)
+            run = _built(model, meshes(Path(path).parent))
+        return replace(run, text=document.text, description=model, folder=Path(path).parent)
     except LocatedError as error:
         if Path(path).suffix.lower() in SURFACE_FILES:  # its lines are not those of the document
             raise SceneError(f"{path}: {error}") from None
@@ -127,33 +128,24 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
     starts: dict[str, NDArray[np.float64]] = {}
     for i, described in enumerate(model.bodies):
         with at("bodies", i):
-            for built in described.build(meshes):
-                if built.body.name in bodies:
-                    raise SceneError(f"another body has the name {built.body.name!r}; give each a different name")
-                bodies[built.body.name] = built.body
-                if built.initial_positions is not None:
-                    starts[built.body.name] = built.initial_positions
-    obstacles = _each("obstacles", model.obstacles, meshes)
-    lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs", "loads", "cavities", "cables", "sensors")
-    lists += ("joints", "welds")
-    parts = {key: _each(key, getattr(model, key)) for key in lists}
+            for made in described.build(meshes):
+                if made.body.name in bodies:
+                    raise SceneError(f"another body has the name {made.body.name!r}; give each a different name")
+                bodies[made.body.name] = made.body
+                if made.initial_positions is not None:
+                    starts[made.body.name] = made.initial_positions
+    parts: dict[str, list[Any]] = {}
+    for key in KINDS_OF_LISTS:
+        with at(key):
+            parts[key] = built(model.entries(key), meshes)
     parts["joints"] = with_shared_inputs(parts["joints"])
     with at("solver"):
         solver = model.solver.build()
     with at():
-        scene = Scene(list(bodies.values()), obstacles, gravity=model.gravity, **parts)
+        scene = Scene(list(bodies.values()), gravity=model.gravity, **parts)
         # The pairs are found here, where an error's place in the file is known; the scene caches them.
         logger.debug("%d stitched pairs", len(scene.stitching))
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
-
-
-def _each(key: str, models: Sequence[Any], *arguments: MeshStore) -> list[Any]:
-    """What each entry of a list in the file builds; errors get the place of their entry."""
-    built = []
-    for i, model in enumerate(models):
-        with at(key, i):
-            built.append(model.build(*arguments))
-    return built
 
 
 def _keys_of_message(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Key, ...]:

@@ -1,4 +1,4 @@
-"""Named sets of mesh files in a scene file: `set: NAME` of pins, forces, soft targets and regions becomes numbers."""
+"""Named sets of mesh files in a scene file: `set: NAME` of vertices and of regions becomes numbers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from supple.errors import SceneError
 from supple.mesh.sets import MeshSets
 from supple.scene.located import at
 
-_SELECTIONS = ("pins", "forces", "soft_targets")
+_SELECTIONS = ("pins", "forces", "soft_targets", "welds")
 
 
 def with_numbers(model: SceneFileModel, meshes: MeshStore) -> SceneFileModel:

@@ -149,7 +149,10 @@ def as_factor(name: str, given: Any) -> Factor:
     if isinstance(given, Factor):
         return given
     if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
-        raise StudyError(f"factor {name!r} is {given!r}; give a list of values, sp.uniform(...) or sp.loguniform(...)")
+        raise StudyError(
+            f"factor {name!r} is {given!r}; give a list of values, sp.studies.uniform(...) or "
+            "sp.studies.loguniform(...)"
+        )
     try:
         return Levels(tuple(given))
     except StudyError as error:

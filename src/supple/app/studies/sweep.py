@@ -44,9 +44,9 @@ def sweep(
     ----------
     source : a function of the factors that returns a `Scene`, or a `Run` where solver or timing vary too; or the path
         of a scene file, in which factors are dotted paths such as "bodies.bear.material.youngs".
-    factors : by name, lists of values, `sp.uniform(...)` or `sp.loguniform(...)`.
+    factors : by name, lists of values, `sp.studies.uniform(...)` or `sp.studies.loguniform(...)`.
     measure : takes a `Recording`, and returns a number, or numbers by name.
-    design : `sp.Grid()` (the default), `sp.Paired()`, `sp.OneAtATime()`, `sp.LatinHypercube(...)` or `sp.Sobol(...)`.
+    design : `sp.studies.Grid()` (the default), `Paired()`, `OneAtATime()`, `LatinHypercube(...)` or `Sobol(...)`.
     folder : for the table, and for a folder per case. On a cluster all machines must have it under the same path.
     solver, dt, steps : for a function that returns a `Scene`; dt in [s].
     units : of factors and measures, by name. Those of a scene file's values are known.

@@ -21,7 +21,7 @@ JOB, ANSWER, MESH = "job.json", "answer.json", "tets.npz"
 def main() -> int:
     """Do the job of the current folder; returns the exit code: 0, or 1 where `answer.json` contains an error."""
     from supple.errors import SuppleError
-    from supple.mesh.meshing.mesher_worker import limit_process
+    from supple.runtime.memory import limit_process
 
     job: dict[str, Any] = json.loads(Path(JOB).read_text("utf-8"))
     limit_process(job["seconds"] + 10.0, job["memory"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +14,9 @@ from supple.contact.start.surfaces import StartSurfaces, start_surfaces
 from supple.errors import SceneError
 from supple.mesh.topology import graph_components
 from supple.model.system import PinRange, System, build_system, initial_state
-from supple.scene.actuators.muscle import Muscle
 from supple.scene.contact_pairs import PairTable, pair_table
-from supple.scene.loads.surface_loads import Pressure, Traction
+from supple.scene.loads.load import OnSurface
+from supple.scene.loads.tet_region import tets_in
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
 
@@ -119,10 +120,13 @@ def _applied(scene: Scene, given: Mapping[str, ArrayLike], total: NDArray[np.flo
                 if item.body == body.name:
                     items[k] = replace(item, vertices=item.select(body.place(body.points)))
         for k, load in enumerate(on_surfaces):
-            if isinstance(load, (Pressure, Traction)) and load.body == body.name and isinstance(load.region, InBox):
-                on_surfaces[k] = replace(load, region=load.triangles(body))
-            if isinstance(load, Muscle) and load.body == body.name and isinstance(load.tets, InBox):
-                on_surfaces[k] = replace(load, tets=load.fibres(body)[0])
+            if getattr(load, "body", None) != body.name:
+                continue
+            this: Any = load
+            if isinstance(load, OnSurface) and isinstance(load.region, InBox):
+                on_surfaces[k] = replace(this, region=load.triangles(body))
+            if isinstance(getattr(load, "tets", None), InBox):
+                on_surfaces[k] = replace(this, tets=tets_in(this.tets, body, load.label))
     if not moves:
         return Separation(scene, starts, ())
     return Separation(replace(scene, bodies=bodies, loads=on_surfaces, **loads), starts, tuple(moves))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +62,14 @@ class CellSoup(NamedTuple):
         flat = np.concatenate([nothing, *(flat for _, _, flat in blocks)])
         offsets = np.concatenate([[0], np.cumsum(sizes)])
         return cls(points, types.astype(np.uint8), offsets.astype(np.int64), flat.astype(np.int64))
+
+
+class MeshFile(NamedTuple):
+    """Points and cells of a file, and by name the rows of points, and of its tets, that belong to named sets."""
+
+    soup: CellSoup
+    node_sets: Mapping[str, NDArray[np.int64]] = {}
+    tet_sets: Mapping[str, NDArray[np.int64]] = {}
 
 
 def checked(soup: CellSoup) -> CellSoup:

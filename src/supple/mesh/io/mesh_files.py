@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import vertex_array
-from supple.mesh.io import msh, obj, off, ply, stl, vtk_legacy, vtk_xml
+from supple.mesh.io import abaqus, obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.file_contents import file_contents
-from supple.mesh.io.models import abaqus, glb, usd
+from supple.mesh.io.libraries.meshio import read_msh, write_msh
+from supple.mesh.io.libraries.trimesh import read_glb
+from supple.mesh.io.libraries.usd import USD_SUFFIXES, read_usd, write_usd
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.merge import merge_map
@@ -28,7 +30,7 @@ SURFACE_READERS: dict[str, Callable[[bytes], CellSoup]] = {
     ".obj": obj.read,
     ".ply": ply.read,
     ".off": off.read,
-    ".glb": glb.read,
+    ".glb": read_glb,
     ".vtp": vtk_xml.read,
     ".vtu": vtk_xml.read,
     ".vtk": vtk_legacy.read,
@@ -43,11 +45,11 @@ SURFACE_WRITERS = {
     ".vtk": vtk_legacy.written_surface,
 }
 TET_READERS: dict[str, Callable[[bytes], CellSoup]] = {
-    ".msh": msh.read,
+    ".msh": lambda data: read_msh(data).soup,
     ".vtu": vtk_xml.read,
     ".vtk": vtk_legacy.read,
-    ".inp": abaqus.read,
-    **dict.fromkeys(usd.USD_SUFFIXES, usd.read),
+    ".inp": lambda data: abaqus.read(data).soup,
+    **dict.fromkeys(USD_SUFFIXES, read_usd),
 }
 TET_WRITERS = {".vtu": vtk_xml.written_cells, ".vtk": vtk_legacy.written_cells, ".inp": abaqus.written}
 TET_EXTENSIONS = (*SUFFIXES, *TET_READERS)
@@ -126,8 +128,8 @@ def write_tets(path: str | Path, vertices: NDArray[np.float64], tets: NDArray[np
     """Write tets (m, 4) or (m, 10) to a `.msh`, `.vtu`, `.vtk`, `.inp` or USD file; see `TetMesh.save`."""
     path = Path(path)
     extension = path.suffix.lower()
-    if extension == ".msh" or extension in usd.USD_SUFFIXES:
-        write = msh.write if extension == ".msh" else usd.write
+    if extension == ".msh" or extension in USD_SUFFIXES:
+        write = write_msh if extension == ".msh" else write_usd
         try:
             _write_whole(path, lambda temporary: write(temporary, vertices, tets))
         except FormatError as error:

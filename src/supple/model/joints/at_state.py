@@ -71,7 +71,9 @@ def refuse_apart(geometry: JointGeometry, state: State) -> None:
     q = np.einsum("fk,fki->fi", vectors.coefficients, corners) + vectors.offsets(poses)
     off = np.zeros(len(geometry.joints))
     np.maximum.at(off, vectors.joint, np.linalg.norm(q, axis=1))
-    np.maximum.at(off, geometry.arguments[0].joint[geometry.across], np.abs(g[geometry.across]))
+    across = geometry.across
+    joint = geometry.arguments[0].joint[across]
+    np.maximum.at(off, joint, np.abs(g[across]) * geometry.sizes[joint] / geometry.units[across])
     for j, joint in enumerate(geometry.joints):
         if off[j] > _APART * geometry.sizes[j]:
             raise SceneError(

@@ -13,8 +13,8 @@ with the pose R, t of the obstacle. The differences of two of them, first side m
     hinge    the point, and the direction of the axis
     slider   three directions
 
-They are linear, so that no turn of the bodies changes their derivatives. The remaining conditions, and the coordinates
-of hinges and sliders, are functions of two to four such vectors, a, b, d and f:
+They are linear, so that no turn of the bodies changes their derivatives. The remaining conditions, and the coordinates,
+are functions of two to four such vectors, a, b, d and f. Every kind of joint says which (`Joint.conditions`):
 
     slider   r . e = 0 for the two directions e of the second across the axis, with the difference r of the points;
              its travel is r . e for the axis e of the second
@@ -23,6 +23,7 @@ of hinges and sliders, are functions of two to four such vectors, a, b, d and f:
     ball     with limits, the cosine a . b of its swing, with the axes a of the first and b of the second; and its
              twist atan2(a . d - f . b, a . b + f . d) about the axis, with the directions a and f of the first across
              the axis, which were b and d of the second at twist zero
+    universal  a . b = 0 for the axes a of the first and b of the second
 
 The rotation R of the first against the second, in axes of which the first is the joint's, has the twist atan2(R_21 -
 R_12, R_11 + R_22) = 2 atan2(q_0, w) with its quaternion (w, q): R is this turn about the axis, and then one about a
@@ -40,13 +41,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.scene.joints.axis_joint import AxisJoint, HingeJoint, SliderJoint
-from supple.scene.joints.ball_joint import BallJoint
+from supple.scene.joints.conditions import FORMS
 from supple.scene.joints.joint import Joint
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 
-ANGLE, PRODUCT, COSINE, TWIST = 0, 1, 2, 3
+ANGLE, PRODUCT, COSINE, TWIST = (FORMS.index(form) for form in ("angle", "product", "cosine", "twist"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,46 +123,32 @@ class JointGeometry:
         centers, differences, functions = [], [], []
         arguments: tuple[list, list, list, list] = ([], [], [], [])
         limits: list[tuple[float, float]] = []
-        free = (-np.inf, np.inf)
         units, across, along = [], [], np.full(len(sides), -1)
-        nothing = _Vector(np.zeros(8), np.zeros(3), 0.0)
         for j, (joint, (first, second)) in enumerate(zip(system.scene.joints, sides, strict=True)):
             body = system.scene.body(joint.first)
             assert isinstance(body, RigidBody)
-            place, axes = joint.place(body), _axes(joint)
+            place, axes, holds = joint.place(body), joint.axes(), joint.conditions()
             size = min(side.size for side in (first, second))
-            apart = first.point(place) - second.point(place)
-            turned = [size * (first.direction(e) - second.direction(e)) for e in axes]
+            vectors = {"apart": first.point(place) - second.point(place)}
+            for k, e in enumerate(axes):
+                vectors[f"first.{k}"], vectors[f"second.{k}"] = first.direction(e), second.direction(e)
             centers.append((j, first.point(place)))
-            if not isinstance(joint, SliderJoint):
-                differences.append((j, apart))
-            if isinstance(joint, HingeJoint):
-                differences.append((j, turned[0]))
-            elif not isinstance(joint, BallJoint):
-                differences += [(j, one) for one in turned]
-            rows = []
-            if isinstance(joint, HingeJoint):
-                vectors = first.direction(axes[1]), second.direction(axes[1]), second.direction(axes[2]), nothing
-                rows = [(ANGLE, 1.0, joint.limits or free, vectors)]
-            elif isinstance(joint, SliderJoint):
-                ends = [joint.limits or free, free, free]
-                across_of = [second.direction(e) for e in axes]
-                rows = [(PRODUCT, size, end, (apart, e, e, nothing)) for end, e in zip(ends, across_of, strict=True)]
-                across += [len(functions) + 1, len(functions) + 2]
-            elif isinstance(joint, BallJoint) and joint.max_swing is not None:
-                of_first, of_second = ([side.direction(e) for e in axes] for side in (first, second))
-                vectors = of_first[0], of_second[0], of_second[0], nothing
-                rows = [(COSINE, np.sin(joint.max_swing), (np.cos(joint.max_swing), np.inf), vectors)]
-                if joint.twist_limits is not None:
-                    vectors = of_first[1], of_second[1], of_second[2], of_first[2]
-                    rows.append((TWIST, 1.0, joint.twist_limits, vectors))
-            if rows:
-                along[j] = len(functions)
-            for kind, unit, ends, vectors in rows:
-                functions.append(kind)
-                units.append(unit)
-                limits.append(ends)
-                for column, vector in zip(arguments, vectors, strict=True):
+            differences += [(j, vectors["apart"])] if holds.together else []
+            differences += [(j, size * (vectors[f"first.{k}"] - vectors[f"second.{k}"])) for k in holds.parallel]
+            for one in holds.functions:
+                if one.vanishes:
+                    across.append(len(functions))
+                elif along[j] < 0:
+                    along[j] = len(functions)
+                functions.append(FORMS.index(one.form))
+                units.append(size if one.is_length else 1.0)
+                limits.append(one.limits)
+                if one.form == "cosine":  # of an angle that is at most the second limit
+                    units[-1], limits[-1] = np.sin(one.limits[1]), (np.cos(one.limits[1]), np.inf)
+                given = [vectors[name] for name in one.vectors]
+                # A product has no third vector, and only a twist has a fourth.
+                given += [given[1] if len(given) == 2 and column == 2 else _NOTHING for column in range(len(given), 4)]
+                for column, vector in zip(arguments, given, strict=True):
                     column.append((j, vector))
         a, b, d, f = (Vectors.of(column) for column in arguments)
         return cls(
@@ -210,6 +196,9 @@ class _Vector:
         return _Vector(factor * self.coefficients, factor * self.world, factor * self.is_point)
 
 
+_NOTHING = _Vector(np.zeros(8), np.zeros(3), 0.0)
+
+
 class _Side:
     """One side of a joint: a rigid body, whose control points have the places `begin`, ... of the eight, or not."""
 
@@ -253,12 +242,3 @@ class _Side:
 
 def _corners(first: _Side, second: _Side) -> NDArray[np.int64]:
     return np.concatenate([first.vertices, first.vertices if second.body is None else second.vertices])
-
-
-def _axes(joint: Joint) -> NDArray[np.float64]:
-    """Three perpendicular unit vectors (rows), right-handed; the first is the joint's axis."""
-    given = joint.axis if isinstance(joint, AxisJoint | BallJoint) else None
-    e = np.array([1.0, 0.0, 0.0]) if given is None else np.asarray(given)
-    across = np.cross(e, np.eye(3)[np.argmin(np.abs(e))])
-    across /= np.linalg.norm(across)
-    return np.array([e, across, np.cross(e, across)])

@@ -1,4 +1,4 @@
-"""What acts along the coordinate of a joint, or across a slider: conditions, limits and motors.
+"""What acts along the coordinate of a joint, or across it: conditions, limits and motors.
 
 Each is an energy psi of one number g whose derivative is a line that is cut off,
 
@@ -133,17 +133,18 @@ def laws_of(
     times : begin and end of the step [s]; moving : whether rates count; without them, as in equilibrium, motors do not
         damp
     """
-    laws = [Law(int(row), float(stiffness[geometry.arguments[0].joint[row]]), 0.0) for row in geometry.across]
+    of_joint = geometry.arguments[0].joint
+    k_of = stiffness[of_joint] * (geometry.sizes[of_joint] / geometry.units) ** 2
+    laws = [Law(int(row), float(k_of[row]), 0.0) for row in geometry.across]
     for j, joint in enumerate(geometry.joints):
-        scales = stiffness[j] * (geometry.sizes[j] / geometry.units) ** 2
         for row in geometry.limited(j).tolist():
-            k, (low, high) = float(scales[row]), geometry.limits[row].tolist()
+            k, (low, high) = float(k_of[row]), geometry.limits[row].tolist()
             laws += [Law(row, k, low, high=0.0)] if np.isfinite(low) else []
             laws += [Law(row, k, high, low=0.0)] if np.isfinite(high) else []
         if not isinstance(joint, AxisJoint):
             continue
         row = int(geometry.along[j])
-        k, here, (low, high) = float(scales[row]), float(start[row]), geometry.limits[row].tolist()
+        k, here, (low, high) = float(k_of[row]), float(start[row]), geometry.limits[row].tolist()
         if joint.max_velocity is not None and moving:
             reach = (times[1] - times[0]) * joint.max_velocity
             laws.append(Law(row, k, here - reach, high=0.0))

@@ -22,14 +22,15 @@ class LoadPattern:
     ----------
     kind : "vector", a force w_i f on each vertex, with the value f (3,); "pressure", a third of -p A on each corner of
         a triangle of area vector A, with the value p; "spring", the forces of k / 2 (l - l0)^2,
-        l = |sum w_i x_i + offset|, with the value l0
+        l = |sum w_i x_i + offset|, with the value l0; "drag", c / 3 (w - v_i) on each corner of a triangle, with the
+        value w (3,), see `supple.model.loads.wind`
     work : as of `AppliedLoad`
-    vertices : (v,), or (t, 3) triangles under a pressure
-    weights : (v,) w; of no meaning for a pressure
-    offset : (3,) [m]; stiffness : k [N/m]
+    vertices : (v,), or (t, 3) triangles of a pressure or a drag
+    weights : (v,) w; of no meaning for triangles
+    offset : (3,) [m]; stiffness : k [N/m]; of a drag, density times coefficient [kg/m^3]
     """
 
-    kind: Literal["vector", "pressure", "spring"]
+    kind: Literal["vector", "pressure", "spring", "drag"]
     work: str
     vertices: NDArray[np.int32]
     weights: NDArray[np.float64]
@@ -139,6 +140,25 @@ class MassLoad(AppliedLoad):
 
     def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
         out[self.vertices] += self.masses[:, None] * self.load.at(x[self.vertices], time)
+
+
+class DragLoad(AppliedLoad):
+    """Forces c_i (w - v_i) on vertices with the velocities v_i in a flow of velocity w.
+
+    `value` is w (3,) [m/s]. The forces are internal to no body, and damp the motion against the flow.
+    """
+
+    @abstractmethod
+    def value(self, time: float) -> NDArray[np.float64]: ...
+
+    @abstractmethod
+    def coefficients(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """(n,) c [kg/s], not below zero, at positions x and velocities v (n, 3) of all vertices."""
+
+    def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
+        """Those on vertices at rest."""
+        at_rest = np.zeros_like(x)
+        out += self.coefficients(x, at_rest, time)[:, None] * self.value(time)
 
 
 class ActiveLoad(AppliedLoad):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,68 +15,60 @@ from supple.model.loads.applied import AppliedLoad, DeadLoad, MassLoad, UniformL
 from supple.model.loads.growth import GrownTets
 from supple.model.loads.muscles import FibreTension
 from supple.model.loads.pressure import FollowerPressure, area_vectors
+from supple.model.loads.setting import Setting
 from supple.model.loads.springs import PointSpring
-from supple.scene.actuators.muscle import Muscle, check_activation
+from supple.model.loads.wind import wind_drag
+from supple.scene.actuators.muscle import Muscle
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force
 from supple.scene.loads.body_force import BodyForce
-from supple.scene.loads.growth import STRETCHES, Growth
+from supple.scene.loads.growth import Growth
 from supple.scene.loads.load import Load
-from supple.scene.loads.over_time import OverTime, magnitude_at, value_at
+from supple.scene.loads.over_time import script_of
 from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction
+from supple.scene.loads.wind import Wind
 
 
-def applied(
-    load: Load,
-    bodies: Sequence[PlacedBody],
-    begins: dict[str, int],
-    masses: NDArray[np.float64],
-    x: NDArray[np.float64],
-) -> list[AppliedLoad]:
+def applied(load: Load, setting: Setting) -> list[AppliedLoad]:
     """A load of a scene on the vertices of all bodies, as one or several.
-
-    Parameters
-    ----------
-    begins : by body name, the number of its first vertex; masses : (n,) of all vertices [kg]
-    x : (n, 3) where the simulation begins [m]
 
     Raises
     ------
     SceneError : where the load is of an unknown kind.
     """
-    named = {body.name: body for body in bodies}
-    if isinstance(load, Traction):
-        body = named[load.body]
-        shares, parts = np.zeros(len(body.points)), _weighted_triangles(body, load.triangles(body))
-        for triangles, weight in parts:
-            areas = weight * np.linalg.norm(area_vectors(body.points, triangles), axis=1) / 3.0
-            shares += np.bincount(triangles.ravel(), np.repeat(areas, 3), len(body.points))
-        touched = np.unique(np.concatenate([triangles for triangles, _ in parts]))
-        at = _over_time(load.traction, f"{load.label}: traction", (3,))
-        vertices, weights = _vertices_of(body, begins[load.body], touched)
-        on_points = shares[touched]
-        own = on_points if weights is None else weights.T @ on_points
-        return [UniformLoad.of(vertices, own, at, "tractions")]
-    if isinstance(load, Pressure):
-        body = named[load.body]
-        at, begin = _over_time(load.pressure, f"{load.label}: pressure", ()), begins[load.body]
-        return [
-            FollowerPressure((triangles + begin).astype(np.int32), lambda time, weight=weight: weight * float(at(time)))
-            for triangles, weight in _weighted_triangles(body, load.triangles(body))
-        ]
-    if isinstance(load, BodyForce):
-        chosen = bodies if load.body is None else [named[load.body]]
-        parts = [np.arange(len(body.mesh.vertices)) + begins[body.name] for body in chosen]
-        vertices = np.concatenate(parts).astype(np.int32)
-        return [MassLoad(load, vertices, masses[vertices])]
-    if isinstance(load, Spring):
-        return [_spring(load, bodies, begins, x)]
-    if isinstance(load, Muscle):
-        return [_muscle(load, named[load.body], begins[load.body], _first_tet(load.body, bodies))]
-    if isinstance(load, Growth):
-        return [_growth(load, named[load.body], begins[load.body], _first_tet(load.body, bodies))]
+    for kind, build in LOADS.items():
+        if isinstance(load, kind):
+            return build(load, setting)
     raise SceneError(f"{load.label}: a {type(load).__name__} is not a load that solvers know")
+
+
+def _traction(load: Traction, setting: Setting) -> list[AppliedLoad]:
+    body = setting.body(load.body)
+    shares, parts = np.zeros(len(body.points)), _weighted_triangles(body, load.triangles(body))
+    for triangles, weight in parts:
+        areas = weight * np.linalg.norm(area_vectors(body.points, triangles), axis=1) / 3.0
+        shares += np.bincount(triangles.ravel(), np.repeat(areas, 3), len(body.points))
+    touched = np.unique(np.concatenate([triangles for triangles, _ in parts]))
+    vertices, weights = _vertices_of(body, setting.begins[load.body], touched)
+    on_points = shares[touched]
+    own = on_points if weights is None else weights.T @ on_points
+    return [UniformLoad.of(vertices, own, script_of(load, "traction"), "tractions")]
+
+
+def _pressure(load: Pressure, setting: Setting) -> list[AppliedLoad]:
+    body, at, begin = setting.body(load.body), script_of(load, "pressure"), setting.begins[load.body]
+    return [
+        FollowerPressure((triangles + begin).astype(np.int32), lambda time, weight=weight: weight * float(at(time)))
+        for triangles, weight in _weighted_triangles(body, load.triangles(body))
+    ]
+
+
+def _body_force(load: BodyForce, setting: Setting) -> list[AppliedLoad]:
+    chosen = setting.bodies if load.body is None else [setting.body(load.body)]
+    parts = [np.arange(len(body.mesh.vertices)) + setting.begins[body.name] for body in chosen]
+    vertices = np.concatenate(parts).astype(np.int32)
+    return [MassLoad(load, vertices, setting.masses[vertices])]
 
 
 def _weighted_triangles(body: PlacedBody, rows: NDArray[np.int64]) -> list[tuple[NDArray[np.int32], float]]:
@@ -124,62 +117,59 @@ def _vertices_of(
     return (vertices + begin).astype(np.int32), weights
 
 
-def _first_tet(name: str, bodies: Sequence[PlacedBody]) -> int:
-    """The number of a body's first tet among those of all bodies."""
-    return sum(len(body.mesh.tets) for body in bodies[: [body.name for body in bodies].index(name)])
+def _growth(load: Growth, setting: Setting) -> list[AppliedLoad]:
+    body = setting.body(load.body)
+    rows, directions = load.growing(body)
+    vertices, stretch = np.unique(body.mesh.nodes[rows]) + setting.begins[load.body], script_of(load, "stretch")
+    tets = ActiveTets(GROWTH, rows + setting.first_tet(load.body), directions)
+    return [GrownTets(tets, vertices, lambda time: float(stretch(time)))]
 
 
-def _growth(growth: Growth, body: PlacedBody, begin: int, first: int) -> GrownTets:
-    rows, directions = growth.growing(body)
-    vertices = np.unique(body.mesh.nodes[rows]) + begin
-    stretch = partial(magnitude_at, growth.stretch, what=f"{growth.label}: stretch", zero=False, limits=STRETCHES)
-    return GrownTets(ActiveTets(GROWTH, rows + first, directions), vertices, stretch)
-
-
-def _muscle(muscle: Muscle, body: PlacedBody, begin: int, first: int) -> FibreTension:
-    rows, directions = muscle.fibres(body)
+def _muscle(load: Muscle, setting: Setting) -> list[AppliedLoad]:
+    body, activation = setting.body(load.body), script_of(load, "activation")
+    rows, directions = load.fibres(body)
     inner = np.einsum("mki,mi->mk", body.mesh.rest_shape_inverse[rows], directions)
     coefficients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
-    what = f"{muscle.label}: activation"
-
-    def activation(time: float) -> float:
-        value = magnitude_at(muscle.activation, time, what)
-        check_activation(value, f"{what}({time:g})")
-        return value
-
-    stretches, values = muscle.force_length or ([1.0], [1.0])
+    stretches, values = load.force_length or ([1.0], [1.0])
     curve = np.array([stretches, values], dtype=np.float64)
-    return FibreTension(
-        ActiveTets(MUSCLE, rows + first, np.ascontiguousarray(directions), 0.0, muscle.strength, curve.T),
-        (body.mesh.tets[rows] + begin).astype(np.int32),
+    first = setting.first_tet(load.body)
+    tension = FibreTension(
+        ActiveTets(MUSCLE, rows + first, np.ascontiguousarray(directions), 0.0, load.strength, curve.T),
+        (body.mesh.tets[rows] + setting.begins[load.body]).astype(np.int32),
         coefficients,
-        muscle.strength * body.mesh.volumes[rows],
-        activation,
+        load.strength * body.mesh.volumes[rows],
+        lambda time: float(activation(time)),
         (curve[0], curve[1]),
     )
+    return [tension]
 
 
-def _spring(
-    spring: Spring, bodies: Sequence[PlacedBody], begins: dict[str, int], x: NDArray[np.float64]
-) -> PointSpring:
+def _spring(load: Spring, setting: Setting) -> list[AppliedLoad]:
     vertices, coefficients, offset = [], [], np.zeros(3)
     for key, sign in (("first", 1.0), ("second", -1.0)):
-        name, corners, weights, fixed = spring.corners(key, bodies)
+        name, corners, weights, fixed = load.corners(key, setting.bodies)
         offset = offset + sign * fixed
         if name is not None:
-            vertices.append(corners + begins[name])
+            vertices.append(corners + setting.begins[name])
             coefficients.append(sign * weights)
     together, number = np.unique(np.concatenate(vertices), return_inverse=True)
     sums = np.bincount(number.ravel(), np.concatenate(coefficients)).astype(np.float64)
     used = sums != 0.0
-    given, what = spring.rest_length, f"{spring.label}: rest_length"
-    made = PointSpring(together[used].astype(np.int32), sums[used], offset, spring.stiffness, lambda time: 0.0)
-    if given is None:
-        length = made.length(x)[0]
-        return PointSpring(made.vertices, made.coefficients, offset, spring.stiffness, lambda time: length)
-    rest_length = partial(magnitude_at, given, what=what)
-    return PointSpring(made.vertices, made.coefficients, offset, spring.stiffness, rest_length)
+    made = PointSpring(together[used].astype(np.int32), sums[used], offset, load.stiffness, lambda time: 0.0)
+    if load.rest_length is None:
+        length = made.length(setting.x)[0]
+        return [replace(made, rest_length=lambda time: length)]
+    rest_length = script_of(load, "rest_length")
+    return [replace(made, rest_length=lambda time: float(rest_length(time)))]
 
 
-def _over_time(value: OverTime, what: str, shape: tuple[int, ...]) -> Callable[[float], NDArray[np.float64]]:
-    return lambda time: value_at(value, time, what, shape)
+# All kinds of loads. A new kind is one file of its class, one of its mathematics, and one line here.
+LOADS: dict[type[Load], Callable[[Any, Setting], list[AppliedLoad]]] = {
+    Traction: _traction,
+    Pressure: _pressure,
+    BodyForce: _body_force,
+    Spring: _spring,
+    Muscle: _muscle,
+    Growth: _growth,
+    Wind: wind_drag,
+}

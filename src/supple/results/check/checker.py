@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from supple.results.check.report import CheckReport, CheckResult
 from supple.results.check.settings import CheckSettings
 from supple.results.check.snapshot import Scene, Snapshot
 from supple.results.check.tally import skipped
-from supple.results.recording.reader import read_recording
+from supple.results.recording.reader import Recording, opened
 
 CHECKS: tuple[type[FrameCheck], ...] = (
     Finite,
@@ -47,17 +48,15 @@ CHECKS: tuple[type[FrameCheck], ...] = (
 
 
 def check_recording(
-    path: str | Path,
-    settings: CheckSettings | None = None,
-    *,
-    progress: Callable[[int, int], None] | None = None,
+    recording: Recording | str | Path, *, progress: Callable[[int, int], None] | None = None, **settings: Any
 ) -> CheckReport:
     """Verify a recording, independently of the solver that made it.
 
     Parameters
     ----------
-    path : of the recording (.vtkhdf).
-    settings : which checks, which frames, and what they allow; without it, all checks on all frames.
+    recording : an open recording, or its path (.vtkhdf).
+    settings : which checks, which frames, and what they allow, such as `only=["inversion"]`, `every=10` or
+        `max_energy_gain=0.01`: the parameters of `CheckSettings`; without any, all checks on all frames.
     progress : is called with how many frames were looked at, and how many there are to look at.
 
     Returns
@@ -66,18 +65,18 @@ def check_recording(
 
     Raises
     ------
-    OutputError : where the file cannot be read as a recording.
+    OutputError : where the file cannot be read as a recording, or a setting is unusable.
     """
-    settings = settings or CheckSettings()
-    with read_recording(path) as recording, np.errstate(all="ignore"):
-        scene = Scene(recording)
-        sound = all(np.isfinite(getattr(recording, name)).all() for name in CONSTANTS)
-        chosen = [check for check in CHECKS if check.name in settings.chosen]
-        checks = {check.name: check(scene, settings) for check in chosen if sound or check.sees_all}
-        numbers = sorted({*range(0, len(recording), settings.every), len(recording) - 1})
+    wanted = CheckSettings(**settings)
+    with opened(recording) as source, np.errstate(all="ignore"):
+        scene = Scene(source)
+        sound = all(np.isfinite(getattr(source, name)).all() for name in CONSTANTS)
+        chosen = [check for check in CHECKS if check.name in wanted.chosen]
+        checks = {check.name: check(scene, wanted) for check in chosen if sound or check.sees_all}
+        numbers = sorted({*range(0, len(source), wanted.every), len(source) - 1})
         seen = 0
         for done, number in enumerate(numbers):
-            at = Snapshot.of(scene, recording[number])
+            at = Snapshot.of(scene, source[number])
             seen += at.finite
             for check in checks.values():
                 if check.why_not is None and (at.finite or check.sees_all):
@@ -85,7 +84,7 @@ def check_recording(
             if progress is not None:
                 progress(done + 1, len(numbers))
         results = tuple(_result(check.name, checks.get(check.name), seen) for check in chosen)
-        return CheckReport(Path(path), len(recording), len(numbers), results)
+        return CheckReport(source.path, len(source), len(numbers), results)
 
 
 def _result(name: str, check: FrameCheck | None, seen: int) -> CheckResult:

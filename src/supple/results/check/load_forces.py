@@ -8,17 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
-from supple.results.recording.actions.loads import RecordedLoad
+from supple.results.recording.scene import RecordedLoad
 
 
 def load_forces(
-    loads: Mapping[str, RecordedLoad], values: Mapping[str, NDArray[np.float64] | float], x: NDArray[np.float64]
+    loads: Mapping[str, RecordedLoad],
+    values: Mapping[str, NDArray[np.float64] | float],
+    x: NDArray[np.float64],
+    v: NDArray[np.float64],
 ) -> dict[str, NDArray[np.float64]]:
-    """By the name of their work, (n, 3) at positions x (n, 3) [N]; NaN where a value is missing."""
+    """By the name of their work, (n, 3) at positions x and velocities v (n, 3) [N]; NaN where a value is missing."""
     out: dict[str, NDArray[np.float64]] = {}
     for name, load in loads.items():
         total = out.setdefault(load.work, np.zeros_like(x))
-        _add_forces(load, np.asarray(values.get(name, np.nan)), x, total)
+        value = np.asarray(values.get(name, np.nan))
+        if load.kind == "drag":
+            _add_drag(load, value, (x, v), total)
+        else:
+            _add_forces(load, value, x, total)
     return out
 
 
@@ -38,6 +45,21 @@ def _add_forces(
         length = float(np.linalg.norm(r))
         force = -load.stiffness * (length - value) * (r / length if length > 0.0 else np.zeros(3))
     np.add.at(out, load.vertices, load.weights[:, None] * force)
+
+
+def _add_drag(
+    load: RecordedLoad,
+    flow: NDArray[np.float64],
+    motion: tuple[NDArray[np.float64], NDArray[np.float64]],
+    out: NDArray[np.float64],
+) -> None:
+    """Of triangles with outward area vectors A and mean velocities u against the flow, where A . u < 0: on each corner
+    a sixth of stiffness |A . u| times the flow's velocity against it; motion : places and velocities (n, 3)."""
+    x, v = (values[load.vertices] for values in motion)
+    A = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    facing = np.einsum("ti,ti->t", A, v.sum(axis=1) / 3.0 - flow)
+    share = load.stiffness / 6.0 * np.where(facing > 0.0, facing, 0.0)
+    np.add.at(out, load.vertices, share[:, None, None] * (flow - v))
 
 
 def add_muscle_forces(

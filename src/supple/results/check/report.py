@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from supple.runtime.displayed import Displayed
 from supple.runtime.replacing import whole_file
 
 
@@ -46,8 +47,8 @@ class CheckResult:
     first_failure: int | None = None
 
 
-@dataclass(frozen=True)
-class CheckReport:
+@dataclass(frozen=True, repr=False)
+class CheckReport(Displayed):
     """All checks of one recording.
 
     Attributes
@@ -60,6 +61,10 @@ class CheckReport:
     frames: int
     frames_checked: int
     results: tuple[CheckResult, ...]
+
+    def _facts(self) -> dict[str, str]:
+        facts = {"frames": f"{self.frames_checked} of {self.frames}", "failed": str(len(self.failures))}
+        return facts | {r.name: f"{r.verdict}: {r.message}" for r in self.results}
 
     @property
     def ok(self) -> bool:

@@ -173,7 +173,7 @@ class Snapshot:
     def load_forces(self) -> dict[str, NDArray[np.float64]]:
         """(n, 3) forces of recorded loads and actuators on the vertices [N], by the name of their work."""
         recording = self.scene.recording
-        found = load_forces(recording.loads, self.load_values, self.positions)
+        found = load_forces(recording.loads, self.load_values, self.positions, self.velocities)
         if any(each.kind == MUSCLE for each in self.active):
             shapes = self.scene.rest_inverse, recording.rest_volumes
             out = found.setdefault("muscles", np.zeros_like(self.positions))

@@ -60,7 +60,7 @@ class Surfaces:
         counts = [len(part) for part in triangles]
         for j, obstacle in enumerate(recording.obstacles):
             points, faces = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
-            if obstacle.obstacle.has_exact_triangles:  # others are checked by their formula
+            if obstacle.obstacle.checked_by_triangles:  # others are checked by their formula
                 points, faces = obstacle.obstacle.triangles()
                 self.fixed.append((j, points, row))
             triangles.append(faces.astype(np.int64) + row)

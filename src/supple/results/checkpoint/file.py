@@ -80,7 +80,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     """
     tree, arrays = encoded(checkpoint, _classes())
     header = json.dumps({"content": tree, "arrays": described(arrays)}, separators=(",", ":")).encode() + b"\n"
-    parts = [header, *(np.ascontiguousarray(array).tobytes() for array in arrays)]
+    parts = [header, *(np.ascontiguousarray(array).tobytes() for array in arrays.values())]
     digest = hashlib.sha256()
     for part in parts:
         digest.update(part)

@@ -1,7 +1,8 @@
 """Values as JSON and arrays, and back with the same bits.
 
-Known are None, truth values, numbers, texts, sets of texts, tuples, lists, mappings from texts, NumPy's arrays and
-scalars, and frozen dataclasses and named tuples of these that are given as `classes`. Nothing that is read is executed.
+Known are None, truth values, numbers, texts, sets of texts, tuples, lists, slices, mappings from texts, NumPy's arrays
+and scalars, and dataclasses and named tuples of these that are given as `classes`. An array is known by its path, such
+as "bodies/0/triangles". Nothing that is read is executed.
 """
 
 from __future__ import annotations
@@ -22,44 +23,50 @@ _DEEPEST = 50
 Classes = Mapping[str, type]
 
 
-def encoded(value: Any, classes: Classes) -> tuple[Any, list[NDArray[Any]]]:
-    """A tree that JSON can hold, and the arrays that it refers to by their number.
+Arrays = Mapping[str, NDArray[Any]]
+
+
+def encoded(value: Any, classes: Classes) -> tuple[Any, dict[str, NDArray[Any]]]:
+    """A tree that JSON can hold, and the arrays that it refers to, by their path.
 
     Raises
     ------
     OutputError : where a value is of no known kind.
     """
-    arrays: list[NDArray[Any]] = []
+    arrays: dict[str, NDArray[Any]] = {}
 
-    def tree_of(item: Any) -> Any:
+    def tree_of(item: Any, path: str) -> Any:
+        def inside(key: object) -> str:
+            return f"{path}/{key}" if path else str(key)
+
         if item is None or (isinstance(item, (bool, int, float, str)) and type(item).__module__ == "builtins"):
             return item
         if isinstance(item, np.ndarray | np.generic) and item.dtype.kind in "biuf":
-            arrays.append(np.asarray(item))
-            return {"array" if isinstance(item, np.ndarray) else "scalar": len(arrays) - 1}
+            arrays[path] = np.asarray(item)
+            return {"array" if isinstance(item, np.ndarray) else "scalar": path}
         if isinstance(item, frozenset) and all(isinstance(part, str) for part in item):
             return {"frozenset": sorted(str(part) for part in item)}
         if isinstance(item, (tuple, list)) and type(item) in (tuple, list):
-            return {type(item).__name__: [tree_of(part) for part in item]}
+            return {type(item).__name__: [tree_of(part, inside(k)) for k, part in enumerate(item)]}
+        if isinstance(item, slice):
+            return {"slice": [int(item.start), int(item.stop)]}
         if isinstance(item, Mapping) and all(isinstance(key, str) for key in item):
-            return {"mapping": {key: tree_of(part) for key, part in item.items()}}
+            # By number: a key may contain any character, and two paths must differ.
+            return {"mapping": {key: tree_of(part, inside(k)) for k, (key, part) in enumerate(item.items())}}
         if classes.get(type(item).__name__) is type(item):
-            made_of = {name: tree_of(getattr(item, name)) for name in _field_names(type(item))}
+            made_of = {name: tree_of(getattr(item, name), inside(name)) for name in field_names(type(item))}
             return {"class": type(item).__name__, "fields": made_of}
-        raise OutputError(
-            f"a checkpoint cannot hold a {type(item).__name__}; register its class in "
-            "supple.results.checkpoint.memories"
-        )
+        raise OutputError(f"a {type(item).__name__} cannot be written to a file; register its class with its codec")
 
-    return tree_of(value), arrays
+    return tree_of(value, ""), arrays
 
 
-def decoded(tree: Any, arrays: list[NDArray[Any]], classes: Classes) -> Any:
+def decoded(tree: Any, arrays: Arrays, classes: Classes) -> Any:
     """The value that `encoded` was given. Arrays are those given, not copies.
 
     Raises
     ------
-    ValueError, TypeError, KeyError, IndexError : where the tree is not one that `encoded` returns for these classes.
+    ValueError, TypeError, KeyError : where the tree is not one that `encoded` returns for these classes.
     """
 
     def value_of(item: Any, depth: int) -> Any:
@@ -75,12 +82,15 @@ def decoded(tree: Any, arrays: list[NDArray[Any]], classes: Classes) -> Any:
             )
         ((kind, content),) = item.items()
         match kind:
-            case "array" | "scalar":
-                if isinstance(content, bool) or not isinstance(content, int) or content < 0:
-                    raise ValueError("the number of an array is wrong")
-                return arrays[content] if kind == "array" else arrays[content][()]
+            case "array":
+                return arrays[content]
+            case "scalar":
+                return arrays[content][()]
             case "frozenset":
                 return frozenset(str(part) for part in content)
+            case "slice":
+                begin, end = content
+                return slice(int(begin), int(end))
             case "tuple":
                 return tuple(value_of(part, depth + 1) for part in content)
             case "list":
@@ -92,14 +102,14 @@ def decoded(tree: Any, arrays: list[NDArray[Any]], classes: Classes) -> Any:
     return value_of(tree, 0)
 
 
-def _field_names(made: type) -> tuple[str, ...]:
+def field_names(made: type) -> tuple[str, ...]:
     """Of a dataclass or a named tuple."""
     return tuple(field.name for field in fields(made)) if is_dataclass(made) else made._fields
 
 
 def _instance(made: type, given: dict[str, Any]) -> Any:
     """A dataclass or named tuple with these fields; all must be given, and none beside them."""
-    if set(_field_names(made)) != given.keys():
+    if set(field_names(made)) != given.keys():
         raise ValueError(f"{made.__name__} has other fields in this version")
     later = [field.name for field in fields(made) if not field.init] if is_dataclass(made) else []
     instance = made(**{key: value for key, value in given.items() if key not in later})
@@ -108,20 +118,20 @@ def _instance(made: type, given: dict[str, Any]) -> Any:
     return instance
 
 
-def described(arrays: list[NDArray[Any]]) -> list[list[Any]]:
+def described(arrays: Arrays) -> dict[str, list[Any]]:
     """Type and shape of each array, as JSON can hold them."""
-    return [[array.dtype.str, list(array.shape)] for array in arrays]
+    return {path: [array.dtype.str, list(array.shape)] for path, array in arrays.items()}
 
 
-def restored(description: Any, data: memoryview) -> list[NDArray[Any]]:
+def restored(description: Any, data: memoryview) -> dict[str, NDArray[Any]]:
     """The arrays with these types and shapes, whose bytes follow each other in `data`.
 
     Raises
     ------
-    ValueError, TypeError : where description and bytes do not agree.
+    ValueError, TypeError, AttributeError : where description and bytes do not agree.
     """
-    arrays, place = [], 0
-    for dtype, shape in description:
+    arrays, place = {}, 0
+    for path, (dtype, shape) in description.items():
         if not isinstance(dtype, str) or _DTYPE.fullmatch(dtype) is None:
             raise ValueError(f"an array is of type {dtype!r}")
         if not all(isinstance(length, int) and 0 <= length < 1 << 40 for length in shape):
@@ -132,7 +142,7 @@ def restored(description: Any, data: memoryview) -> list[NDArray[Any]]:
         end = place + count * kind.itemsize
         if end > len(data):
             raise ValueError("an array is longer than the file")
-        arrays.append(np.frombuffer(data[place:end], dtype=kind).reshape(shape).copy())
+        arrays[path] = np.frombuffer(data[place:end], dtype=kind).reshape(shape).copy()
         place = end
     if place != len(data):
         raise ValueError("bytes are left over after its arrays")

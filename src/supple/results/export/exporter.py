@@ -8,8 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from supple.errors import OutputError
-from supple.results.drawing import opened
-from supple.results.recording.reader import Recording
+from supple.results.recording.reader import Recording, opened
 from supple.results.recording.recorder import SUFFIXES as RECORDING_SUFFIXES
 from supple.runtime.replacing import refuse_to_replace
 

@@ -100,23 +100,14 @@ class CheckedFile:
             raise self.broken(f"{path} is no text")
         return value.decode("utf-8", errors="replace")
 
-    def array(self, path: str, kind: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
-        """A whole array of `kind` ("f", "i" or "u") and shape, None standing for any length."""
+    def array(self, path: str) -> NDArray[Any]:
+        """A whole array of numbers."""
         dataset = self.dataset(path)
-        got = dataset.shape or ()
-        if len(got) != len(shape) or any(want not in (None, have) for want, have in zip(shape, got, strict=True)):
-            raise self.broken(f"{path} has shape {got}, not {tuple('any' if s is None else s for s in shape)}")
-        self._check_data(dataset, path, kind, dataset.size * dataset.dtype.itemsize)
-        return self._load(dataset, path, ())
-
-    def indices(self, path: str, columns: int, count: int) -> NDArray[np.int32]:
-        """(k, columns) int32 below `count`."""
-        values = self.array(path, "i", (None, columns))
-        if values.size and (values.min() < 0 or values.max() >= count):
-            raise self.broken(
-                f"{path} points to row {values.max() if values.max() >= count else values.min()} of {count}"
-            )
-        return np.ascontiguousarray(values, dtype=np.int32)
+        if dataset.dtype.kind not in "biuf":
+            raise self.broken(f"{path} holds {dataset.dtype}")
+        self._check_size(path, dataset.size * dataset.dtype.itemsize)
+        values = self._load(dataset, path, ())
+        return values.astype(values.dtype.newbyteorder("="), copy=False)
 
     def check_series(self, series: Series, frames: int) -> h5py.Dataset:
         """The dataset of a series, which has the rows of at least so many frames."""
@@ -124,21 +115,21 @@ class CheckedFile:
         got, needed = dataset.shape or (), series.shape(frames)
         if got[1:] != needed[1:] or not got[:1] >= needed[:1]:
             raise self.broken(f"{series.path} has shape {got}; {frames} frames need {needed}")
-        self._check_data(dataset, series.path, np.dtype(series.dtype).kind, series.frame_bytes)
+        if dataset.dtype.kind != np.dtype(series.dtype).kind:
+            raise self.broken(f"{series.path} holds {dataset.dtype}")
+        self._check_size(series.path, series.frame_bytes)
         return dataset
 
     def rows(self, series: Series, begin: int, end: int, what: str) -> NDArray[Any]:
         """The rows of the frames from `begin` to `end`; an error calls them `what`."""
         dataset = self.check_series(series, end)
-        self._check_data(dataset, series.path, dataset.dtype.kind, (end - begin) * series.frame_bytes)
+        self._check_size(series.path, (end - begin) * series.frame_bytes)
         return self._load(dataset, what, slice(begin * series.rows, end * series.rows))
 
     def close(self) -> None:
         self._file.close()
 
-    def _check_data(self, dataset: h5py.Dataset, path: str, kind: str, size: int) -> None:
-        if dataset.dtype.kind != kind:
-            raise self.broken(f"{path} holds {dataset.dtype}")
+    def _check_size(self, path: str, size: int) -> None:
         if size > _MOST_EXPANSION * self._bytes:
             raise self.broken(f"{path} claims more data than the file can contain")
 

@@ -13,88 +13,58 @@ from supple.errors import OutputError
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.model.state import Status
 from supple.results.readings.fields import FIELDS, Field
-from supple.results.recording.actions.actuators import read_actuators
-from supple.results.recording.actions.joints import RecordedJoint, read_joints
-from supple.results.recording.actions.loads import read_loads
-from supple.results.recording.actions.stitches import RecordedStitches, read_stitches
 from supple.results.recording.checked_hdf5 import CheckedFile
-from supple.results.recording.details import RecordedDetails
 from supple.results.recording.file import WRITTEN
-from supple.results.recording.laws import read_quadratic, recorded_laws
-from supple.results.recording.physics import RecordedPhysics, RecordedWeld, read_physics, read_untouching, read_welds
+from supple.results.recording.laws import recorded_laws
 from supple.results.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
-from supple.results.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
-from supple.results.recording.sensors import RecordedSensor, sensors_of_header
+from supple.results.recording.scene import RecordedBody, RecordedScene, read_scene
 
 _MESSAGE = "supple/frames/message"
 _READ_BY_FRAME = ("VTKHDF/Points", "VTKHDF/PointData/velocities", "VTKHDF/CellData/det_F", "supple/frames/poses")
 
 
-class RecordedContents:
+class RecordedContents(RecordedScene):
     """The arrays and records of a recording's file; see `Recording` for its attributes."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._file = CheckedFile(self.path)
+        self._read_series: dict[str, NDArray[Any]] = {}
         try:
-            self._read()
+            super().__init__(**vars(read_scene(self._file)))
+            self._open_series()
         except (OutputError, OSError, RuntimeError) as error:
             self._file.close()
             if isinstance(error, OutputError):
                 raise
             raise self._file.broken(str(error)) from None
 
-    def _read(self) -> None:
-        file = self._file
-        header = read_header(file)
-        self._read_series: dict[str, NDArray[Any]] = {}
-        self.details = RecordedDetails.from_header(file, header)
-        self.rest_positions = file.array("supple/rest_positions", "f", (None, 3))
-        n = len(self.rest_positions)
-        self.tets = file.indices("supple/tets", 4, n)
-        m = len(self.tets)
-        self.quadratic = read_quadratic(file, self.tets, n)
-        self.triangles = file.indices("supple/triangles", 3, n)
-        self.rest_volumes = file.array("supple/rest_volumes", "f", (m,))
-        self.masses = file.array("supple/masses", "f", (n,))
-        self.gravity = file.array("supple/gravity", "f", (3,))
-        self.pinned_vertices = file.array("supple/pinned_vertices", "i", (None,))
-        self.bodies: tuple[RecordedBody, ...] = read_bodies(file, header, n, m, self.triangles)
-        self.obstacles: tuple[RecordedObstacle, ...] = read_obstacles(file, header)
-        curved = np.zeros(m, dtype=bool)
-        if self.quadratic is not None:
-            curved[self.quadratic[0]] = True
-        self.physics: RecordedPhysics = read_physics(file, header, curved)
-        self.untouching = read_untouching(file, header)
-        self.welds: tuple[RecordedWeld, ...] = read_welds(file, header, n)
-        self.joints: tuple[RecordedJoint, ...] = read_joints(file, header)
-        self.loads, self.other_loads = read_loads(file, header, n)
-        self.cavities, self.cables = read_actuators(file, header, n)
-        self.stitches: RecordedStitches = read_stitches(file, n, len(self.obstacles))
-        self.dt = float(header["dt"])
-        self.solver: str | None = header.get("solver")
-        self.supple_version = str(header.get("supple_version", ""))
-        self.scene_text = file.text("supple/scene") if "supple/scene" in file else None
-        self._count = int(file.array(WRITTEN, "i", ()))
+    def _open_series(self) -> None:
+        file, flowing = self._file, self.internal_rows
+        self._count = int(file.array(WRITTEN))
         if self._count < 1:
             raise file.broken(f"its number of frames is {self._count}")
-        self.fields: tuple[Field, ...] = _recorded_fields(file, header)
-        self.sensors: tuple[RecordedSensor, ...] = sensors_of_header(file, header)
-        flowing = self.internal_rows
+        if not set(self.field_names) <= FIELDS.keys():
+            raise file.of_another_version("it has an unknown field")
+        self.fields: tuple[Field, ...] = tuple(FIELDS[name] for name in self.field_names)
+        n, m = len(self.rest_positions), len(self.tets)
         layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors, flowing)
         self._series = {series.path: series for series in layout.series}
         own = [field_series(field, n, m).path for field in self.fields]
-        others = [_MESSAGE] + [INTERNAL] * (flowing > 0)
-        for path in (*_READ_BY_FRAME, *own, *others):
+        for path in (*_READ_BY_FRAME, *own, _MESSAGE, *([INTERNAL] if flowing else [])):
             file.check_series(self._series[path], self._count)
         self.times: NDArray[np.float64] = self._values("supple/frames/time")
         if not np.isfinite(self.times).all():
             raise file.broken("a frame's time is not finite")
         codes = self._values("supple/frames/status")
-        names = header["statuses"]
-        if codes.max() >= len(names) or not set(names) <= {str(status) for status in Status}:
+        if codes.max() >= len(self.statuses_of_codes):
             raise file.of_another_version("a frame has an unknown status")
-        self.statuses: tuple[Status, ...] = tuple(Status(names[code]) for code in codes)
+        self.statuses: tuple[Status, ...] = tuple(Status(self.statuses_of_codes[code]) for code in codes)
+
+    @cached_property
+    def triangles(self) -> NDArray[np.int32]:
+        """(t, 3) boundaries of all bodies."""
+        return np.concatenate([body.triangles + np.int32(body.vertices.start) for body in self.bodies])
 
     @cached_property
     def laws(self) -> TetLaws:
@@ -161,12 +131,3 @@ class RecordedContents:
     def _frame_rows(self, path: str, number: int) -> NDArray[Any]:
         block = self._file.rows(self._series[path], number, number + 1, f"frame {number}")
         return block[0] if path == "supple/frames/poses" else block
-
-
-def _recorded_fields(file: CheckedFile, header: dict[str, Any]) -> tuple[Field, ...]:
-    names = header.get("fields")
-    if not isinstance(names, list):
-        raise file.broken("its header does not list its fields")
-    if not set(map(str, names)) <= FIELDS.keys():
-        raise file.of_another_version("it has an unknown field")
-    return tuple(FIELDS[name] for name in names)

@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.model.state import SolverDetails
-from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.file import Series
 
 
@@ -38,7 +37,7 @@ class RecordedField:
     """
 
     name: str
-    dtype: str
+    dtype: Literal["<i8", "<f8"]
     keys: tuple[str, ...] | None = None
     row_shape: tuple[int, ...] = ()
 
@@ -67,9 +66,9 @@ class RecordedField:
 
 @dataclass(frozen=True)
 class RecordedDetails:
-    """The class of a recording's details, and how each of its fields is stored."""
+    """The name of the class of a recording's details, and how each of its fields is stored."""
 
-    kind: type[SolverDetails] = SolverDetails
+    kind: str = "SolverDetails"
     fields: tuple[RecordedField, ...] = ()
 
     @classmethod
@@ -78,28 +77,22 @@ class RecordedDetails:
         known = _kinds().values()
         kind = next(base for base in type(details).__mro__ if base in known)
         kept = [field.name for field in fields(kind) if field.compare]
-        return cls(kind, tuple(_field_like(name, getattr(details, name)) for name in kept))
+        return cls(kind.__name__, tuple(_field_like(name, getattr(details, name)) for name in kept))
 
-    @classmethod
-    def from_header(cls, file: CheckedFile, header: dict[str, Any]) -> RecordedDetails:
-        """What the header of a recording describes."""
-        try:
-            kind = _kinds()[header["details"]["kind"]]
-            known = {field.name for field in fields(kind) if field.compare}
-            made = cls(kind, tuple(_field_of(described) for described in header["details"]["fields"]))
-        except (KeyError, TypeError, ValueError):
-            raise file.broken("the solver's details in its header are not described as they should be") from None
-        if not {field.name for field in made.fields} <= known:
-            raise file.of_another_version(f"{kind.__name__} has an unknown field")
-        return made
-
-    def header(self) -> dict[str, Any]:
-        """The description, as JSON can hold it."""
-        return {"kind": self.kind.__name__, "fields": [vars(field) for field in self.fields]}
+    def check(self) -> None:
+        """Raise `ValueError` where this is not what this version writes."""
+        kind = _kinds().get(self.kind)
+        known = set() if kind is None else {field.name for field in fields(kind) if field.compare}
+        if not {field.name for field in self.fields} <= known:
+            raise ValueError(f"the solver's details are {self.kind} with fields that are not known here")
+        if any(field.row_shape not in ((), (3,)) for field in self.fields):
+            raise ValueError("a field of the solver's details has rows that are neither numbers nor vectors")
 
     def of_frame(self, number: int, series: Callable[[str], NDArray[Any]]) -> SolverDetails:
         """The details of one frame; `series` returns all frames' rows of the series at a path."""
-        return self.kind(**{field.name: field.loaded(series(field.series.path)[number]) for field in self.fields})
+        return _kinds()[self.kind](
+            **{field.name: field.loaded(series(field.series.path)[number]) for field in self.fields}
+        )
 
 
 def _field_like(name: str, value: Any) -> RecordedField:
@@ -107,10 +100,3 @@ def _field_like(name: str, value: Any) -> RecordedField:
         rows = [np.asarray(row) for row in value.values()]
         return RecordedField(name, "<f8", tuple(value), rows[0].shape if rows else ())
     return RecordedField(name, "<i8" if isinstance(value, (int, np.integer)) else "<f8")
-
-
-def _field_of(described: dict[str, Any]) -> RecordedField:
-    name, dtype, keys, row_shape = (described[key] for key in ("name", "dtype", "keys", "row_shape"))
-    if dtype not in ("<i8", "<f8") or row_shape not in ([], [3]) or not (keys is None or isinstance(keys, list)):
-        raise ValueError
-    return RecordedField(str(name), dtype, None if keys is None else tuple(map(str, keys)), tuple(row_shape))

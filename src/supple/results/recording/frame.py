@@ -50,7 +50,8 @@ class RecordedFrame(TetReadings):
         """All vertices, in the order of the bodies."""
         internal = self._rows(INTERNAL) if self.recording.internal_rows else NEVER_FLOWED
         vertices = self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities")
-        joints = {joint.name for joint in self.recording.joints if joint.kind == "hinge"}
+        measures = {joint.name: joint.conditions.coordinate for joint in self.recording.joints}
+        joints = {name for name, measure in measures.items() if measure is not None and measure.form == "angle"}
         known = self.report.joints.items()
         angles = {name: one.coordinate for name, one in known if name in joints and one.coordinate is not None}
         return State(self.time, *vertices, internal=internal, hinge_angles=angles)

@@ -11,24 +11,8 @@ from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.per_tet import TetMaterial
-from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.physics import RecordedPhysics
 from supple.results.recording.scene import RecordedBody
-
-
-def read_quadratic(
-    file: CheckedFile, tets: NDArray[np.integer], n: int
-) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
-    """Rows (k,) and nodes (k, 10) of the quadratic ones among tets (m, 4) of n vertices; None without such."""
-    if "supple/quadratic" not in file:
-        return None
-    rows = file.array("supple/quadratic/rows", "i", (None,))
-    if len(rows) and (rows.min() < 0 or rows.max() >= len(tets) or (np.diff(rows) <= 0).any()):
-        raise file.broken("its quadratic tets are not rows of its tets in ascending order")
-    nodes = file.indices("supple/quadratic/nodes", 10, n)
-    if len(nodes) != len(rows) or not np.array_equal(nodes[:, :4], tets[rows]):
-        raise file.broken("the nodes of its quadratic tets do not have the corners of its tets")
-    return rows.astype(np.int32), nodes
 
 
 def recorded_laws(

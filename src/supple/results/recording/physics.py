@@ -1,15 +1,14 @@
-"""What a recording keeps of its scene for `supple check`: laws of the bodies, loads, and pairs that may touch."""
+"""What a recording keeps of its scene for `supple check`: laws of the bodies, and what holds them."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import SceneError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS
@@ -18,21 +17,43 @@ from supple.materials.flows.registry import RECORDED_FLOWS
 from supple.materials.laws.registry import RECORDED_LAWS
 from supple.materials.material import Hyperelastic
 from supple.materials.own.derivation import OwnLaw
-from supple.materials.own.formula import VARIABLES, Formula
+from supple.materials.own.formula import Formula
 from supple.materials.own.formula_law import FormulaLaw
 from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, Law, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.model.system import System
-from supple.results.recording.actions.actuators import write_actuators
-from supple.results.recording.actions.joints import joints_of
-from supple.results.recording.actions.loads import write_loads
-from supple.results.recording.checked_hdf5 import CheckedFile
+from supple.results.checkpoint.typed import Rows
 from supple.scene.contact_pairs import pair_table
 from supple.scene.joints.axis_joint import AxisJoint
 
 NOT_KNOWN = 255
 GIVEN_BY_LAW = 254
-_GROUP = "supple/physics"
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLaw:
+    """Tets with one law that is not one of `registry.ELASTIC_MATERIALS`.
+
+    Attributes
+    ----------
+    law : the name of a registered law, or its formula; flow : the name of how it flows, or None
+    rows : (k,) the tets; parameters : (k, q); points : at how many points of each tet it is evaluated
+    """
+
+    law: str | Formula
+    flow: str | None
+    rows: Annotated[NDArray[np.int64], Rows("k", below="m")]
+    parameters: Annotated[NDArray[np.float64], Rows("k", "q")]
+    points: int
+
+    @cached_property
+    def here(self) -> LawTets | None:
+        """The law itself; None where it is not known here."""
+        law: Law | None = FormulaLaw(self.law) if isinstance(self.law, Formula) else RECORDED_LAWS.get(self.law)
+        if law is None or self.parameters.shape[1] not in law.counts:
+            return None
+        flow = None if self.flow is None else RECORDED_FLOWS[self.flow]
+        return LawTets(law, self.rows, self.parameters, flow, self.points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +62,10 @@ class RecordedPhysics:
 
     Attributes
     ----------
-    region : (m,) the region over whose patches the energy of a tet is averaged, or `NO_REGION`
     kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, `GIVEN_BY_LAW` or `NOT_KNOWN`; mu, lam : (m,) [Pa]
-    laws : whose energies are added to those of `kind`
+    region : (m,) the region over whose patches the energy of a tet is averaged, or `NO_REGION`
+    materials : names of `registry.ELASTIC_MATERIALS`
+    recorded_laws : whose energies are added to those of `kind`
     internal : number of rows of internal variables of a frame
     active : growths and muscles; each frame has their values, see `SolverDetails`
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
@@ -51,9 +73,14 @@ class RecordedPhysics:
     held_joints, motors : numbers of the joints with the world or an obstacle, and of motors of joints
     """
 
-    kind: NDArray[np.uint8]
-    mu: NDArray[np.float64]
-    lam: NDArray[np.float64]
+    kind: Annotated[NDArray[np.uint8], Rows("m")]
+    mu: Annotated[NDArray[np.float64], Rows("m")]
+    lam: Annotated[NDArray[np.float64], Rows("m")]
+    region: Annotated[NDArray[np.int32], Rows("m")]
+    materials: tuple[str, ...]
+    recorded_laws: tuple[RecordedLaw, ...]
+    internal: int
+    active: tuple[ActiveTets, ...]
     compliances: tuple[tuple[float, float] | None, ...]
     forces: int
     soft_targets: int
@@ -61,199 +88,52 @@ class RecordedPhysics:
     stitches: int
     held_joints: int
     motors: int
-    region: NDArray[np.int32]
-    laws: tuple[LawTets, ...] = ()
-    internal: int = 0
-    active: tuple[ActiveTets, ...] = ()
 
-    @property
+    @cached_property
+    def laws(self) -> tuple[LawTets, ...]:
+        """Those of the laws that are known here."""
+        return tuple(law.here for law in self.recorded_laws if law.here is not None)
+
+    @cached_property
     def tet_kinds(self) -> NDArray[np.int32]:
         """(m,) as of `TetMaterial`."""
         kind = self.kind.astype(np.int32)
         kind[self.kind == NOT_KNOWN] = NOT_ELASTIC
         kind[self.kind == GIVEN_BY_LAW] = BY_LAW
+        for law in self.recorded_laws:
+            if law.here is None:
+                kind[law.rows] = NOT_ELASTIC
         return kind
 
     def knows_law(self, body: int, tets: slice) -> bool:
         """Whether the elastic energy of a body can be computed."""
-        return self.compliances[body] is not None or bool((self.kind[tets] != NOT_KNOWN).all())
+        return self.compliances[body] is not None or bool((self.tet_kinds[tets] != NOT_ELASTIC).all())
 
-
-def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
-    """Write the arrays to the group of the recording; returns the part that belongs in its header."""
-    m = len(system.tets)
-    kind, mu, lam = np.full(m, NOT_KNOWN, dtype=np.uint8), np.zeros(m), np.zeros(m)
-    region = np.full(m, NO_REGION, dtype=np.int32)
-    compliances: list[list[float] | None] = []
-    for part in system.bodies:
-        material = part.body.material
-        compliances.append(None)
-        if isinstance(material, EdgesAndVolume):
-            compliances[-1] = [float(material.edge_compliance), float(material.volume_compliance)]
-        elif isinstance(material, Hyperelastic):
-            rows = material.per_tet(part.tets.stop - part.tets.start)
-            kind[part.tets] = np.where(rows.kind == BY_LAW, GIVEN_BY_LAW, rows.kind)
-            mu[part.tets], lam[part.tets], region[part.tets] = rows.mu, rows.lam, rows.region
-    known = [tets for tets in system.laws.material.laws if _described(tets.law) is not None]
-    for tets in system.laws.material.laws:
-        if _described(tets.law) is None:
-            kind[tets.rows] = NOT_KNOWN
-    group = own.create_group("physics")
-    group["kind"], group["mu"], group["lam"] = kind, mu, lam
-    group["region"] = region
-    for k, tets in enumerate(known):
-        group[f"law_{k}/rows"] = tets.rows.astype(np.int32)[:, None]
-        group[f"law_{k}/parameters"] = tets.parameters
-    active = system.laws_at(system.start_states[-1].time).active
-    for k, each in enumerate(active):
-        group[f"active_{k}/rows"] = each.rows.astype(np.int32)[:, None]
-        group[f"active_{k}/directions"], group[f"active_{k}/curve"] = each.directions, each.curve
-    return {
-        "active": [[each.kind, each.strength] for each in active],
-        "laws": [law.__name__ for law in ELASTIC_MATERIALS],
-        "by_law": [_described(tets.law) for tets in known],
-        "flows": [None if tets.flow is None else tets.flow.name for tets in known],
-        "points": [tets.points for tets in known],
-        "internal": count_of(system.laws.material),
-        "compliances": compliances,
-        "forces": len(system.loads) + sum(each.coordinate.is_anchored for each in system.actuators),
-        "soft_targets": len(system.soft_targets),
-        "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
-        "stitches": len(system.stitching),
-        "held_joints": sum(joint.second not in {part.name for part in system.bodies} for joint in system.scene.joints),
-        "motors": sum(isinstance(joint, AxisJoint) and joint.motor is not None for joint in system.scene.joints),
-        "untouching": _untouching(system),
-        "welds": _welds(system),
-        "loads": write_loads(group, system),
-        "actuators": write_actuators(group, system),
-        "joints": [joint.described() for joint in joints_of(system)],
-    }
-
-
-def _described(law: Law) -> str | dict[str, Any] | None:
-    """A law as recordings name it, or write it out; None where they cannot."""
-    if not isinstance(law, OwnLaw):
-        return law.name if law.name in RECORDED_LAWS else None
-    return None if law.formula is None else asdict(law.formula)
-
-
-def _law_of(entry: object) -> Law | None:
-    """The law that `_described` gave; None where it is not known here.
-
-    Raises
-    ------
-    SceneError : where a formula is no formula.
-    """
-    if not isinstance(entry, dict):
-        return RECORDED_LAWS.get(str(entry))
-    text, of, names = (entry.get(key) for key in ("text", "of", "parameters"))
-    if not isinstance(text, str) or of not in VARIABLES or not isinstance(names, list):
-        raise SceneError("its entry is incomplete")
-    return FormulaLaw(Formula(text, of, tuple(map(str, names))))
-
-
-def _untouching(system: System) -> list[list[int]]:
-    """Pairs that the scene lets pass through each other: numbers of bodies, then obstacles."""
-    collide = pair_table(system.scene).collide
-    obstacle = np.arange(len(collide)) >= len(system.bodies)
-    passing = np.argwhere(np.triu(~collide & ~(obstacle[:, None] & obstacle[None, :])))
-    return passing.tolist()
-
-
-def _welds(system: System) -> list[tuple[int, int, list[int]]]:
-    """The soft and the rigid body of each weld, and its vertices."""
-    number = {part.name: k for k, part in enumerate(system.bodies)}
-    vertices, weld_of = system.welding.vertices, system.welding.weld
-    welds = enumerate(system.scene.welds)
-    return [(number[weld.body], number[weld.rigid], vertices[weld_of == k].tolist()) for k, weld in welds]
-
-
-def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[np.bool_]) -> RecordedPhysics:
-    """The laws of a recording; quadratic : (m,) which tets are.
-
-    Raises
-    ------
-    OutputError : where the data are contradictory.
-    """
-    physics = header["physics"]
-    try:
-        names = ("forces", "soft_targets", "scripted_pins", "stitches", "held_joints", "motors")
-        counts = [int(physics[key]) for key in names]
-        laws = [str(law) for law in physics["laws"]]
-        laws_here = [_law_of(entry) for entry in physics["by_law"]]
-        flows = list(physics["flows"])
-        points = [int(number) for number in physics["points"]]
-        internal = int(physics["internal"])
-        compliances = tuple(
-            None if pair is None else (float(pair[0]), float(pair[1])) for pair in physics["compliances"]
-        )
-    except SceneError as error:
-        raise file.broken(f"the energy of a material: {error}") from None
-    except (KeyError, TypeError, ValueError, IndexError):
-        raise file.broken("the physics in its header is not described as it should be") from None
-    if len(compliances) != len(header["bodies"]):
-        raise file.broken("its header describes the physics of another number of bodies")
-    m = len(quadratic)
-    if laws != [law.__name__ for law in ELASTIC_MATERIALS]:
-        raise file.of_another_version("it has other materials")
-    kind = file.array(f"{_GROUP}/kind", "u", (m,)).astype(np.uint8)
-    if ((kind >= len(laws)) & (kind < GIVEN_BY_LAW)).any():
-        raise file.broken("a tet is of a material that does not exist")
-    mu, lam = file.array(f"{_GROUP}/mu", "f", (m,)), file.array(f"{_GROUP}/lam", "f", (m,))
-    region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
-    known = []
-    for k, (law, flow, at) in enumerate(zip(laws_here, flows, points, strict=False)):
-        tets = file.indices(f"{_GROUP}/law_{k}/rows", 1, m)[:, 0].astype(np.int64)
-        parameters = file.array(f"{_GROUP}/law_{k}/parameters", "f", (len(tets), None))
-        if at != (QUADRATURE_POINTS if quadratic[tets].all() else 1) or quadratic[tets].any() != quadratic[tets].all():
-            raise file.broken("a law is not evaluated at the points of its tets")
-        if flow is not None and flow not in RECORDED_FLOWS:
-            raise file.of_another_version(f"a material flows by a law {flow!r} that this version does not know")
-        if law is not None and parameters.shape[1] in law.counts:
-            parameters = np.ascontiguousarray(parameters)
-            known.append(LawTets(law, tets, parameters, None if flow is None else RECORDED_FLOWS[flow], at))
-        else:
-            kind[tets] = NOT_KNOWN
-    if internal != sum(len(tets.rows) * tets.points for tets in known if tets.flow is not None):
-        raise file.broken("its number of internal variables is not that of its materials")
-    active = _read_active(file, physics, m)
-    here = kind, mu, lam, compliances, *counts
-    return RecordedPhysics(*here, region=region, laws=tuple(known), internal=internal, active=active)
-
-
-def _read_active(file: CheckedFile, physics: dict[str, Any], m: int) -> tuple[ActiveTets, ...]:
-    try:
-        described = [(str(kind), float(strength)) for kind, strength in physics["active"]]
-    except (KeyError, TypeError, ValueError):
-        raise file.broken("its growths and muscles are not described as they should be") from None
-    found = []
-    for k, (kind, strength) in enumerate(described):
-        if kind not in (GROWTH, MUSCLE):
-            raise file.of_another_version(f"tets act by a {kind!r} that this version does not know")
-        rows = file.indices(f"{_GROUP}/active_{k}/rows", 1, m)[:, 0].astype(np.int64)
-        directions = file.array(f"{_GROUP}/active_{k}/directions", "f", (None, 3))
-        curve = file.array(f"{_GROUP}/active_{k}/curve", "f", (None, 2))
-        if len(directions) not in (len(rows), 0) or len(curve) == 0 or (kind == MUSCLE and len(directions) == 0):
-            raise file.broken("a growth or muscle has another number of directions than of tets")
-        found.append(ActiveTets(kind, rows, directions, 1.0, strength, curve))
-    return tuple(found)
-
-
-def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[int, int], ...]:
-    """The pairs that may pass through each other: numbers of bodies, then obstacles.
-
-    Raises
-    ------
-    OutputError : where a body or obstacle does not exist.
-    """
-    try:
-        pairs = tuple((int(i), int(j)) for i, j in header["physics"]["untouching"])
-    except (KeyError, TypeError, ValueError):
-        raise file.broken("the pairs that may touch are not described as they should be") from None
-    owners = len(header["bodies"]) + len(header["obstacles"])
-    if not all(0 <= number < owners for pair in pairs for number in pair):
-        raise file.broken("what may touch names a body or obstacle that does not exist")
-    return pairs
+    def check(self, bodies: int, curved: NDArray[np.bool_]) -> None:
+        """Raise `ValueError` for what the annotations cannot say; curved : (m,) which tets are quadratic."""
+        if len(self.compliances) != bodies:
+            raise ValueError("it has the physics of another number of bodies")
+        if list(self.materials) != [law.__name__ for law in ELASTIC_MATERIALS]:
+            raise ValueError("it has other materials than this version")
+        if ((self.kind >= len(self.materials)) & (self.kind < GIVEN_BY_LAW)).any():
+            raise ValueError("a tet is of a material that does not exist")
+        for law in self.recorded_laws:
+            at = curved[law.rows]
+            if at.any() != at.all() or law.points != (QUADRATURE_POINTS if at.all() else 1):
+                raise ValueError("a law is not evaluated at the points of its tets")
+            if law.flow is not None and law.flow not in RECORDED_FLOWS:
+                raise ValueError(f"a material flows by a law {law.flow!r} that this version does not know")
+        if self.internal != sum(len(tets.rows) * tets.points for tets in self.laws if tets.flow is not None):
+            raise ValueError("its number of internal variables is not that of its materials")
+        for each in self.active:
+            rows, directions, curve = each.rows, each.directions, each.curve
+            if each.kind not in (GROWTH, MUSCLE):
+                raise ValueError(f"tets act by a {each.kind!r} that this version does not know")
+            shapes = directions.shape[1:] == (3,) and curve.shape[1:] == (2,) and rows.ndim == 1
+            inside = not rows.size or 0 <= rows.min() <= rows.max() < len(curved)
+            enough = len(directions) in (len(rows), 0) and len(curve) > 0
+            if not (shapes and inside and enough) or (each.kind == MUSCLE and len(directions) == 0):
+                raise ValueError("a growth or muscle has other tets, or another number of directions")
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,25 +142,71 @@ class RecordedWeld:
 
     soft: int
     rigid: int
-    vertices: NDArray[np.int64]
+    vertices: Annotated[NDArray[np.int64], Rows("k", below="n")]
 
 
-def read_welds(file: CheckedFile, header: dict[str, Any], n: int) -> tuple[RecordedWeld, ...]:
-    """The welds of a recording with n vertices.
+def recorded_physics(system: System) -> RecordedPhysics:
+    """The laws of a scene."""
+    m = len(system.tets)
+    kind, mu, lam = np.full(m, NOT_KNOWN, dtype=np.uint8), np.zeros(m), np.zeros(m)
+    region = np.full(m, NO_REGION, dtype=np.int32)
+    compliances: list[tuple[float, float] | None] = []
+    for part in system.bodies:
+        material = part.body.material
+        compliances.append(None)
+        if isinstance(material, EdgesAndVolume):
+            compliances[-1] = float(material.edge_compliance), float(material.volume_compliance)
+        elif isinstance(material, Hyperelastic):
+            rows = material.per_tet(part.tets.stop - part.tets.start)
+            kind[part.tets] = np.where(rows.kind == BY_LAW, GIVEN_BY_LAW, rows.kind)
+            mu[part.tets], lam[part.tets], region[part.tets] = rows.mu, rows.lam, rows.region
+    laws = []
+    for tets in system.laws.material.laws:
+        named = _named(tets.law)
+        if named is None:
+            kind[tets.rows] = NOT_KNOWN
+        else:
+            flow = None if tets.flow is None else tets.flow.name
+            laws.append(RecordedLaw(named, flow, tets.rows.astype(np.int64), tets.parameters, tets.points))
+    active = system.laws_at(system.start_states[-1].time).active
+    names = {part.name for part in system.bodies}
+    return RecordedPhysics(
+        kind=kind,
+        mu=mu,
+        lam=lam,
+        region=region,
+        materials=tuple(law.__name__ for law in ELASTIC_MATERIALS),
+        recorded_laws=tuple(laws),
+        internal=count_of(system.laws.material),
+        active=tuple(replace(each, rows=each.rows.astype(np.int64), strength=float(each.strength)) for each in active),
+        compliances=tuple(compliances),
+        forces=len(system.loads) + sum(each.coordinate.is_anchored for each in system.actuators),
+        soft_targets=len(system.soft_targets),
+        scripted_pins=sum(part.pin.motion is not None for part in system.pins),
+        stitches=len(system.stitching),
+        held_joints=sum(joint.second not in names for joint in system.scene.joints),
+        motors=sum(isinstance(joint, AxisJoint) and joint.motor is not None for joint in system.scene.joints),
+    )
 
-    Raises
-    ------
-    OutputError : where a body or a vertex does not exist.
-    """
-    bodies = len(header["bodies"])
-    try:
-        described = header["physics"]["welds"]
-        welds = tuple(RecordedWeld(int(a), int(b), np.array(rows, dtype=np.int64)) for a, b, rows in described)
-    except (KeyError, TypeError, ValueError, OverflowError):
-        raise file.broken("its welds are not described as they should be") from None
-    for weld in welds:
-        numbers = weld.vertices
-        right = numbers.ndim == 1 and len(numbers) and numbers.min() >= 0 and numbers.max() < n
-        if not (0 <= weld.soft < bodies and 0 <= weld.rigid < bodies and right):
-            raise file.broken("a weld names a body or a vertex that does not exist")
-    return welds
+
+def _named(law: Law) -> str | Formula | None:
+    """A law as recordings name it, or its formula; None where they cannot."""
+    if isinstance(law, OwnLaw):
+        return law.formula
+    return law.name if law.name in RECORDED_LAWS else None
+
+
+def untouching_pairs(system: System) -> tuple[tuple[int, int], ...]:
+    """Pairs that the scene lets pass through each other: numbers of bodies, then obstacles."""
+    collide = pair_table(system.scene).collide
+    obstacle = np.arange(len(collide)) >= len(system.bodies)
+    passing = np.argwhere(np.triu(~collide & ~(obstacle[:, None] & obstacle[None, :])))
+    return tuple((int(i), int(j)) for i, j in passing)
+
+
+def recorded_welds(system: System) -> tuple[RecordedWeld, ...]:
+    """The welds of a scene."""
+    number = {part.name: k for k, part in enumerate(system.bodies)}
+    vertices, weld_of = system.welding.vertices.astype(np.int64), system.welding.weld
+    welds = enumerate(system.scene.welds)
+    return tuple(RecordedWeld(number[weld.body], number[weld.rigid], vertices[weld_of == k]) for k, weld in welds)

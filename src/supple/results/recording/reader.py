@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import overload
+from typing import Any, overload
 
 from supple.results.recording.contents import RecordedContents
 from supple.results.recording.frame import RecordedFrame
-from supple.runtime.displayed import Showable, short_list
+from supple.runtime.displayed import Showable, short_list, supplied
 
 
 class Recording(RecordedContents, Showable, Sequence[RecordedFrame]):
@@ -60,6 +61,49 @@ class Recording(RecordedContents, Showable, Sequence[RecordedFrame]):
             "ended": str(self.statuses[-1]),
         }
 
+    def check(self, *, progress: Callable[[int, int], None] | None = None, **settings: Any) -> Any:
+        """Verify the recording, independently of the solver that made it; see `check_recording`.
+
+        Parameters
+        ----------
+        progress : is called with how many frames were looked at, and how many there are to look at.
+        settings : which checks, which frames, and what they allow.
+
+        Returns
+        -------
+        CheckReport : one result for each check; `report.ok`, `report["inversion"].verdict`,
+            `report.save("report.json")`.
+
+        Raises
+        ------
+        OutputError : where a setting is unusable.
+        """
+        return supplied("check")(self, progress=progress, **settings)
+
+    def plot(self) -> Any:
+        """What was measured over time: energies, works, momenta, volumes, the smallest J, the time of each step.
+
+        Cavities, cables and sensors have panels where there are some. A notebook shows the plot where it is the last
+        line of a cell; `recording.plot().save("plot.pdf")` writes it.
+        """
+        return supplied("plot")(self)
+
+    def export(self, to: str, output: str | Path | None = None) -> Path:
+        """Write the recording in another format; the path of what was written.
+
+        Parameters
+        ----------
+        to : "glb", "obj", "vtu", "vtkhdf", "usd", "gif", "mp4", "csv" or "html".
+        output : file, with a suffix of the format, or folder; beside the recording, under its name, where it is not
+            given. What is there is replaced.
+
+        Raises
+        ------
+        OutputError : where the format is unknown, needs something that is not installed or does not agree with the
+            output's suffix, or the output cannot be written. No incomplete file is left.
+        """
+        return supplied("export")(self, to, output)
+
     @property
     def frames(self) -> Recording:
         """The recording itself, which is the sequence of its frames."""
@@ -87,3 +131,8 @@ def read_recording(path: str | Path) -> Recording:
         the text starts with the path.
     """
     return Recording(path)
+
+
+def opened(recording: Recording | str | Path) -> AbstractContextManager[Recording]:
+    """The recording itself if it is open, otherwise one that is opened for this block."""
+    return nullcontext(recording) if isinstance(recording, Recording) else read_recording(recording)

@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +22,8 @@ from supple.results.frame import Frame
 from supple.results.readings.fields import Field, checked_fields, cost
 from supple.results.recording.details import RecordedDetails
 from supple.results.recording.file import TIMES, Layout, RecordingFile, Series, create, rewrite
-from supple.results.recording.scene import write_scene
+from supple.results.recording.from_system import recorded_scene, write_grid
+from supple.results.recording.scene import RecordedScene, write_scene
 from supple.results.recording.sensors import RecordedSensor, recorded_sensors
 from supple.runtime.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
 
@@ -130,16 +132,11 @@ class Recorder:
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Create the file, with the frame at the start."""
-        from supple import __version__
-
         system = first.system
         self._details = RecordedDetails.like(first.report.details)
         # The limits of `check_recording` depend on the solver.
         solver = str(first.solver) if self._solver is None and first.solver is not None else self._solver
-        facts = {"supple_version": __version__, "dt": float(dt), "steps": int(steps), "solver": solver}
-        facts["details"] = self._details.header()
-        facts["fields"] = [field.name for field in self._fields]
-        facts["sensors"] = [sensor.described() for sensor in recorded_sensors(system.scene)]
+        scene = recorded_scene(first, (dt, steps), solver, self._scene_text, self._fields)
         layout = self._layout(system)
         if self._fields:
             sizes = len(system.rest_positions), len(system.tets)
@@ -149,7 +146,7 @@ class Recorder:
         parent_folder(self.path)
         fresh = temporary_name(self.path)
         try:
-            create(fresh, layout, capacity, lambda file: write_scene(file, first, facts, self._scene_text))
+            create(fresh, layout, capacity, lambda file: _write_static(file, system, scene))
             self._file = RecordingFile(fresh, layout, capacity)
             self._put(first)
             self._file = self._file.moved(self.path)
@@ -264,6 +261,11 @@ class Recorder:
             with np.errstate(over="ignore"):  # beyond single precision, a value is infinite
                 file.put(series.path, _recorded(field, frame).astype(np.float32))
         file.commit()
+
+
+def _write_static(file: h5py.File, system: System, scene: RecordedScene) -> None:
+    write_grid(file.require_group("VTKHDF"), system)
+    write_scene(file, scene)
 
 
 def _recorded(field: Field, frame: Frame) -> NDArray[np.float64]:

@@ -1,33 +1,43 @@
-"""The part of a recording that no frame changes: bodies, skins, obstacles and their arrays."""
+"""The part of a recording that no frame changes: bodies, skins, obstacles, laws, and what acts on them.
+
+It is written by the codec of checkpoints: a tree of JSON, and beside it an array for each path in the tree.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError, SceneError
-from supple.mesh.skin import Embedding
+from supple.materials.elastic_tets.active import ActiveTets
+from supple.materials.own.formula import Formula
 from supple.mesh.surface import SurfaceMesh
+from supple.model.loads.applied import LoadPattern
 from supple.model.state import Status
-from supple.model.system import System
-from supple.results.frame import Frame
-from supple.results.recording.actions.stitches import write_stitches
+from supple.results.checkpoint.typed import Known, Rows, Sizes, check
+from supple.results.checkpoint.values import decoded, encoded
+from supple.results.recording.actions.actuators import RecordedCable, RecordedCavity
+from supple.results.recording.actions.joints import RecordedJoint
+from supple.results.recording.actions.stitches import RecordedStitches, StitchLaws
 from supple.results.recording.checked_hdf5 import CheckedFile
-from supple.results.recording.physics import write_physics
+from supple.results.recording.details import RecordedDetails, RecordedField
+from supple.results.recording.physics import RecordedLaw, RecordedPhysics, RecordedWeld
+from supple.results.recording.sensors import RecordedSensor
 from supple.results.recording.skinned_surface import SkinnedSurface
-from supple.scene.body import PlacedBody
+from supple.scene.joints.conditions import Conditions, Function
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS, restored_obstacle
-from supple.scene.rigid.rigid_body import RigidBody
 
-FORMAT_VERSION = 3
-VTK_TETRA, VTK_QUADRATIC_TETRA = 10, 24
+RecordedLoad = LoadPattern
+FORMAT_VERSION = 4
+_GROUP, _HEADER = "supple", "supple/header"
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +58,14 @@ class RecordedBody:
     material: str
     vertices: slice
     tets: slice
-    triangles: NDArray[np.int32]
+    triangles: Annotated[NDArray[np.int32], Rows("t", 3, below="own")]
     skin: SkinnedSurface | None
     rigid: bool = False
     touches_with_skin: bool = False
+
+    @property
+    def sizes(self) -> Sizes:
+        return {"own": self.vertices.stop - self.vertices.start}
 
     @property
     def point_count(self) -> int:
@@ -78,9 +92,21 @@ class RecordedObstacle:
 
     name: str
     kind: str
-    parameters: dict[str, Any]
-    vertices: NDArray[np.float64]
-    triangles: NDArray[np.int32]
+    parameters: Mapping[str, Any]
+    vertices: Annotated[NDArray[np.float64], Rows("corners", 3)]
+    triangles: Annotated[NDArray[np.int32], Rows("t", 3, below="corners")]
+
+    @classmethod
+    def of(cls, obstacle: Obstacle) -> RecordedObstacle:
+        """As the scene has it."""
+        surface = None if obstacle.surface_mesh is None else obstacle.surface_mesh.compact()
+        return cls(
+            obstacle.name or obstacle.label,
+            type(obstacle).__name__,
+            {"friction": float(obstacle.friction), **obstacle.values()},
+            np.zeros((0, 3)) if surface is None else surface.vertices,
+            np.zeros((0, 3), dtype=np.int32) if surface is None else surface.triangles,
+        )
 
     @cached_property
     def obstacle(self) -> Obstacle:
@@ -96,187 +122,162 @@ class RecordedObstacle:
         return restored_obstacle(self.kind, values)
 
 
-def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text: str | None) -> None:
-    """Write the part that no frame changes; `facts` are added to the header."""
-    system = first.system
-    n, m = len(system.rest_positions), len(system.tets)
-    _write_grid(file.require_group("VTKHDF"), first, n, m)
-    own = file.create_group("supple")
+class QuadraticRows(NamedTuple):
+    """Which tets are quadratic, ascending, and their nodes."""
+
+    rows: Annotated[NDArray[np.int32], Rows("k", below="m")]
+    nodes: Annotated[NDArray[np.int32], Rows("k", 10, below="n")]
+
+
+@dataclass(eq=False, repr=False)
+class RecordedScene:
+    """All that no frame changes; see `Recording`."""
+
+    supple_version: str
+    dt: float
+    steps: int
+    solver: str | None
+    scene_text: str | None
+    rest_positions: Annotated[NDArray[np.float64], Rows("n", 3)]
+    tets: Annotated[NDArray[np.int32], Rows("m", 4, below="n")]
+    quadratic: QuadraticRows | None
+    rest_volumes: Annotated[NDArray[np.float64], Rows("m")]
+    masses: Annotated[NDArray[np.float64], Rows("n")]
+    gravity: Annotated[NDArray[np.float64], Rows(3)]
+    pinned_vertices: Annotated[NDArray[np.integer], Rows("pinned", below="n")]
+    bodies: tuple[RecordedBody, ...]
+    obstacles: tuple[RecordedObstacle, ...]
+    physics: RecordedPhysics
+    untouching: tuple[tuple[int, int], ...]
+    welds: tuple[RecordedWeld, ...]
+    joints: tuple[RecordedJoint, ...]
+    loads: dict[str, LoadPattern]
+    other_loads: frozenset[str]
+    cavities: tuple[RecordedCavity, ...]
+    cables: tuple[RecordedCable, ...]
+    stitches: RecordedStitches
+    details: RecordedDetails
+    field_names: tuple[str, ...]
+    sensors: tuple[RecordedSensor, ...]
+    statuses_of_codes: tuple[str, ...]
+
+    @property
+    def sizes(self) -> Sizes:
+        """The lengths that the annotations name."""
+        counts = {"n": len(self.rest_positions), "m": len(self.tets)}
+        return counts | {"bodies": len(self.bodies), "obstacles": len(self.obstacles)}
+
+
+_CLASSES: dict[str, type] = {
+    kind.__name__: kind
+    for kind in (
+        ActiveTets, Conditions, Formula, Function,
+        LoadPattern, QuadraticRows, RecordedBody, RecordedCable, RecordedCavity, RecordedDetails,
+        RecordedField, RecordedJoint, RecordedLaw, RecordedObstacle, RecordedPhysics, RecordedScene, RecordedSensor,
+        RecordedStitches, RecordedWeld, SkinnedSurface, StitchLaws,
+    )
+}  # fmt: skip
+
+
+def write_scene(file: h5py.File, scene: RecordedScene) -> None:
+    """Write the part that no frame changes to its group."""
+    own = file.require_group(_GROUP)
     own.attrs["format_version"] = FORMAT_VERSION
-    header = facts | {
-        "statuses": [str(status) for status in Status],
-        "bodies": _described_bodies(system),
-        "obstacles": [_describe_obstacle(obstacle) for obstacle in system.obstacles],
-        "physics": write_physics(own, system),
-    }
-    own["header"] = json.dumps(header)
-    if scene_text is not None:
-        own["scene"] = scene_text
-    own["rest_positions"] = system.rest_positions
-    own["rest_volumes"] = system.rest_volumes
-    own["masses"] = system.masses
-    own["gravity"] = system.gravity
-    own["tets"] = system.tets
-    if system.quadratic is not None:
-        own["quadratic/rows"], own["quadratic/nodes"] = system.quadratic.rows, system.quadratic.nodes
-    own["triangles"] = np.concatenate([p.body.mesh.surface.triangles + p.vertices.start for p in system.bodies])
-    own["pinned_vertices"] = system.pinned_vertices
-    write_stitches(own, system)
-    for i, part in enumerate(system.bodies):
-        body = part.body
-        if body.skin is not None:
-            skin = body.skin.compact()
-            group = own.create_group(f"skins/{i}")
-            group["corners"], group["weights"] = _attached(body, skin)
-            group["triangles"] = skin.triangles
-    for i, obstacle in enumerate(system.obstacles):
-        if obstacle.surface_mesh is not None:
-            surface = obstacle.surface_mesh.compact()
-            group = own.create_group(f"obstacles/{i}")
-            group["vertices"], group["triangles"] = surface.vertices, surface.triangles
+    tree, arrays = encoded(scene, _CLASSES)
+    file[_HEADER] = json.dumps(tree)
+    for path, array in arrays.items():
+        own[path] = array
 
 
-def _attached(body: PlacedBody, skin: SurfaceMesh) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Corners and weights (k, 4) of the skin's vertices, (k, 10) of quadratic tets; of a rigid body those that the
-    simulation has."""
-    if isinstance(body, RigidBody):
-        return np.tile(np.arange(4, dtype=np.int32), (len(body.weights), 1)), body.weights
-    attached = Embedding.of(body.mesh, skin.vertices)
-    return attached.corners, attached.weights
-
-
-def _write_grid(grid: h5py.Group, first: Frame, n: int, m: int) -> None:
-    system = first.system
-    grid.attrs.create("Version", np.array([2, 2], dtype=np.int64))
-    grid.attrs.create("Type", np.bytes_("UnstructuredGrid"))
-    cells = [part.body.mesh.nodes + part.vertices.start for part in system.bodies]
-    widths = np.concatenate([np.full(len(nodes), nodes.shape[1], dtype=np.int64) for nodes in cells])
-    for name, count in (("NumberOfPoints", n), ("NumberOfCells", m), ("NumberOfConnectivityIds", widths.sum())):
-        grid[name] = np.array([count], dtype=np.int64)
-    grid["Connectivity"] = np.concatenate([nodes.ravel() for nodes in cells]).astype(np.int64)
-    grid["Offsets"] = np.concatenate([[0], np.cumsum(widths)])
-    grid["Types"] = np.where(widths == 4, VTK_TETRA, VTK_QUADRATIC_TETRA).astype(np.uint8)
-    of_point, of_cell = np.zeros(n, dtype=np.int32), np.zeros(m, dtype=np.int32)
-    for i, part in enumerate(system.bodies):
-        of_point[part.vertices], of_cell[part.tets] = i, i
-    grid["PointData/body"], grid["CellData/body"] = of_point, of_cell
-
-
-def _described_bodies(system: System) -> list[dict[str, Any]]:
-    """The bodies with their rows; those of triangles are of the boundaries of the tets."""
-    described, t = [], 0
-    for part in system.bodies:
-        body, count = part.body, len(part.body.mesh.surface.triangles)
-        rigid = isinstance(body, RigidBody)
-        described.append(
-            {
-                "name": part.name,
-                "material": f"rigid, {body.properties.mass:.6g} kg" if rigid else _one_line(body.material),
-                "vertices": [int(part.vertices.start), int(part.vertices.stop)],
-                "tets": [int(part.tets.start), int(part.tets.stop)],
-                "triangles": [t, t + count],
-                "skin": body.skin is not None,
-                "rigid": rigid,
-                "collide": "skin" if body.touches_with_skin else "tets",
-            }
-        )
-        t += count
-    return described
-
-
-def _one_line(thing: object) -> str:
-    text = " ".join(repr(thing).split())
-    return text if len(text) <= 500 else text[:499] + "…"
-
-
-def _describe_obstacle(obstacle: Obstacle) -> dict[str, Any]:
-    numbers = {"friction": float(obstacle.friction), **obstacle.values()}
-    return {"name": obstacle.name or obstacle.label, "kind": type(obstacle).__name__, "parameters": numbers}
-
-
-def read_header(file: CheckedFile) -> dict[str, Any]:
-    """The header of a recording, after a check that the file is a recording of a known version.
+def read_scene(file: CheckedFile) -> RecordedScene:
+    """The part that no frame changes. All of it is checked.
 
     Raises
     ------
-    OutputError : where it is not.
+    OutputError : where the file is not a recording, of another version, or contradictory.
     """
-    version = file.attribute("supple", "format_version")
+    version = file.attribute(_GROUP, "format_version")
     if version is None:
         kind = file.attribute("VTKHDF", "Type")
-        other = (
-            f"a VTKHDF {kind.decode()} of another program"
-            if isinstance(kind, bytes)
-            else "an HDF5 file of another kind"
-        )
-        raise file.other(other)
+        foreign = f"a VTKHDF {kind.decode()} of another program" if isinstance(kind, bytes) else "an HDF5 file"
+        raise file.other(foreign)
     if not isinstance(version, (int, np.integer)):
         raise file.broken(f"its format version is {str(version)[:20]!r}")
     if version != FORMAT_VERSION:
         raise file.of_another_version(f"format {version}, this one reads {FORMAT_VERSION}")
     try:
-        header = json.loads(file.text("supple/header"))
-        dt, lists = float(header["dt"]), [header[key] for key in ("statuses", "bodies", "obstacles", "sensors")]
-        acting = [header["physics"][key] for key in ("loads", "actuators", "joints", "welds", "untouching")]
-    except (ValueError, TypeError, KeyError):
-        raise file.broken("its header is not the expected JSON") from None
-    if not all(isinstance(item, list) for item in lists) or not header["bodies"] or not dt > 0.0:
-        raise file.broken("its header has no bodies, or no time step")
-    if not all(isinstance(item, list) for item in acting):
-        raise file.broken("the physics in its header is not described as it should be")
-    return header
+        scene = decoded(json.loads(file.text(_HEADER)), _Arrays(file), _CLASSES)
+        check(scene, RecordedScene, Known(), _GROUP)
+        _check_consistency(scene)
+    except (
+        *(ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, OverflowError),  # of other data
+        *(SceneError, MeshError),  # of other numbers
+    ) as error:
+        raise file.broken(f"its description of the scene: {' '.join(str(error).split())[:300]}") from None
+    return scene
 
 
-def read_bodies(
-    file: CheckedFile, header: dict[str, Any], n: int, m: int, triangles: NDArray[np.int32]
-) -> tuple[RecordedBody, ...]:
-    """The bodies of a recording with n vertices and m tets."""
-    bodies = []
-    try:
-        for i, described in enumerate(header["bodies"]):
-            ends = [(int(a), int(b)) for a, b in (described["vertices"], described["tets"], described["triangles"])]
-            (v0, v1), (t0, t1), (f0, f1) = ends
-            if not (0 <= v0 < v1 <= n and 0 <= t0 < t1 <= m and 0 <= f0 <= f1 <= len(triangles)):
-                raise file.broken(f"body {described['name']!r} has rows {ends}, outside of {n} vertices and {m} tets")
-            own = triangles[f0:f1] - np.int32(v0)
-            if own.size and (own.min() < 0 or own.max() >= v1 - v0):
-                raise file.broken(f"body {described['name']!r} has triangles on vertices of another")
-            skin = _read_skin(file, f"supple/skins/{i}", v1 - v0) if described["skin"] else None
-            rows = slice(v0, v1), slice(t0, t1)
-            names = str(described["name"]), str(described["material"])
-            rigid = bool(described["rigid"])
-            if rigid and (skin is None or v1 - v0 != 4 or t1 - t0 != 1):
-                raise file.broken(f"rigid body {described['name']!r} does not have four vertices and a surface")
-            touches = skin is not None and (rigid or described["collide"] == "skin")
-            bodies.append(RecordedBody(*names, *rows, np.ascontiguousarray(own), skin, rigid, touches))
-    except (KeyError, TypeError, ValueError):
-        raise file.broken("the bodies in its header are not described as they should be") from None
-    return tuple(bodies)
+class _Arrays(dict[str, NDArray[Any]]):
+    """The arrays beside the tree, read when they are asked for."""
+
+    def __init__(self, file: CheckedFile) -> None:
+        super().__init__()
+        self._file = file
+
+    def __missing__(self, path: str) -> NDArray[Any]:
+        return self._file.array(f"{_GROUP}/{path}")
 
 
-def _read_skin(file: CheckedFile, path: str, vertices: int) -> SkinnedSurface:
-    width = file.array(f"{path}/corners", "i", (None, None)).shape[1]
-    if width not in (4, 10):
-        raise file.broken(f"{path}/corners has {width} columns; a skin's vertices have 4 corners or 10 nodes")
-    corners = file.indices(f"{path}/corners", width, vertices)
-    weights = file.array(f"{path}/weights", "f", corners.shape)
-    return SkinnedSurface(corners, weights, file.indices(f"{path}/triangles", 3, len(corners)))
-
-
-def read_obstacles(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedObstacle, ...]:
-    """The obstacles of a recording."""
-    obstacles = []
-    try:
-        for i, described in enumerate(header["obstacles"]):
-            vertices, triangles = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)
-            name, kind, path = str(described["name"]), str(described["kind"]), f"supple/obstacles/{i}"
-            if kind not in KINDS:
-                raise file.broken(f"obstacle {name!r} is of an unknown kind, {kind!r}; register the kind first")
-            if any(one.kind == "surface" for one in KINDS[kind].parameters().values()):
-                vertices = file.array(f"{path}/vertices", "f", (None, 3))
-                triangles = file.indices(f"{path}/triangles", 3, len(vertices))
-            obstacles.append(RecordedObstacle(name, kind, dict(described["parameters"]), vertices, triangles))
-            _ = obstacles[-1].obstacle
-    except (KeyError, TypeError, ValueError, SceneError, MeshError):
-        raise file.broken("the obstacles in its header are not described as they should be") from None
-    return tuple(obstacles)
+def _check_consistency(scene: RecordedScene) -> None:
+    """Raise `ValueError` for what the annotations cannot say."""
+    n, m = len(scene.rest_positions), len(scene.tets)
+    if not scene.bodies or not scene.dt > 0.0:
+        raise ValueError("it has no bodies, or no time step")
+    known = {str(status) for status in Status}
+    if not set(scene.statuses_of_codes) <= known:
+        raise ValueError("it has a status that is not known here")
+    for body in scene.bodies:
+        ends = [body.vertices.start, body.vertices.stop], [body.tets.start, body.tets.stop]
+        if not (0 <= ends[0][0] < ends[0][1] <= n and 0 <= ends[1][0] < ends[1][1] <= m):
+            raise ValueError(f"body {body.name!r} has rows {ends}, outside of {n} vertices and {m} tets")
+        if body.rigid and (body.skin is None or [b - a for a, b in ends] != [4, 1]):
+            raise ValueError(f"rigid body {body.name!r} does not have four vertices and a surface")
+        if body.touches_with_skin and body.skin is None:
+            raise ValueError(f"body {body.name!r} has no skin to touch with")
+        if body.skin is not None and body.skin.corners.shape[1] not in (4, 10):
+            raise ValueError(f"the skin of {body.name!r} is not carried by 4 corners or 10 nodes")
+    for obstacle in scene.obstacles:
+        if obstacle.kind not in KINDS:
+            raise ValueError(f"obstacle {obstacle.name!r} is of an unknown kind, {obstacle.kind!r}; register the kind")
+        _ = obstacle.obstacle
+    curved = np.zeros(m, dtype=bool)
+    if scene.quadratic is not None:
+        rows, nodes = scene.quadratic
+        if (np.diff(rows) <= 0).any() or not np.array_equal(nodes[:, :4], scene.tets[rows]):
+            raise ValueError("its quadratic tets are not ascending rows of its tets, with their corners")
+        curved[rows] = True
+    scene.physics.check(len(scene.bodies), curved)
+    owners = len(scene.bodies) + len(scene.obstacles)
+    if not all(0 <= number < owners for pair in scene.untouching for number in pair):
+        raise ValueError("what may touch names a body or obstacle that does not exist")
+    for weld in scene.welds:
+        if not (0 <= weld.soft < len(scene.bodies) and 0 <= weld.rigid < len(scene.bodies) and len(weld.vertices)):
+            raise ValueError("a weld names a body that does not exist, or no vertex")
+    jointed = [body.rigid for body in scene.bodies] + [True] * len(scene.obstacles)
+    for joint in scene.joints:
+        joint.check(jointed, len(scene.bodies))
+    for name, load in scene.loads.items():
+        shape = (len(load.weights), 3) if load.kind in ("pressure", "drag") else load.weights.shape
+        inside = not load.vertices.size or 0 <= load.vertices.min() <= load.vertices.max() < n
+        if load.weights.ndim != 1 or load.vertices.shape != shape or not inside:
+            raise ValueError(f"load {name} does not act on vertices of the scene")
+        if not np.isfinite([*load.weights, *load.offset, load.stiffness]).all():
+            raise ValueError(f"a number of load {name} is not finite")
+    for cable in scene.cables:
+        if len(cable.weights) < 2:
+            raise ValueError(f"cable {cable.name!r} has no span")
+    scene.stitches.check(n)
+    scene.details.check()
+    for sensor in scene.sensors:
+        if sensor.shape != (7,) and not (len(sensor.shape) == 3 and min(sensor.shape) > 0 and sensor.shape[2] == 3):
+            raise ValueError(f"sensor {sensor.name!r} has numbers of the shape {sensor.shape}")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.skin import mixed
+from supple.results.checkpoint.typed import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +25,9 @@ class SkinnedSurface:
     triangles : (t, 3) int32, rows of `corners`
     """
 
-    corners: NDArray[np.int32]
-    weights: NDArray[np.float64]
-    triangles: NDArray[np.int32]
+    corners: Annotated[NDArray[np.int32], Rows("k", "width", below="own")]
+    weights: Annotated[NDArray[np.float64], Rows("k", "width")]
+    triangles: Annotated[NDArray[np.int32], Rows("t", 3, below="k")]
 
     def positions(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where the surface's vertices (k, 3) are when the body's are at x (n, 3) [m]."""

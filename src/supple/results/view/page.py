@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from supple.results.drawing import View, opened
+from supple.results.drawing import View
 from supple.results.recording.frame import RecordedFrame
-from supple.results.recording.reader import Recording
+from supple.results.recording.reader import Recording, opened
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.gate import new_token
 from supple.results.view.layers.skin import drawn_points

@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name
+from supple.kinds.kind import Kind
 from supple.scene.body import PlacedBody
-from supple.scene.loads.over_time import OverTime, checked_magnitude, checked_over_time
-from supple.scene.loads.points import Point, checked_point, point_corners
-from supple.scene.values import check_name, non_negative, positive
+from supple.scene.loads.over_time import OverTime, OverTimeOf
+from supple.scene.loads.points import Point, PointList, point_corners
+from supple.scene.loads.spring import LENGTH
 
 
 @dataclass(frozen=True, eq=False)
-class Cable:
+class Cable(Kind):
     """An elastic cable without mass. It is fixed at its first point, slides through eyelets at those in between, and
     is wound up by a winch at its last point. It pulls and never pushes.
 
@@ -38,47 +41,24 @@ class Cable:
     SceneError : where a value is of the wrong kind or out of range.
     """
 
-    points: Sequence[Point]
-    length: OverTime | None = None
-    tension: OverTime | None = None
-    winch_speed: OverTime | None = None
-    stiffness: float | None = None
-    friction: float = 0.0
-    name: str = "cable"
+    kind: ClassVar[str] = "cable"
+    exactly_one: ClassVar[tuple[str, ...]] = ("length", "tension", "winch_speed")
+
+    points: Annotated[Sequence[Point], PointList()]
+    length: Annotated[OverTime | None, LENGTH] = None
+    tension: Annotated[OverTime | None, OverTimeOf(bounds=NON_NEGATIVE)] = None
+    winch_speed: Annotated[OverTime | None, OverTimeOf()] = None
+    stiffness: Annotated[float | None, POSITIVE] = None
+    friction: Annotated[float, NON_NEGATIVE] = 0.0
+    name: Annotated[str, Name()] = "cable"
 
     def __post_init__(self) -> None:
-        check_name(self.name, "cable")
-        try:
-            given = list(self.points)
-        except TypeError:
-            given = []
-        if len(given) < 2:
-            raise SceneError(f"{self.label}: points is {self.points!r}; give two or more")
-        points = tuple(checked_point(point, f"{self.label}: points[{i}]") for i, point in enumerate(given))
-        if all(name is None for name, _ in points):
+        super().__post_init__()
+        if all(name is None for name, _ in self.points):
             raise SceneError(f"{self.label}: all points are fixed in the world; give at least one point of a body")
-        object.__setattr__(self, "points", points)
-        drives = [key for key in ("length", "tension", "winch_speed") if getattr(self, key) is not None]
-        if len(drives) != 1:
-            found = " and ".join(drives) or "none of them"
-            raise SceneError(f"{self.label}: {found} given; give exactly one of length, tension and winch_speed")
-        for key in ("length", "tension"):
-            if getattr(self, key) is not None:
-                object.__setattr__(self, key, checked_magnitude(getattr(self, key), f"{self.label}: {key}"))
-        if self.winch_speed is not None:
-            speed = checked_over_time(self.winch_speed, f"{self.label}: winch_speed", ())
-            object.__setattr__(self, "winch_speed", speed)
         if (self.stiffness is None) != (self.tension is not None):
             remedy = "give it" if self.stiffness is None else "it has no effect with tension; leave it out"
             raise SceneError(f"{self.label}: stiffness is {self.stiffness!r}; {remedy}")
-        if self.stiffness is not None:
-            object.__setattr__(self, "stiffness", positive(self.stiffness, f"{self.label}: stiffness"))
-        object.__setattr__(self, "friction", non_negative(self.friction, f"{self.label}: friction"))
-
-    @property
-    def label(self) -> str:
-        """The name of this cable in messages."""
-        return f"cable {self.name!r}"
 
     @property
     def bodies(self) -> tuple[str, ...]:

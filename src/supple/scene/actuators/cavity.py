@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import POSITIVE, Name, OneOf, Whole
+from supple.kinds.kind import Kind
 from supple.mesh.voids import enclosed_voids, is_closed, signed_volumes
 from supple.scene.actuators.gas import Gas
 from supple.scene.body import PlacedBody
-from supple.scene.loads.load import body_of, checked_region
-from supple.scene.loads.over_time import OverTime, checked_magnitude, checked_over_time
+from supple.scene.loads.load import Rows, body_of
+from supple.scene.loads.over_time import OverTime, OverTimeOf
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.values import check_name
 
 
 @dataclass(frozen=True, eq=False)
-class Cavity:
+class Cavity(Kind):
     """A closed inner surface of a body, and what is inside: exactly one of pressure, volume and gas.
 
     Parameters
@@ -37,40 +39,23 @@ class Cavity:
     SceneError : where a value is of the wrong kind or out of range.
     """
 
-    body: str
-    pressure: OverTime | None = None
-    volume: OverTime | None = None
-    gas: Gas | None = None
-    void: int = 0
-    triangles: ArrayLike | None = None
-    name: str | None = None
+    kind: ClassVar[str] = "cavity"
+    exactly_one: ClassVar[tuple[str, ...]] = ("pressure", "volume", "gas")
+
+    body: Annotated[str, Name()]
+    pressure: Annotated[OverTime | None, OverTimeOf()] = None
+    volume: Annotated[OverTime | None, OverTimeOf(bounds=POSITIVE)] = None
+    gas: Annotated[Gas | None, OneOf((Gas,), "a Gas")] = None
+    void: Annotated[int, Whole()] = 0
+    triangles: Annotated[ArrayLike | None, Rows("triangles", boxes=False)] = None
+    name: Annotated[str | None, Name()] = None
 
     def __post_init__(self) -> None:
-        check_name(self.body, "cavity: body")
         if self.name is None:
             object.__setattr__(self, "name", self.body)
-        check_name(self.name, "cavity")
-        given = [key for key in ("pressure", "volume", "gas") if getattr(self, key) is not None]
-        if len(given) != 1:
-            found = " and ".join(given) or "none of them"
-            raise SceneError(f"{self.label}: {found} given; give exactly one of pressure, volume and gas")
-        if self.pressure is not None:
-            object.__setattr__(self, "pressure", checked_over_time(self.pressure, f"{self.label}: pressure", ()))
-        if self.volume is not None:
-            object.__setattr__(self, "volume", checked_magnitude(self.volume, f"{self.label}: volume", zero=False))
-        if self.gas is not None and not isinstance(self.gas, Gas):
-            raise SceneError(f"{self.label}: gas is {self.gas!r}; give a Gas")
-        if isinstance(self.void, bool) or not isinstance(self.void, (int, np.integer)) or self.void < 0:
-            raise SceneError(f"{self.label}: void is {self.void!r}; give a whole number from 0")
-        if self.triangles is not None:
-            if self.void:
-                raise SceneError(f"{self.label}: void and triangles given; give one of them")
-            object.__setattr__(self, "triangles", checked_region(self.triangles, self.label))
-
-    @property
-    def label(self) -> str:
-        """The name of this cavity in messages."""
-        return f"cavity {self.name!r}"
+        super().__post_init__()
+        if self.triangles is not None and self.void:
+            raise SceneError(f"{self.label}: void and triangles given; give one of them")
 
     @property
     def bodies(self) -> tuple[str, ...]:

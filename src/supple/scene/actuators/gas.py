@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 from supple.errors import SceneError
-from supple.scene.loads.over_time import OverTime, checked_magnitude
-from supple.scene.values import non_negative, positive
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE
+from supple.kinds.kind import Kind
+from supple.scene.loads.over_time import OverTime, OverTimeOf
 
+AMOUNT = OverTimeOf(bounds=POSITIVE)
 GAS_CONSTANT = 8.31446261815324  # [J/(mol K)], exact by definition
 
 
 @dataclass(frozen=True, eq=False)
-class Gas:
+class Gas(Kind):
     """An ideal gas: p V^gamma is constant for a constant amount, and p V0 = n R T in the volume V0 at the start.
 
     Parameters
@@ -28,16 +31,14 @@ class Gas:
     SceneError : where a value is of the wrong kind or out of range.
     """
 
-    amount: OverTime | None = None
-    temperature: float = 293.15
-    gamma: float = 1.0
-    ambient: float = 101325.0
+    kind: ClassVar[str] = "gas"
+
+    amount: Annotated[OverTime | None, AMOUNT] = None
+    temperature: Annotated[float, POSITIVE] = 293.15
+    gamma: Annotated[float, POSITIVE] = 1.0
+    ambient: Annotated[float, NON_NEGATIVE] = 101325.0
 
     def __post_init__(self) -> None:
-        if self.amount is not None:
-            object.__setattr__(self, "amount", checked_magnitude(self.amount, "gas: amount", zero=False))
-        elif self.ambient == 0.0:
+        super().__post_init__()
+        if self.amount is None and self.ambient == 0.0:
             raise SceneError("gas: ambient is 0, so that there is no gas at the start; give the amount")
-        object.__setattr__(self, "temperature", positive(self.temperature, "gas: temperature"))
-        object.__setattr__(self, "gamma", positive(self.gamma, "gas: gamma"))
-        object.__setattr__(self, "ambient", non_negative(self.ambient, "gas: ambient"))

@@ -4,18 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import float_array
+from supple.kinds.forms import POSITIVE, Form, Name, Number
 from supple.scene.body import PlacedBody
-from supple.scene.loads.load import OnBody, body_of
-from supple.scene.loads.over_time import Curve, OverTime, checked_magnitude
-from supple.scene.loads.tet_region import TetRegion, checked_directions, checked_tets, directions_of, tets_in
+from supple.scene.loads.load import TETS, OnBody, body_of
+from supple.scene.loads.over_time import OverTime, OverTimeOf
+from supple.scene.loads.tet_region import Directions, TetRegion, directions_of, tets_in
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.values import float_array, positive
+
+ACTIVATION = OverTimeOf(bounds=Number(least=0.0, most=1.0))
+
+
+@dataclass(frozen=True)
+class ForceLength(Form):
+    """(stretches, values): increasing numbers above zero, and numbers of zero or more."""
+
+    def checked(self, value: Any, what: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        try:
+            stretches, values = (float_array(part, what) for part in value)
+        except (TypeError, ValueError):
+            raise SceneError(f"{what} is {value!r}; give (stretches, values)") from None
+        if stretches.ndim != 1 or len(stretches) == 0 or stretches.shape != values.shape:
+            raise SceneError(f"{what}: shapes are {stretches.shape} and {values.shape}; give as many of both")
+        if not (np.isfinite(stretches).all() and stretches[0] > 0.0 and (np.diff(stretches) > 0.0).all()):
+            raise SceneError(f"{what}: stretches must be finite, above zero and increasing")
+        if not (np.isfinite(values).all() and (values >= 0.0).all()):
+            raise SceneError(f"{what}: values must be finite and zero or more")
+        return stretches, values
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,26 +67,13 @@ class Muscle(OnBody):
 
     kind: ClassVar[str] = "muscle"
 
-    body: str
-    strength: float
-    direction: ArrayLike
-    activation: OverTime = 1.0
-    tets: TetRegion = None
-    force_length: tuple[ArrayLike, ArrayLike] | None = None
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        self._check_names()
-        object.__setattr__(self, "strength", positive(self.strength, f"{self.label}: strength"))
-        object.__setattr__(self, "direction", checked_directions(self.direction, self.label))
-        what = f"{self.label}: activation"
-        object.__setattr__(self, "activation", checked_magnitude(self.activation, what))
-        known = self.activation.values if isinstance(self.activation, Curve) else self.activation
-        if not callable(known):
-            check_activation(float(np.max(np.asarray(known))), what)
-        object.__setattr__(self, "tets", checked_tets(self.tets, self.label))
-        if self.force_length is not None:
-            object.__setattr__(self, "force_length", self._checked_curve())
+    body: Annotated[str, Name()]
+    strength: Annotated[float, POSITIVE]
+    direction: Annotated[ArrayLike, Directions()]
+    activation: Annotated[OverTime, ACTIVATION] = 1.0
+    tets: Annotated[TetRegion, TETS] = None
+    force_length: Annotated[tuple[ArrayLike, ArrayLike] | None, ForceLength()] = None
+    name: Annotated[str | None, Name()] = None
 
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         self.fibres(body_of(self.body, bodies, self.label))
@@ -81,23 +89,3 @@ class Muscle(OnBody):
             raise SceneError(f"{self.label}: the body is rigid; a muscle acts in soft bodies")
         rows = tets_in(self.tets, body, self.label)
         return rows, directions_of(self.direction, rows, self.label)
-
-    def _checked_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        what = f"{self.label}: force_length"
-        try:
-            stretches, values = (float_array(part, what) for part in self.force_length or ())
-        except (TypeError, ValueError):
-            raise SceneError(f"{what} is {self.force_length!r}; give (stretches, values)") from None
-        if stretches.ndim != 1 or len(stretches) == 0 or stretches.shape != values.shape:
-            raise SceneError(f"{what}: shapes are {stretches.shape} and {values.shape}; give as many of both")
-        if not (np.isfinite(stretches).all() and stretches[0] > 0.0 and (np.diff(stretches) > 0.0).all()):
-            raise SceneError(f"{what}: stretches must be finite, above zero and increasing")
-        if not (np.isfinite(values).all() and (values >= 0.0).all()):
-            raise SceneError(f"{what}: values must be finite and zero or more")
-        return stretches, values
-
-
-def check_activation(value: float, what: str) -> None:
-    """Raise `SceneError` for more than 1."""
-    if value > 1.0:
-        raise SceneError(f"{what} is {value:g}; it must be from 0 to 1")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from numpy.typing import ArrayLike
 
-from supple.errors import SceneError
-from supple.scene.joints.joint import Joint, checked_limits
-from supple.scene.joints.motors import Motor
-from supple.scene.values import non_negative, positive, unit_vector
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Direction, Limits, OneOf
+from supple.scene.joints.conditions import FREE, Conditions, Function
+from supple.scene.joints.joint import Joint
+from supple.scene.joints.motors import MOTORS, Motor
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,29 +30,18 @@ class AxisJoint(Joint):
         with whatever effort that takes, as of the coordinate; None: no bound. Equilibria have no rates.
     """
 
-    axis: ArrayLike = (0.0, 0.0, 1.0)
-    limits: tuple[float, float] | None = None
-    motor: Motor | None = None
-    damping: float = 0.0
-    friction: float = 0.0
-    max_effort: float | None = None
-    max_velocity: float | None = None
+    axis: Annotated[ArrayLike, Direction()] = (0.0, 0.0, 1.0)
+    limits: Annotated[tuple[float, float] | None, Limits("exchange them, or use a FixedJoint")] = None
+    motor: Annotated[Motor | None, OneOf(MOTORS, "PositionMotor(...) or another motor")] = None
+    damping: Annotated[float, NON_NEGATIVE] = 0.0
+    friction: Annotated[float, NON_NEGATIVE] = 0.0
+    max_effort: Annotated[float | None, POSITIVE] = None
+    max_velocity: Annotated[float | None, POSITIVE] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "axis", unit_vector(self.axis, f"{self.label}: axis"))
-        if self.limits is not None:
-            object.__setattr__(self, "limits", checked_limits(self.limits, f"{self.label}: limits"))
-        if self.motor is not None and not isinstance(self.motor, Motor):
-            raise SceneError(f"{self.label}: motor is {self.motor!r}; give PositionMotor(...) or another motor")
-        for key in ("damping", "friction"):
-            object.__setattr__(self, key, non_negative(getattr(self, key), f"{self.label}: {key}"))
-        if self.max_velocity is not None:
-            object.__setattr__(self, "max_velocity", positive(self.max_velocity, f"{self.label}: max_velocity"))
-        if self.max_effort is not None:
-            object.__setattr__(self, "max_effort", positive(self.max_effort, f"{self.label}: max_effort"))
-            if self.motor is not None:
-                object.__setattr__(self, "motor", self.motor.bounded(self.max_effort))
+        if self.max_effort is not None and self.motor is not None:
+            object.__setattr__(self, "motor", self.motor.bounded(self.max_effort))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +57,11 @@ class HingeJoint(AxisJoint):
     """
 
     kind: ClassVar[str] = "hinge"
-    needs_point: ClassVar[bool] = True
+    required: ClassVar[tuple[str, ...]] = ("point",)
+
+    def conditions(self) -> Conditions:
+        angle = Function("angle", ("first.1", "second.1", "second.2"), self.limits or FREE)
+        return Conditions(parallel=(0,), functions=(angle,), lines=("second.0",))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,3 +76,8 @@ class SliderJoint(AxisJoint):
     """
 
     kind: ClassVar[str] = "slider"
+
+    def conditions(self) -> Conditions:
+        travel = Function("product", ("apart", "second.0"), self.limits or FREE)
+        across = [Function("product", ("apart", f"second.{k}"), vanishes=True) for k in (1, 2)]
+        return Conditions(together=False, parallel=(0, 1, 2), functions=(travel, *across), lines=("second.0",))

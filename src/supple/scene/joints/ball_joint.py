@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from supple.errors import SceneError
-from supple.scene.joints.joint import Joint, checked_limits
-from supple.scene.values import positive, unit_vector
+from supple.kinds.forms import POSITIVE, Direction, Limits
+from supple.scene.joints.conditions import Conditions, Function
+from supple.scene.joints.joint import Joint
 
 # The swing has no direction at zero and at half a turn: limits stay away from them.
 _SWINGS = (0.01, np.pi - 0.01)
@@ -36,11 +37,11 @@ class BallJoint(Joint):
     """
 
     kind: ClassVar[str] = "ball"
-    needs_point: ClassVar[bool] = True
+    required: ClassVar[tuple[str, ...]] = ("point",)
 
-    axis: ArrayLike | None = None
-    max_swing: float | None = None
-    twist_limits: tuple[float, float] | None = None
+    axis: Annotated[ArrayLike | None, Direction()] = None
+    max_swing: Annotated[float | None, POSITIVE] = None
+    twist_limits: Annotated[tuple[float, float] | None, Limits()] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -50,17 +51,24 @@ class BallJoint(Joint):
             if self.twist_limits is not None:
                 raise SceneError(f"{self.label}: twist_limits need axis and max_swing, without which there is no twist")
             return
-        object.__setattr__(self, "axis", unit_vector(self.axis, f"{self.label}: axis"))
-        object.__setattr__(self, "max_swing", positive(self.max_swing, f"{self.label}: max_swing"))
-        if not _SWINGS[0] <= self.max_swing <= _SWINGS[1]:
+        check_swing(self.max_swing, self.label)
+        low, high = self.twist_limits or (0.0, 0.0)
+        if max(-low, high) > _SWINGS[1]:
             raise SceneError(
-                f"{self.label}: max_swing is {self.max_swing:g} rad; give one from {_SWINGS[0]:g} to {_SWINGS[1]:.4g}"
+                f"{self.label}: twist_limits are ({low:g}, {high:g}); give two from {-_SWINGS[1]:.4g} to "
+                f"{_SWINGS[1]:.4g}"
             )
+
+    def conditions(self) -> Conditions:
+        if self.max_swing is None:
+            return Conditions()
+        functions = [Function("cosine", ("first.0", "second.0"), (0.0, self.max_swing))]
         if self.twist_limits is not None:
-            low, high = checked_limits(self.twist_limits, f"{self.label}: twist_limits")
-            if max(-low, high) > _SWINGS[1]:
-                raise SceneError(
-                    f"{self.label}: twist_limits are ({low:g}, {high:g}); give two from {-_SWINGS[1]:.4g} to "
-                    f"{_SWINGS[1]:.4g}"
-                )
-            object.__setattr__(self, "twist_limits", (low, high))
+            functions.append(Function("twist", ("first.1", "second.1", "second.2", "first.2"), self.twist_limits))
+        return Conditions(functions=tuple(functions))
+
+
+def check_swing(max_swing: float, label: str) -> None:
+    """Raise `SceneError` where the largest swing is near zero or half a turn [rad]."""
+    if not _SWINGS[0] <= max_swing <= _SWINGS[1]:
+        raise SceneError(f"{label}: max_swing is {max_swing:g} rad; give one from {_SWINGS[0]:g} to {_SWINGS[1]:.4g}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from supple.scene.joints.conditions import Conditions
 from supple.scene.joints.joint import Joint
 
 
@@ -18,3 +19,6 @@ class FixedJoint(Joint):
     """
 
     kind: ClassVar[str] = "fixed"
+
+    def conditions(self) -> Conditions:
+        return Conditions(parallel=(0, 1, 2))

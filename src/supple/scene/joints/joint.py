@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import Flag, Name, Vector
+from supple.kinds.kind import Kind
 from supple.scene.body import PlacedBody
+from supple.scene.joints.conditions import Conditions
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.suggestion import suggestion
-from supple.scene.values import check_name, finite_vector, float_array
 
 
 @dataclass(frozen=True, eq=False)
-class Joint(ABC):
+class Joint(Kind, ABC):
     """Two things that move against each other in some ways only: a rigid body, and another, an obstacle or the world.
 
     Points and axes are those of the world where the scene places everything; there the coordinate of a joint is zero.
@@ -34,29 +36,18 @@ class Joint(ABC):
     name : under which reports have the joint; a scene names unnamed joints by kind and number.
     """
 
-    kind: ClassVar[str]
-    needs_point: ClassVar[bool] = False
+    title: ClassVar[str] = "joint"
 
-    first: str
-    second: str | None = None
-    point: ArrayLike | None = None
-    collide: bool = False
-    name: str | None = None
+    first: Annotated[str, Name()]
+    second: Annotated[str | None, Name()] = None
+    point: Annotated[ArrayLike | None, Vector()] = None
+    collide: Annotated[bool, Flag()] = False
+    name: Annotated[str | None, Name()] = None
 
     def __post_init__(self) -> None:
-        if self.name is not None:
-            check_name(self.name, "joint")
-        check_name(self.first, f"{self.label}: first")
-        if self.second is not None:
-            check_name(self.second, f"{self.label}: second")
+        super().__post_init__()
         if self.first == self.second:
             raise SceneError(f"{self.label}: it joins body {self.first!r} to itself; give two different ones")
-        if self.point is not None:
-            object.__setattr__(self, "point", finite_vector(self.point, f"{self.label}: point"))
-        elif self.needs_point:
-            raise SceneError(f"{self.label}: there is no point; give point=(x, y, z), where the two are joined [m]")
-        if not isinstance(self.collide, bool):
-            raise SceneError(f"{self.label}: collide is {self.collide!r}; give True or False")
 
     @property
     def label(self) -> str:
@@ -66,6 +57,14 @@ class Joint(ABC):
         return (
             f"{type(self).__name__} of {self.first!r} and {'the world' if self.second is None else repr(self.second)}"
         )
+
+    def axes(self) -> NDArray[np.float64]:
+        """(3, 3) three perpendicular unit vectors (rows), right-handed, which `conditions` refers to by number."""
+        return axes_along(getattr(self, "axis", None))
+
+    @abstractmethod
+    def conditions(self) -> Conditions:
+        """What holds between the two sides, and what is measured."""
 
     def check(self, bodies: Mapping[str, PlacedBody], obstacles: Mapping[str, Obstacle]) -> None:
         """Raise `SceneError` where what it joins does not exist, or is soft."""
@@ -90,19 +89,9 @@ class Joint(ABC):
             raise SceneError(f"{self.label}: body {name!r} is soft; joints join rigid bodies")
 
 
-def checked_limits(limits: object, what: str) -> tuple[float, float]:
-    """Two numbers, the first below the second; `what` begins the messages.
-
-    Raises
-    ------
-    SceneError : where they are not.
-    """
-    ends = float_array(limits, what, "give two numbers (low, high)")
-    if ends.shape != (2,) or np.isnan(ends).any():
-        raise SceneError(f"{what} is {limits!r}; give two numbers (low, high)")
-    low, high = float(ends[0]), float(ends[1])
-    if not low < high:
-        raise SceneError(
-            f"{what} are ({low:g}, {high:g}), and the first is not below the second; exchange them, or use a FixedJoint"
-        )
-    return low, high
+def axes_along(axis: ArrayLike | None) -> NDArray[np.float64]:
+    """(3, 3) perpendicular unit vectors (rows), right-handed; the first is the axis, or x without one."""
+    e = np.array([1.0, 0.0, 0.0]) if axis is None else np.asarray(axis, dtype=np.float64)
+    across = np.cross(e, np.eye(3)[np.argmin(np.abs(e))])
+    across /= np.linalg.norm(across)
+    return np.array([e, across, np.cross(e, across)], dtype=np.float64)

@@ -6,24 +6,30 @@ are an angle [rad] and a torque [N m]. A positive effort pushes the first body t
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 
 from supple.errors import SceneError
-from supple.scene.loads.over_time import OverTime, checked_over_time, value_at
-from supple.scene.values import non_negative, positive
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE
+from supple.kinds.kind import Kind
+from supple.scene.loads.over_time import OverTime, OverTimeOf, value_at
+
+_SCRIPT = OverTimeOf(inputs=True)
 
 
-class Motor(ABC):
+class Motor(Kind, ABC):
     """The base class of motors.
 
     Attributes
     ----------
     max_force : largest effort [N], [N m]; None where it has no bound
+    driven_by : the field with the target, or the effort, over time
     """
+
+    driven_by: ClassVar[str] = "target"
 
     max_force: float | None = None
 
@@ -33,9 +39,9 @@ class Motor(ABC):
         return type(self).__name__
 
     @property
-    @abstractmethod
     def script(self) -> OverTime:
         """What drives it, over time: a target, or an effort."""
+        return getattr(self, self.driven_by)
 
     def at(self, time: float) -> float:
         """The target, or the effort, at `time` [s].
@@ -46,18 +52,14 @@ class Motor(ABC):
         """
         return float(value_at(self.script, time, f"{self.label}: its function of time", ()))
 
-    @abstractmethod
     def scripted(self, script: OverTime) -> Motor:
         """The same motor with another script."""
+        return replace(cast(Any, self), **{self.driven_by: script})
 
     def bounded(self, most: float) -> Motor:
         """The same motor with an effort of at most `most`."""
         most = most if self.max_force is None else min(self.max_force, most)
         return replace(cast(Any, self), max_force=most)
-
-    def _check_max_force(self) -> None:
-        if self.max_force is not None:
-            object.__setattr__(self, "max_force", positive(self.max_force, f"{self.label}: max_force"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,25 +80,17 @@ class PositionMotor(Motor):
     SceneError : where a value is of the wrong kind or out of range.
     """
 
-    target: OverTime
-    stiffness: float
-    damping: float = 0.0
-    max_force: float | None = None
+    kind: ClassVar[str] = "position"
+
+    target: Annotated[OverTime, _SCRIPT]
+    stiffness: Annotated[float, NON_NEGATIVE]
+    damping: Annotated[float, NON_NEGATIVE] = 0.0
+    max_force: Annotated[float | None, POSITIVE] = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "target", checked_over_time(self.target, f"{self.label}: target", ()))
-        for key in ("stiffness", "damping"):
-            object.__setattr__(self, key, non_negative(getattr(self, key), f"{self.label}: {key}"))
+        super().__post_init__()
         if self.stiffness == 0.0 and self.damping == 0.0:
             raise SceneError(f"{self.label}: stiffness and damping are both zero, so that it has no effect; give one")
-        self._check_max_force()
-
-    @property
-    def script(self) -> OverTime:
-        return self.target
-
-    def scripted(self, script: OverTime) -> Motor:
-        return replace(self, target=script)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,19 +110,10 @@ class VelocityMotor(Motor):
     SceneError : where a value is of the wrong kind or out of range.
     """
 
-    target: OverTime
-    max_force: float | None = None
+    kind: ClassVar[str] = "velocity"
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "target", checked_over_time(self.target, f"{self.label}: target", ()))
-        self._check_max_force()
-
-    @property
-    def script(self) -> OverTime:
-        return self.target
-
-    def scripted(self, script: OverTime) -> Motor:
-        return replace(self, target=script)
+    target: Annotated[OverTime, _SCRIPT]
+    max_force: Annotated[float | None, POSITIVE] = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,20 +130,15 @@ class ForceMotor(Motor):
     SceneError : where a value is of the wrong kind or out of range.
     """
 
-    force: OverTime
-    max_force: float | None = None
+    kind: ClassVar[str] = "force"
+    driven_by: ClassVar[str] = "force"
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "force", checked_over_time(self.force, f"{self.label}: force", ()))
-        self._check_max_force()
+    force: Annotated[OverTime, _SCRIPT]
+    max_force: Annotated[float | None, POSITIVE] = None
 
     def at(self, time: float) -> float:
         most = np.inf if self.max_force is None else self.max_force
         return float(np.clip(super().at(time), -most, most))
 
-    @property
-    def script(self) -> OverTime:
-        return self.force
 
-    def scripted(self, script: OverTime) -> Motor:
-        return replace(self, force=script)
+MOTORS: tuple[type[Motor], ...] = (PositionMotor, VelocityMotor, ForceMotor)

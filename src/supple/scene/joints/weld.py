@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import POSITIVE, Name
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.body import PlacedBody
 from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.selection import OnVertices, Selection
+from supple.scene.selection import OnVertices, Selection, Vertices
 from supple.scene.suggestion import suggestion
-from supple.scene.values import check_name, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,21 +38,17 @@ class Weld(OnVertices):
     """
 
     kind: ClassVar[str] = "weld"
-    takes_all: ClassVar[bool] = True
 
-    body: str
-    rigid: str
-    vertices: Selection | None = None
-    max_distance: float | None = None
-    name: str | None = None
+    body: Annotated[str, Name()]
+    rigid: Annotated[str, Name()]
+    vertices: Annotated[Selection | None, Vertices()] = None
+    max_distance: Annotated[float | None, POSITIVE] = None
+    name: Annotated[str | None, Name()] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_name(self.rigid, f"{self.label}: rigid")
         if (self.vertices is None) == (self.max_distance is None):
-            raise SceneError(f"{self.label}: give its vertices by either `vertices` or `max_distance`")
-        if self.max_distance is not None:
-            object.__setattr__(self, "max_distance", positive(self.max_distance, f"{self.label}: max_distance"))
+            raise SceneError(f"{self.label}: give the vertices by one of `vertices`, `box` and `max_distance`")
 
     def bodies_of(self, bodies: Mapping[str, PlacedBody]) -> tuple[PlacedBody, RigidBody]:
         """The soft and the rigid body.

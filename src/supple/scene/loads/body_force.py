@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import float_array
+from supple.kinds.forms import Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Load, body_of
-from supple.scene.loads.over_time import Curve, checked_over_time, value_at
-from supple.scene.values import check_name, float_array
+from supple.scene.loads.over_time import Curve, OverTimeOf, value_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,19 +33,11 @@ class BodyForce(Load):
     SceneError : where a value is of the wrong kind or not finite.
     """
 
-    kind: ClassVar[str] = "body force"
+    kind: ClassVar[str] = "body_force"
 
-    force: ArrayLike | Curve | Callable[[NDArray[np.float64], float], ArrayLike]
-    body: str | None = None
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.body is not None:
-            check_name(self.body, f"{self.kind}: body")
-        if self.name is not None:
-            check_name(self.name, self.kind)
-        if isinstance(self.force, Curve) or not callable(self.force):
-            object.__setattr__(self, "force", checked_over_time(self.force, f"{self.label}: force", (3,)))
+    force: Annotated[ArrayLike | Curve | Callable[[NDArray[np.float64], float], ArrayLike], OverTimeOf((3,))]
+    body: Annotated[str | None, Name()] = None
+    name: Annotated[str | None, Name()] = None
 
     @property
     def bodies(self) -> tuple[str, ...]:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import Name, Number
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.scene.body import PlacedBody
-from supple.scene.loads.load import OnBody, body_of
-from supple.scene.loads.over_time import Limits, OverTime, checked_magnitude
-from supple.scene.loads.tet_region import TetRegion, checked_directions, checked_tets, directions_of, tets_in
+from supple.scene.loads.load import TETS, OnBody, body_of
+from supple.scene.loads.over_time import OverTime, OverTimeOf
+from supple.scene.loads.tet_region import Directions, TetRegion, directions_of, tets_in
 from supple.scene.rigid.rigid_body import RigidBody
 
 # Of a stretch: volumes and stiffnesses beyond it are not those of a body in the same scene.
-STRETCHES: Limits = (1e-3, 1e3)
+STRETCH = OverTimeOf(bounds=Number(least=1e-3, most=1e3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,19 +46,11 @@ class Growth(OnBody):
 
     kind: ClassVar[str] = "growth"
 
-    body: str
-    stretch: OverTime
-    direction: ArrayLike | None = None
-    tets: TetRegion = None
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        self._check_names()
-        what = f"{self.label}: stretch"
-        object.__setattr__(self, "stretch", checked_magnitude(self.stretch, what, zero=False, limits=STRETCHES))
-        if self.direction is not None:
-            object.__setattr__(self, "direction", checked_directions(self.direction, self.label))
-        object.__setattr__(self, "tets", checked_tets(self.tets, self.label))
+    body: Annotated[str, Name()]
+    stretch: Annotated[OverTime, STRETCH]
+    direction: Annotated[ArrayLike | None, Directions()] = None
+    tets: Annotated[TetRegion, TETS] = None
+    name: Annotated[str | None, Name()] = None
 
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         self.growing(body_of(self.body, bodies, self.label))

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import Form
+from supple.kinds.kind import Kind
 from supple.scene.body import PlacedBody
 from supple.scene.selection import InBox
 from supple.scene.suggestion import suggestion
-from supple.scene.values import check_name
 
 
-class Load(ABC):
+class Load(Kind, ABC):
     """The base class of loads; those on vertices alone are `Force`."""
 
-    kind: ClassVar[str]
     name: str | None
-
-    @property
-    def label(self) -> str:
-        """The name of this load in messages."""
-        return f"{self.kind} {self.name!r}" if self.name else self.kind
 
     @property
     @abstractmethod
@@ -58,12 +54,6 @@ class OnBody(Load):
 
     body: str
 
-    def _check_names(self) -> None:
-        """Raise `SceneError` where the name of the body or that of the load is none."""
-        check_name(self.body, f"{self.kind}: body")
-        if self.name is not None:
-            check_name(self.name, self.kind)
-
     @property
     def label(self) -> str:
         return f"{super().label} on body {self.body!r}"
@@ -81,10 +71,6 @@ class OnSurface(OnBody):
     """
 
     region: Region
-
-    def __post_init__(self) -> None:
-        self._check_names()
-        object.__setattr__(self, "region", checked_region(self.region, self.label))
 
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         self.triangles(body_of(self.body, bodies, self.label))
@@ -122,23 +108,32 @@ def surface_region(region: Region, body: PlacedBody, label: str) -> NDArray[np.i
     return rows
 
 
-def checked_region(region: Region, label: str) -> Region:
-    """A region, checked as far as possible without its body.
+@dataclass(frozen=True)
+class Rows(Form):
+    """Numbers of triangles of a surface, or of tets, or an `InBox` that holds all corners of each at the start.
 
-    Raises
-    ------
-    SceneError : where it is neither None, nor an `InBox`, nor a list of different numbers.
+    Attributes
+    ----------
+    things : what is numbered, in the plural; boxes : whether it may be an `InBox`
     """
-    if region is None or isinstance(region, InBox):
-        return region
-    try:
-        rows = np.atleast_1d(np.asarray(region))
-    except (TypeError, ValueError):
-        raise SceneError(f"{label}: region is {region!r}; give numbers of triangles, an InBox, or None") from None
-    if rows.ndim != 1 or rows.size == 0 or not np.issubdtype(rows.dtype, np.integer):
-        raise SceneError(f"{label}: region must be a non-empty list of whole numbers, an InBox, or None")
-    if rows.min() < 0:
-        raise SceneError(f"{label}: region holds {rows.min()}, which is negative; triangles are counted from 0")
-    if len(np.unique(rows)) != len(rows):
-        raise SceneError(f"{label}: region names a triangle twice; name each once")
-    return rows.astype(np.int64)
+
+    things: str
+    boxes: bool = True
+
+    def checked(self, value: Any, what: str) -> Region:
+        if isinstance(value, InBox) and self.boxes:
+            return value
+        try:
+            rows = np.atleast_1d(np.asarray(value))
+        except (TypeError, ValueError):
+            raise SceneError(f"{what} is {value!r}; give numbers of {self.things}, an InBox, or None") from None
+        if rows.ndim != 1 or rows.size == 0 or not np.issubdtype(rows.dtype, np.integer):
+            raise SceneError(f"{what} must be a non-empty list of whole numbers, an InBox, or None")
+        if rows.min() < 0:
+            raise SceneError(f"{what} holds {rows.min()}, which is negative; {self.things} are counted from 0")
+        if len(np.unique(rows)) != len(rows):
+            raise SceneError(f"{what} names a {self.things[:-1]} twice; name each once")
+        return rows.astype(np.int64)
+
+
+TRIANGLES, TETS = Rows("triangles"), Rows("tets")

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.scene.values import float_array
-
-# The least and the largest value that a number may have.
-Limits = tuple[float, float]
-ANY: Limits = (-math.inf, math.inf)
+from supple.kinds.checks import float_array
+from supple.kinds.forms import ANY_NUMBER, NUMBERS, Form, ListOf, Number
+from supple.kinds.kind import Kind, declared
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(Kind):
     """Piecewise linear values over time; constant before the first and after the last.
 
     Parameters
@@ -33,11 +31,15 @@ class Curve:
     SceneError : where shapes disagree, times do not increase, or a value is not finite.
     """
 
-    times: ArrayLike
-    values: ArrayLike
+    kind: ClassVar[str] = "curve"
+    title: ClassVar[str] = "Curve"
+
+    times: Annotated[ArrayLike, NUMBERS]
+    values: Annotated[ArrayLike, ListOf(("numbers", "vectors"))]
 
     def __post_init__(self) -> None:
-        times, values = float_array(self.times, "Curve: times"), float_array(self.values, "Curve: values")
+        super().__post_init__()
+        times, values = np.asarray(self.times), np.asarray(self.values)
         if times.ndim != 1 or len(times) == 0:
             raise SceneError(f"Curve: times has shape {times.shape}; give one time or more")
         if values.shape not in ((len(times),), (len(times), 3)):
@@ -48,8 +50,6 @@ class Curve:
         if len(late):
             k = int(late[0])
             raise SceneError(f"Curve: times[{k + 1}] = {times[k + 1]:g} s does not come after {times[k]:g} s")
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "values", values)
 
     def __call__(self, time: float) -> NDArray[np.float64]:
         """The value at `time` [s]."""
@@ -69,17 +69,42 @@ class Curve:
 OverTime = ArrayLike | Curve | Callable[[float], ArrayLike]
 
 
-def checked_over_time(value: OverTime, what: str, shape: tuple[int, ...]) -> OverTime:
-    """The value, as an array of `shape` where it is a constant; functions are checked when they are called.
+@dataclass(frozen=True)
+class OverTimeOf(Form):
+    """A number within bounds, or a vector of shape (3,): a constant, a `Curve`, or a function of time.
 
-    Raises
-    ------
-    SceneError : where a constant or a curve is not finite or has another shape.
+    Functions are checked when they are called.
+
+    Attributes
+    ----------
+    inputs : whether a scene file may name an input, which a program sets from frame to frame
     """
-    if isinstance(value, Curve):
-        _checked(value(float(np.asarray(value.times)[0])), what, shape)
-        return value
-    return value if callable(value) else _checked(value, what, shape)
+
+    shape: tuple[int, ...] = ()
+    bounds: Number = ANY_NUMBER
+    inputs: bool = False
+
+    def checked(self, value: Any, what: str) -> Any:
+        if callable(value) and not isinstance(value, Curve):
+            return value
+        known = value.values if isinstance(value, Curve) else [_checked(value, what, self.shape)]
+        _checked(np.asarray(known)[0], what, self.shape)
+        if self.shape == ():
+            for number in np.asarray(known, dtype=np.float64):
+                self.bounds.check_bounds(float(number), what)
+        return value if isinstance(value, Curve) else _checked(value, what, self.shape)
+
+    def at(self, value: OverTime, time: float, what: str) -> NDArray[np.float64]:
+        """The value at `time` [s].
+
+        Raises
+        ------
+        SceneError : where it is not finite, of another shape, or beyond its bounds.
+        """
+        found = value_at(value, time, what, self.shape)
+        if self.shape == ():
+            self.bounds.check_bounds(float(found), f"{what}({time:g})")
+        return found
 
 
 def value_at(value: OverTime, time: float, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -94,37 +119,11 @@ def value_at(value: OverTime, time: float, what: str, shape: tuple[int, ...]) ->
     return _checked(value(time), f"{what}({time:g})", shape) if callable(value) else np.asarray(value)
 
 
-def checked_magnitude(value: OverTime, what: str, *, zero: bool = True, limits: Limits = ANY) -> OverTime:
-    """`checked_over_time` of a number within `limits` that is never below zero and, without `zero`, always above it.
-
-    Raises
-    ------
-    SceneError : where it is not.
-    """
-    given = checked_over_time(value, what, ())
-    known = given.values if isinstance(given, Curve) else () if callable(given) else given
-    for number in np.atleast_1d(np.asarray(known, dtype=np.float64)):
-        _check_magnitude(float(number), what, zero, limits)
-    return given
-
-
-def magnitude_at(value: OverTime, time: float, what: str, *, zero: bool = True, limits: Limits = ANY) -> float:
-    """The value of such a number at `time` [s].
-
-    Raises
-    ------
-    SceneError : where it is not finite, or beyond its limits.
-    """
-    number = float(value_at(value, time, what, ()))
-    _check_magnitude(number, f"{what}({time:g})", zero, limits)
-    return number
-
-
-def _check_magnitude(number: float, what: str, zero: bool, limits: Limits) -> None:
-    if number < 0.0 or (number == 0.0 and not zero):
-        raise SceneError(f"{what} is {number:g}; it must be {'zero or more' if zero else 'above zero'}")
-    if not limits[0] <= number <= limits[1]:
-        raise SceneError(f"{what} is {number:g}; it must be from {limits[0]:g} to {limits[1]:g}")
+def script_of(thing: Kind, key: str) -> Callable[[float], NDArray[np.float64]]:
+    """A field of a kind that is declared with `OverTimeOf`, as a function of time [s] that checks its values."""
+    form, value, what = declared(type(thing))[key].form, getattr(thing, key), f"{thing.label}: {key}"
+    assert isinstance(form, OverTimeOf)
+    return lambda time: form.at(value, time, what)
 
 
 def _checked(value: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:

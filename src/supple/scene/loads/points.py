@@ -3,41 +3,55 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import check_name, finite_vector
+from supple.kinds.forms import Form
 from supple.mesh.skin import Embedding
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import body_of
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.values import check_name, finite_vector
 
 Point = tuple[str | None, Any]
 
 
-def checked_point(given: Any, what: str) -> Point:
-    """A point, checked as far as possible without its body.
+@dataclass(frozen=True)
+class PointForm(Form):
+    """(body, vertex), (body, (x, y, z)) or (None, (x, y, z)), checked as far as possible without the body."""
 
-    Raises
-    ------
-    SceneError : where it is neither (body, vertex) nor (body, (x, y, z)) nor (None, (x, y, z)).
-    """
-    try:
-        name, place = given
-    except (TypeError, ValueError):
-        raise SceneError(f"{what} is {given!r}; give (body, vertex) or (body, (x, y, z))") from None
-    if name is not None:
-        check_name(name, f"{what}: body")
-    if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
-        if name is None:
-            raise SceneError(f"{what}: the world has no vertices; give (None, (x, y, z))")
-        if place < 0:
-            raise SceneError(f"{what}: vertex {place} is negative; vertices are counted from 0")
-        return name, int(place)
-    return name, finite_vector(place, f"{what}: place")
+    def checked(self, value: Any, what: str) -> Point:
+        try:
+            name, place = value
+        except (TypeError, ValueError):
+            raise SceneError(f"{what} is {value!r}; give (body, vertex) or (body, (x, y, z))") from None
+        if name is not None:
+            check_name(name, f"{what}: body")
+        if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
+            if name is None:
+                raise SceneError(f"{what}: the world has no vertices; give (None, (x, y, z))")
+            if place < 0:
+                raise SceneError(f"{what}: vertex {place} is negative; vertices are counted from 0")
+            return name, int(place)
+        return name, finite_vector(place, f"{what}: place")
+
+
+@dataclass(frozen=True)
+class PointList(Form):
+    """Two points or more."""
+
+    def checked(self, value: Any, what: str) -> tuple[Point, ...]:
+        try:
+            given = list(value)
+        except TypeError:
+            given = []
+        if len(given) < 2:
+            raise SceneError(f"{what} is {value!r}; give two or more")
+        return tuple(PointForm().checked(point, f"{what}[{i}]") for i, point in enumerate(given))
 
 
 def point_corners(

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Load
-from supple.scene.loads.over_time import OverTime, checked_magnitude
-from supple.scene.loads.points import Point, checked_point, point_corners
-from supple.scene.values import check_name, positive
+from supple.scene.loads.over_time import OverTime, OverTimeOf
+from supple.scene.loads.points import Point, PointForm, point_corners
+
+LENGTH = OverTimeOf(bounds=NON_NEGATIVE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,23 +39,16 @@ class Spring(Load):
 
     kind: ClassVar[str] = "spring"
 
-    first: Point
-    second: Point
-    stiffness: float
-    rest_length: OverTime | None = None
-    name: str | None = None
+    first: Annotated[Point, PointForm()]
+    second: Annotated[Point, PointForm()]
+    stiffness: Annotated[float, POSITIVE]
+    rest_length: Annotated[OverTime | None, LENGTH] = None
+    name: Annotated[str | None, Name()] = None
 
     def __post_init__(self) -> None:
-        if self.name is not None:
-            check_name(self.name, self.kind)
-        for key in ("first", "second"):
-            object.__setattr__(self, key, checked_point(getattr(self, key), f"{self.label}: {key}"))
+        super().__post_init__()
         if self.first[0] is None and self.second[0] is None:
             raise SceneError(f"{self.label}: both ends are fixed in the world; give at least one point of a body")
-        object.__setattr__(self, "stiffness", positive(self.stiffness, f"{self.label}: stiffness"))
-        if self.rest_length is not None:
-            given = checked_magnitude(self.rest_length, f"{self.label}: rest_length")
-            object.__setattr__(self, "rest_length", given)
 
     @property
     def bodies(self) -> tuple[str, ...]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from supple.errors import SceneError
+from supple.kinds.forms import Name
 from supple.scene.body import PlacedBody
-from supple.scene.loads.load import OnSurface, Region, body_of
-from supple.scene.loads.over_time import OverTime, checked_over_time
+from supple.scene.loads.load import TRIANGLES, OnSurface, Region, body_of
+from supple.scene.loads.over_time import OverTime, OverTimeOf
 from supple.scene.rigid.rigid_body import RigidBody
 
 
@@ -32,14 +33,10 @@ class Traction(OnSurface):
 
     kind: ClassVar[str] = "traction"
 
-    body: str
-    traction: OverTime
-    region: Region = None
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "traction", checked_over_time(self.traction, f"{self.label}: traction", (3,)))
+    body: Annotated[str, Name()]
+    traction: Annotated[OverTime, OverTimeOf((3,))]
+    region: Annotated[Region, TRIANGLES] = None
+    name: Annotated[str | None, Name()] = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +56,10 @@ class Pressure(OnSurface):
 
     kind: ClassVar[str] = "pressure"
 
-    body: str
-    pressure: OverTime
-    region: Region = None
-    name: str | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "pressure", checked_over_time(self.pressure, f"{self.label}: pressure", ()))
+    body: Annotated[str, Name()]
+    pressure: Annotated[OverTime, OverTimeOf()]
+    region: Annotated[Region, TRIANGLES] = None
+    name: Annotated[str | None, Name()] = None
 
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         super().check(bodies)

@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import float_array
+from supple.kinds.forms import Form
 from supple.scene.body import PlacedBody
 from supple.scene.selection import InBox
-from supple.scene.values import float_array
 
 TetRegion = ArrayLike | InBox | None
-
-
-def checked_tets(tets: TetRegion, label: str) -> TetRegion:
-    """None, an `InBox`, or different whole numbers from 0.
-
-    Raises
-    ------
-    SceneError : where it is something else.
-    """
-    if tets is None or isinstance(tets, InBox):
-        return tets
-    rows = np.atleast_1d(np.asarray(tets))
-    if rows.ndim != 1 or rows.size == 0 or not np.issubdtype(rows.dtype, np.integer) or rows.min() < 0:
-        raise SceneError(f"{label}: tets must be a non-empty list of whole numbers from 0, an InBox, or None")
-    if len(np.unique(rows)) != len(rows):
-        raise SceneError(f"{label}: tets names a tet twice; name each once")
-    return rows.astype(np.int64)
 
 
 def tets_in(tets: TetRegion, body: PlacedBody, label: str) -> NDArray[np.int64]:
@@ -53,21 +40,19 @@ def tets_in(tets: TetRegion, body: PlacedBody, label: str) -> NDArray[np.int64]:
     return rows
 
 
-def checked_directions(direction: ArrayLike, label: str) -> NDArray[np.float64]:
-    """(3,) or (m, 3) unit vectors.
+@dataclass(frozen=True)
+class Directions(Form):
+    """(3,) or (m, 3) vectors of any length above zero, stored as unit vectors; a scene file has one."""
 
-    Raises
-    ------
-    SceneError : where the shape is another one, or a vector is zero or not finite.
-    """
-    given = float_array(direction, f"{label}: direction", "give three numbers, or three for each tet")
-    if given.shape != (3,) and (given.ndim != 2 or given.shape[1] != 3):
-        raise SceneError(f"{label}: direction has shape {given.shape}; give (3,), or (m, 3) for m tets")
-    largest = np.abs(given).max(axis=-1, keepdims=True)
-    if not (np.isfinite(largest).all() and (largest > 0.0).all()):
-        raise SceneError(f"{label}: direction is zero or not finite; give vectors of any length above zero")
-    given = given / largest
-    return given / np.linalg.norm(given, axis=-1, keepdims=True)
+    def checked(self, value: Any, what: str) -> NDArray[np.float64]:
+        given = float_array(value, what, "give three numbers, or three for each tet")
+        if given.shape != (3,) and (given.ndim != 2 or given.shape[1] != 3):
+            raise SceneError(f"{what} has shape {given.shape}; give (3,), or (m, 3) for m tets")
+        largest = np.abs(given).max(axis=-1, keepdims=True)
+        if not (np.isfinite(largest).all() and (largest > 0.0).all()):
+            raise SceneError(f"{what} is zero or not finite; give vectors of any length above zero")
+        given = given / largest
+        return given / np.linalg.norm(given, axis=-1, keepdims=True)
 
 
 def directions_of(direction: ArrayLike, rows: NDArray[np.int64], label: str) -> NDArray[np.float64]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.kinds.forms import Extents, Flag, Vector
 from supple.mesh import shapes
 from supple.scene.obstacles.half_space import plane_contact
 from supple.scene.obstacles.obstacle import Obstacle, distances_from_corner
-from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.shape import Shape, frame_of
 from supple.scene.rotation import rotation_matrix
 
@@ -26,14 +26,12 @@ class Box(Obstacle):
     inside : True where bodies live inside the box.
     """
 
-    center: ArrayLike = field(default=(0.0, 0.0, 0.0), metadata=parameter("vector", "[m]"))
-    size: ArrayLike = field(default=(1.0, 1.0, 1.0), metadata=parameter("extents", "full edge lengths [m]"))
-    rotation: ArrayLike = field(
-        default=(0.0, 0.0, 0.0), metadata=parameter("vector", "rotation vector about the center [rad]")
-    )
-    inside: bool = field(default=False, metadata=parameter("flag", "true where bodies live inside"))
+    center: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    size: Annotated[ArrayLike, Extents()] = (1.0, 1.0, 1.0)
+    rotation: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    inside: Annotated[bool, Flag()] = False
 
-    file_kind: ClassVar[str] = "box"
+    kind: ClassVar[str] = "box"
 
     @property
     def orientation(self) -> NDArray[np.float64]:
@@ -41,7 +39,7 @@ class Box(Obstacle):
         return rotation_matrix(self.rotation)
 
     @property
-    def has_exact_triangles(self) -> bool:
+    def checked_by_triangles(self) -> bool:
         return not self.inside
 
     def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -38,7 +38,7 @@ class Capsule(SegmentObstacle):
     inside : True where bodies live inside the capsule.
     """
 
-    file_kind: ClassVar[str] = "capsule"
+    kind: ClassVar[str] = "capsule"
     smooth: ClassVar[bool] = True
 
     def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

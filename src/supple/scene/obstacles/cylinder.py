@@ -42,7 +42,7 @@ class Cylinder(SegmentObstacle):
     inside : True where bodies live inside the cylinder.
     """
 
-    file_kind: ClassVar[str] = "cylinder"
+    kind: ClassVar[str] = "cylinder"
 
     def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         heights, r, outward = self.split(points)

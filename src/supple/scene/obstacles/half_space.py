@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.kinds.forms import Direction, Vector
 from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import Obstacle
-from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.shape import Shape, frame_of
 
 
@@ -29,10 +29,10 @@ class HalfSpace(Obstacle):
     point : (3,) a point of the plane [m]; normal : (3,) direction out of the solid [-], towards the free side.
     """
 
-    point: ArrayLike = field(default=(0.0, 0.0, 0.0), metadata=parameter("vector", "a point of the plane [m]"))
-    normal: ArrayLike = field(default=(0.0, 1.0, 0.0), metadata=parameter("direction", "towards the free side"))
+    point: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    normal: Annotated[ArrayLike, Direction()] = (0.0, 1.0, 0.0)
 
-    file_kind: ClassVar[str] = "half_space"
+    kind: ClassVar[str] = "half_space"
 
     @property
     def plane(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

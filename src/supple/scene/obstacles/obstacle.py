@@ -1,6 +1,6 @@
 """The interface of obstacles. A kind is one class in one file, and one line in `registry`.
 
-An obstacle is a convex solid, a room with a convex inside, or a mesh of triangles. Its shape is given where it is at
+An obstacle is a solid, a room with a convex inside, or a mesh of triangles. Its shape is given where it is at
 time 0; `motion` moves it from there (see `supple.scene.motion`).
 """
 
@@ -9,21 +9,32 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import SceneError
+from supple.kinds.forms import NON_NEGATIVE, Form, Name
+from supple.kinds.kind import Declared, Kind, declared
 from supple.mesh.surface import SurfaceMesh
-from supple.scene.motion import Motion, check_motion, rigid_pose
-from supple.scene.obstacles.parameters import Parameter
+from supple.scene.motion import Motion, MotionForm, rigid_pose
 from supple.scene.obstacles.shape import Shape
-from supple.scene.values import check_name, non_negative
+
+
+@dataclass(frozen=True)
+class Surface(Form):
+    """Triangles."""
+
+    def checked(self, value: Any, what: str) -> SurfaceMesh:
+        if not isinstance(value, SurfaceMesh):
+            raise SceneError(f"{what} is {value!r}; give a SurfaceMesh")
+        return value
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Obstacle(ABC):
-    """Base of all obstacles. A kind declares its own fields with `parameter`.
+class Obstacle(Kind, ABC):
+    """Base of all obstacles.
 
     Parameters
     ----------
@@ -36,27 +47,19 @@ class Obstacle(ABC):
     SceneError : where a value is of the wrong kind, not finite or out of range; the text names the obstacle.
     """
 
-    friction: float = 0.0
-    motion: Motion = None
-    name: str | None = None
+    friction: Annotated[float, NON_NEGATIVE] = 0.0
+    motion: Annotated[Motion, MotionForm()] = None
+    name: Annotated[str | None, Name()] = None
 
-    file_kind: ClassVar[str]
-    """The value of `kind` in scene files."""
+    title: ClassVar[str] = "obstacle"
     smooth: ClassVar[bool] = False
     """Whether the surface is drawn without edges."""
 
-    def __post_init__(self) -> None:
-        if self.name is not None:
-            check_name(self.name, "obstacle")
-        object.__setattr__(self, "friction", non_negative(self.friction, f"{self.label}: friction"))
-        check_motion(self.motion, self.label)
-        for key, declared in self.parameters().items():
-            object.__setattr__(self, key, declared.checked(getattr(self, key), f"{self.label}: {key}"))
-
     @classmethod
-    def parameters(cls) -> dict[str, Parameter]:
-        """The declared parameters, by name."""
-        return {f.name: f.metadata["parameter"] for f in fields(cls) if "parameter" in f.metadata}
+    def parameters(cls) -> dict[str, Declared]:
+        """What a kind declares of its own, by name."""
+        common = {field.name for field in fields(Obstacle)}
+        return {key: one for key, one in declared(cls).items() if key not in common}
 
     @property
     def label(self) -> str:
@@ -65,8 +68,8 @@ class Obstacle(ABC):
 
     def values(self) -> dict[str, Any]:
         """The parameters as plain numbers and lists, without surfaces; a recording keeps them."""
-        declared = {key: getattr(self, key) for key, one in self.parameters().items() if one.kind != "surface"}
-        return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in declared.items()}
+        own = {key: getattr(self, key) for key, one in self.parameters().items() if not isinstance(one.form, Surface)}
+        return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in own.items()}
 
     def pose(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotation (3, 3) and translation (3,) [m] from where it is at time 0 to where it is at `time` [s]."""
@@ -105,8 +108,8 @@ class Obstacle(ABC):
         return SurfaceMesh(*self.triangles())
 
     @property
-    def has_exact_triangles(self) -> bool:
-        """Whether `triangles` is the surface itself, and not a polyhedron about it."""
+    def checked_by_triangles(self) -> bool:
+        """Whether checks compare bodies with `triangles`: the surface, or one about a solid that is not convex."""
         return self.surface_mesh is not None
 
     @abstractmethod

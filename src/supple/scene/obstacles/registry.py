@@ -10,6 +10,7 @@ from supple.scene.obstacles.cylinder import Cylinder
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.sphere import Sphere
+from supple.scene.obstacles.torus import Torus
 from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
 
 KINDS: dict[str, type[Obstacle]] = {}
@@ -33,5 +34,5 @@ def restored_obstacle(kind: str, values: dict[str, Any]) -> Obstacle:
     return KINDS[kind](**values)
 
 
-for _kind in (HalfSpace, Box, Sphere, Capsule, Cylinder, TriangleObstacle):
+for _kind in (HalfSpace, Box, Sphere, Capsule, Cylinder, Torus, TriangleObstacle):
     register(_kind)

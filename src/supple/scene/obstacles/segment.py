@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import POSITIVE, Flag, Vector
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
-from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.shape import frame_of
 
 
@@ -22,10 +23,10 @@ class SegmentObstacle(Obstacle):
     start, end : (3,) the ends of the axis [m]; radius : [m]; inside : True where bodies live inside.
     """
 
-    start: ArrayLike = field(default=(0.0, -0.5, 0.0), metadata=parameter("vector", "one end of the axis [m]"))
-    end: ArrayLike = field(default=(0.0, 0.5, 0.0), metadata=parameter("vector", "the other end of the axis [m]"))
-    radius: float = field(default=0.5, metadata=parameter("positive", "[m]"))
-    inside: bool = field(default=False, metadata=parameter("flag", "true where bodies live inside"))
+    start: Annotated[ArrayLike, Vector()] = (0.0, -0.5, 0.0)
+    end: Annotated[ArrayLike, Vector()] = (0.0, 0.5, 0.0)
+    radius: Annotated[float, POSITIVE] = 0.5
+    inside: Annotated[bool, Flag()] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

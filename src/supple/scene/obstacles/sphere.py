@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.kinds.forms import POSITIVE, Flag, Vector
 from supple.numerics.mat3 import dot
 from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
-from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.polyhedra import round_ball
 from supple.scene.obstacles.shape import Shape, concave_contact
 
@@ -35,11 +35,11 @@ class Sphere(Obstacle):
     center : (3,) [m]; radius : [m]; inside : True where bodies live inside the sphere.
     """
 
-    center: ArrayLike = field(default=(0.0, 0.0, 0.0), metadata=parameter("vector", "[m]"))
-    radius: float = field(default=1.0, metadata=parameter("positive", "[m]"))
-    inside: bool = field(default=False, metadata=parameter("flag", "true where bodies live inside"))
+    center: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    radius: Annotated[float, POSITIVE] = 1.0
+    inside: Annotated[bool, Flag()] = False
 
-    file_kind: ClassVar[str] = "sphere"
+    kind: ClassVar[str] = "sphere"
     smooth: ClassVar[bool] = True
 
     def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

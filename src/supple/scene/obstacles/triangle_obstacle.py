@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.surface import SurfaceMesh
 from supple.numerics.geometry.triangle_tree import TriangleTree, closest_places
-from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
-from supple.scene.obstacles.parameters import parameter
+from supple.scene.obstacles.obstacle import Obstacle, Surface, lengths_and_directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +23,10 @@ class TriangleObstacle(Obstacle):
     surface : the triangles, where they are at time 0 [m].
     """
 
-    surface: SurfaceMesh | None = field(default=None, metadata=parameter("surface", "where it is at time 0 [m]"))
+    surface: Annotated[SurfaceMesh | None, Surface()] = None
 
-    file_kind: ClassVar[str] = "triangles"
+    kind: ClassVar[str] = "triangles"
+    required: ClassVar[tuple[str, ...]] = ("surface",)
 
     @property
     def surface_mesh(self) -> SurfaceMesh:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import check_name, finite_vector, positive
 from supple.materials.material import Material
 from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
 from supple.mesh.surface import SurfaceMesh
@@ -29,7 +30,6 @@ from supple.scene.body import PlacedBody
 from supple.scene.rigid.control_points import control_points
 from supple.scene.rigid.mass_properties import MassProperties, of_solid, with_inertia, with_mass
 from supple.scene.rigid.pose import deformation_of
-from supple.scene.values import check_name, finite_vector, positive
 
 # Positions that are given for the surface must be a rigid motion of it, up to round-off in what a user computed and the
 # orthogonality error of a solver.

@@ -1,4 +1,4 @@
-"""All kinds of stitches. A new kind is one file and one line here, and one in `scene_file/entries/stitches.py`."""
+"""All kinds of stitches. A new kind is one file and one line here."""
 
 from __future__ import annotations
 
@@ -7,8 +7,4 @@ from supple.scene.stitches.vertex_edge import VertexEdgeStitch
 from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
 from supple.scene.stitches.vertex_vertex import VertexVertexStitch
 
-STITCHES: dict[str, type[Stitch]] = {
-    "soft_vertex_triangle": SoftVertexTriangleStitch,
-    "vertex_vertex": VertexVertexStitch,
-    "vertex_edge": VertexEdgeStitch,
-}
+STITCHES: tuple[type[Stitch], ...] = (SoftVertexTriangleStitch, VertexVertexStitch, VertexEdgeStitch)

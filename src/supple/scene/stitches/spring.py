@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE
 from supple.scene.stitches.elements import Pairs, Springs
-from supple.scene.stitches.stitch import Stitch
+from supple.scene.stitches.stitch import PerPair, Stitch
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,15 +25,10 @@ class SpringStitch(Stitch):
     Each is one number, or one for each pair.
     """
 
-    stiffness: float | NDArray[np.float64] = field(kw_only=True)
-    rest_length: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "stiffness", self.checked_numbers(self.stiffness, "stiffness", "N/m"))
-        if self.rest_length is not None:
-            length = self.checked_numbers(self.rest_length, "rest_length", "m", zero=True)
-            object.__setattr__(self, "rest_length", length)
+    stiffness: Annotated[float | NDArray[np.float64], PerPair(POSITIVE)] = field(kw_only=True)
+    rest_length: Annotated[float | NDArray[np.float64] | None, PerPair(NON_NEGATIVE)] = field(
+        default=None, kw_only=True
+    )
 
     def springs(self, pairs: Pairs, ends: NDArray[np.int32], place: NDArray[np.float64]) -> Springs:
         """From the pairs' vertices to the places (k,) along ends (k, 2)."""

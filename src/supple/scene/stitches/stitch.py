@@ -4,22 +4,57 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import float_array
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Choice, Form, Name, Number
+from supple.kinds.kind import Kind
 from supple.numerics.geometry.triangle_tree import TriangleTree, pair_distances
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side
-from supple.scene.values import check_name, float_array, non_negative, positive
 
-PAIRINGS = ("closest", "all")
+
+@dataclass(frozen=True)
+class PairList(Form):
+    """(n, 2) different pairs of whole numbers."""
+
+    def checked(self, value: Any, what: str) -> NDArray[np.int64]:
+        try:
+            pairs = np.array(value)
+        except (TypeError, ValueError):
+            raise SceneError(f"{what} is not an array of numbers") from None
+        if pairs.ndim != 2 or pairs.shape[1] != 2 or len(pairs) == 0 or not np.issubdtype(pairs.dtype, np.integer):
+            raise SceneError(f"{what} must be a list of one or more [vertex, partner], in whole numbers")
+        if pairs.min() < 0 or pairs.max() > np.iinfo(np.int32).max:
+            raise SceneError(f"{what} holds {pairs.min()}; numbers begin at 0 and fit a mesh")
+        if len(np.unique(pairs, axis=0)) != len(pairs):
+            raise SceneError(f"{what} names a pair twice; name each once")
+        return pairs.astype(np.int64)
+
+
+@dataclass(frozen=True)
+class PerPair(Form):
+    """A number within bounds, or a list of them, one for each pair."""
+
+    bounds: Number
+
+    def checked(self, value: Any, what: str) -> NDArray[np.float64]:
+        values = float_array(value, what, "give a number, or one for each pair")
+        if values.ndim > 1 or values.size == 0:
+            raise SceneError(f"{what} has shape {values.shape}; give a number, or one for each pair")
+        for each in values.ravel():
+            if not np.isfinite(each):
+                raise SceneError(f"{what} is {each:g}; it must be finite and {self.bounds.bounds}")
+            self.bounds.check_bounds(float(each), what)
+        return values
 
 
 @dataclass(frozen=True, eq=False)
-class Stitch(ABC):
+class Stitch(Kind, ABC):
     """Joins vertices of a body to something of another body, or of a triangle obstacle. Bodies are soft or rigid.
 
     Give `pairs`, or `max_distance`; then pairs are found in the world, where the scene places bodies and obstacles at
@@ -46,30 +81,21 @@ class Stitch(ABC):
 
     partner: ClassVar[str]  # the kind of the second part of a pair, in the plural
 
-    first: str
-    second: str
-    pairs: ArrayLike | None = field(default=None, kw_only=True)
-    max_distance: float | None = field(default=None, kw_only=True)
-    pairing: str = field(default="closest", kw_only=True)
-    damping: float = field(default=0.0, kw_only=True)
-    name: str | None = field(default=None, kw_only=True)
+    title: ClassVar[str] = "stitch"
+    exactly_one: ClassVar[tuple[str, ...]] = ("pairs", "max_distance")
+
+    first: Annotated[str, Name()]
+    second: Annotated[str, Name()]
+    pairs: Annotated[ArrayLike | None, PairList()] = field(default=None, kw_only=True)
+    max_distance: Annotated[float | None, POSITIVE] = field(default=None, kw_only=True)
+    pairing: Annotated[str, Choice(("closest", "all"))] = field(default="closest", kw_only=True)
+    damping: Annotated[float, NON_NEGATIVE] = field(default=0.0, kw_only=True)
+    name: Annotated[str | None, Name()] = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        check_name(self.first, "stitch: first")
-        check_name(self.second, "stitch: second")
-        if self.name is not None:
-            check_name(self.name, "stitch")
+        super().__post_init__()
         if self.first == self.second:
             raise SceneError(f"{self.label}: it joins a body with itself; give two")
-        if (self.pairs is None) == (self.max_distance is None):
-            raise SceneError(f"{self.label}: give either pairs or max_distance")
-        if self.pairs is not None:
-            object.__setattr__(self, "pairs", self._checked_pairs())
-        else:
-            object.__setattr__(self, "max_distance", positive(self.max_distance, f"{self.label}: max_distance"))
-        if self.pairing not in PAIRINGS:
-            raise SceneError(f"{self.label}: there is no pairing {self.pairing!r}; there are 'closest' and 'all'")
-        object.__setattr__(self, "damping", non_negative(self.damping, f"{self.label}: damping"))
 
     @property
     def label(self) -> str:
@@ -135,21 +161,6 @@ class Stitch(ABC):
         vertices = first.surface_vertices[queries].astype(np.int32)
         return Pairs(vertices, candidates[rows].astype(np.int32), _without_round_off(distances, first, second))
 
-    def _checked_pairs(self) -> NDArray[np.int64]:
-        try:
-            pairs = np.array(self.pairs)
-        except (TypeError, ValueError):
-            raise SceneError(f"{self.label}: pairs is not an array of numbers") from None
-        if pairs.ndim != 2 or pairs.shape[1] != 2 or len(pairs) == 0 or not np.issubdtype(pairs.dtype, np.integer):
-            raise SceneError(
-                f"{self.label}: pairs must be a list of one or more [vertex, {self.partner[:-1]}], in whole numbers"
-            )
-        if pairs.min() < 0 or pairs.max() > np.iinfo(np.int32).max:
-            raise SceneError(f"{self.label}: pairs holds {pairs.min()}; numbers begin at 0 and fit a mesh")
-        if len(np.unique(pairs, axis=0)) != len(pairs):
-            raise SceneError(f"{self.label}: pairs names a pair twice; name each once")
-        return pairs.astype(np.int64)
-
     def per_pair(self, value: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
         """A number, or one for each pair, as (count,).
 
@@ -161,17 +172,6 @@ class Stitch(ABC):
         if values.ndim and values.shape != (count,):
             raise SceneError(f"{self.label}: {what} has {values.size} values for {count} pairs; give one, or one each")
         return np.ascontiguousarray(np.broadcast_to(values, count))
-
-    def checked_numbers(self, value: object, what: str, unit: str, *, zero: bool = False) -> NDArray[np.float64]:
-        """A number, or a list of them, finite and above zero (or zero, too)."""
-        values = float_array(value, f"{self.label}: {what}", "give a number, or one for each pair")
-        bad = ~np.isfinite(values) | (values < 0.0) | ((values == 0.0) & (not zero))
-        if values.ndim > 1 or values.size == 0:
-            raise SceneError(f"{self.label}: {what} has shape {values.shape}; give a number, or one for each pair")
-        if bad.any():
-            must = "zero or more" if zero else "above zero"
-            raise SceneError(f"{self.label}: {what} is {values[bad].flat[0]:g}; it must be finite and {must} [{unit}]")
-        return values
 
 
 def _without_round_off(distances: NDArray[np.float64], first: Side, second: Side) -> NDArray[np.float64]:

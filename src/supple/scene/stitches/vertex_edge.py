@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ class VertexEdgeStitch(SpringStitch):
     `surface.edges`).
     """
 
+    kind: ClassVar[str] = "vertex_edge"
     partner = "edges"
 
     def partners(self, second: Side) -> NDArray[np.int32]:

@@ -6,22 +6,25 @@ Source: "Soft Vertex Triangle Stitch", the documentation of libuipc's constituti
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import float_array
+from supple.kinds.forms import POSITIVE
 from supple.materials.lame import lame_from_engineering
 from supple.scene.stitches.elements import Pairs, StitchTets
 from supple.scene.stitches.side import Side
-from supple.scene.stitches.stitch import Stitch
-from supple.scene.values import float_array
+from supple.scene.stitches.stitch import PerPair, Stitch
 
 # The default rest distance, as a share of the mean edge at a pair. Two half bars, joined by stitches as stiff as they
 # are, then bend 0.3 % further than one bar (docs/reference/stitches.md).
 _DISTANCE_SHARE = 0.01
 
-_MODULI = {"mu": "Pa", "lam": "Pa", "youngs": "Pa", "poisson": "-"}
+_MODULI = ("mu", "lam", "youngs", "poisson")
+Numbers = float | NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +54,18 @@ class SoftVertexTriangleStitch(Stitch):
     SceneError : where a value is not finite or out of range. lam must be above zero: psi divides by it.
     """
 
+    kind: ClassVar[str] = "soft_vertex_triangle"
     partner = "triangles"
 
-    mu: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
-    lam: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
-    youngs: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
-    poisson: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
-    min_separate_distance: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
+    mu: Annotated[Numbers | None, PerPair(POSITIVE)] = field(default=None, kw_only=True)
+    lam: Annotated[Numbers | None, PerPair(POSITIVE)] = field(default=None, kw_only=True)
+    youngs: Annotated[Numbers | None, PerPair(POSITIVE)] = field(default=None, kw_only=True)
+    poisson: Annotated[Numbers | None, PerPair(POSITIVE)] = field(default=None, kw_only=True)
+    min_separate_distance: Annotated[Numbers | None, PerPair(POSITIVE)] = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         given = [key for key in _MODULI if getattr(self, key) is not None]
-        for key in given:
-            object.__setattr__(self, key, self.checked_numbers(getattr(self, key), key, _MODULI[key]))
         if given == ["mu", "lam"]:
             _same_count(self, "mu", "lam")
         elif given in (["youngs", "poisson"], list(_MODULI)):
@@ -78,9 +80,6 @@ class SoftVertexTriangleStitch(Stitch):
         else:
             named = " and ".join(given) or "neither"
             raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {named})")
-        if self.min_separate_distance is not None:
-            distance = self.checked_numbers(self.min_separate_distance, "min_separate_distance", "m")
-            object.__setattr__(self, "min_separate_distance", distance)
 
     def _converted(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """mu and lam of youngs and poisson."""

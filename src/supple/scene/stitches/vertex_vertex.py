@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from supple.scene.stitches.spring import SpringStitch
 class VertexVertexStitch(SpringStitch):
     """Springs between vertices. Pairs are (vertex of the first body, vertex of the second). See `SpringStitch`."""
 
+    kind: ClassVar[str] = "vertex_vertex"
     partner = "vertices"
 
     def partners(self, second: Side) -> NDArray[np.int32]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.loads.applied import DeadLoad
+from supple.model.loads.applied import DeadLoad, DragLoad
 from supple.model.loads.growth import GrownTets
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
@@ -24,7 +24,8 @@ class ExternalForces:
     def __init__(self, system: System) -> None:
         loads = system.loads
         self._springs = [load for load in loads if isinstance(load, PointSpring)]
-        self._pushes = [load for load in loads if not isinstance(load, (PointSpring, GrownTets))]
+        self._drags = [load for load in loads if isinstance(load, DragLoad)]
+        self._pushes = [load for load in loads if not isinstance(load, (PointSpring, GrownTets, DragLoad))]
         self._need_places = not all(isinstance(load, DeadLoad) for load in self._pushes)
         self._targets = system.soft_targets
         self.acting: list[tuple[str, NDArray[np.integer] | slice, NDArray[np.float64]]] = []
@@ -42,6 +43,15 @@ class ExternalForces:
             self.acting.append((load.work, slice(None), forces))
         for load, (_, _, forces) in zip(self._pushes, self.acting, strict=True):
             _push(at.points, np.zeros_like(forces) if load.is_internal else at.velocities, forces, at.h)
+        for load in self._drags:
+            self._drag(load, at)
+
+    def _drag(self, load: DragLoad, at: Substep) -> None:
+        """The forces c (w - v') with the velocity v' after them: v' = (v + h c w / m) / (1 + h c / m)."""
+        c = load.coefficients(at.begun + at.origins, at.velocities, at.time)[:, None]
+        forces = c * (load.value(at.time) - at.velocities) / (1.0 + at.h * c * at.points[:, 3:])
+        self.acting.append((load.work, slice(None), forces))
+        _push(at.points, at.velocities, forces, at.h)
 
     def pull_springs(self, at: Substep) -> None:
         """Project the springs between points: C = l - l0 with compliance 1 / k, one after the other.

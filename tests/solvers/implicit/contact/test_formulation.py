@@ -147,7 +147,7 @@ def test_a_ridge_that_bends_away_repels_an_edge_across_its_bend(offset):
     ridge = np.array([[-0.05, 0.01, 0], [0, 0, 0], [0.05, 0.01, 0]])
     points = np.concatenate([ridge, ridge + np.array([0, -0.05, 0.05]), ridge + np.array([0, -0.05, -0.05])])
     faces = [[0, 3, 1], [1, 3, 4], [1, 4, 2], [2, 4, 5], [0, 1, 6], [1, 7, 6], [1, 2, 7], [2, 8, 7]]
-    sheet = sp.TriangleObstacle(surface=sp.SurfaceMesh(points, np.array(faces)), name="ridge")
+    sheet = sp.obstacles.TriangleObstacle(surface=sp.SurfaceMesh(points, np.array(faces)), name="ridge")
     for gap in (0.5, 0.1, 0.01, 1e-3):
         body = sp.Body("above", wedge(0.06), RUBBER, position=(offset * gap * DHAT, gap * DHAT, 0))
         model, x = model_of([body], [sheet])
@@ -196,7 +196,7 @@ def test_vertices_on_vertices_repel_each_other():
 
 
 def test_a_box_in_the_corner_of_a_room_is_pushed_by_every_wall():
-    room = sp.Box(center=(0, 0, 0), size=(0.3, 0.3, 0.3), inside=True, name="room")
+    room = sp.obstacles.Box(center=(0, 0, 0), size=(0.3, 0.3, 0.3), inside=True, name="room")
     near, far = 0.15 - 0.5 * SIDE - 0.5 * DHAT, 0.0
     at = {}
     for place in ((near, far, far), (far, near, far), (near, near, far), (near, near, near)):
@@ -221,7 +221,7 @@ def bumpy(seed):
     faces = np.concatenate(
         [np.column_stack([corner, corner + 1, corner + 10]), np.column_stack([corner, corner + 10, corner + 9])]
     )
-    return sp.TriangleObstacle(surface=sp.SurfaceMesh(points, faces), name="sheet")
+    return sp.obstacles.TriangleObstacle(surface=sp.SurfaceMesh(points, faces), name="sheet")
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
@@ -309,7 +309,7 @@ def test_known_vertices_cross_an_outline_without_a_jump_or_a_force_along_the_fac
 
 def test_a_vertex_on_a_diagonal_counts_once_whatever_the_round_off():
     """The closest point may have a barycentric coordinate that is a rounding error below zero."""
-    floor = sp.Box(center=(0, -0.05, 0), size=(0.2, 0.1, 0.2))
+    floor = sp.obstacles.Box(center=(0, -0.05, 0), size=(0.2, 0.1, 0.2))
     model, x = model_of([sp.Body("cube", cube(1), RUBBER)], [floor])
     rng = np.random.default_rng(0)
     corners = np.flatnonzero(x[:8, 1] < 0.0)

@@ -22,8 +22,8 @@ def downhill(mu):
     )
     return {
         "half-space": sp.HalfSpace(normal=NORMAL, friction=mu),
-        "box": sp.Box(center=-0.5 * NORMAL, size=(6, 1, 2), rotation=TURN, friction=mu),
-        "sheet": sp.TriangleObstacle(surface=sheet, friction=mu),
+        "box": sp.obstacles.Box(center=-0.5 * NORMAL, size=(6, 1, 2), rotation=TURN, friction=mu),
+        "sheet": sp.obstacles.TriangleObstacle(surface=sheet, friction=mu),
     }
 
 

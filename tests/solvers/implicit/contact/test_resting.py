@@ -10,11 +10,11 @@ WEIGHT = 0.2**3 * 1000.0 * 9.81
 SHEET = sp.SurfaceMesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 2, 1], [0, 3, 2]])
 SUPPORTS = {
     "half-space": sp.HalfSpace(),
-    "box": sp.Box(center=(0, -0.5, 0), size=(2, 1, 2)),
-    "sheet from above": sp.TriangleObstacle(surface=SHEET),
-    "sheet from below": sp.TriangleObstacle(surface=sp.SurfaceMesh(SHEET.vertices, SHEET.triangles[:, ::-1])),
-    "room": sp.Box(center=(0, 0.5, 0), size=(1, 1, 1), inside=True),
-    "bowl": sp.Sphere(center=(0, 1, 0), radius=1, inside=True),
+    "box": sp.obstacles.Box(center=(0, -0.5, 0), size=(2, 1, 2)),
+    "sheet from above": sp.obstacles.TriangleObstacle(surface=SHEET),
+    "sheet from below": sp.obstacles.TriangleObstacle(surface=sp.SurfaceMesh(SHEET.vertices, SHEET.triangles[:, ::-1])),
+    "room": sp.obstacles.Box(center=(0, 0.5, 0), size=(1, 1, 1), inside=True),
+    "bowl": sp.obstacles.Sphere(center=(0, 1, 0), radius=1, inside=True),
 }
 
 
@@ -45,7 +45,7 @@ def test_a_resting_cube_presses_with_its_weight(kind):
 
 def test_a_ball_presses_on_the_ball_below():
     """A cup that hangs over a ball: contact outside a sphere."""
-    ball = sp.Sphere(center=(0, -0.5, 0), radius=0.5)
+    ball = sp.obstacles.Sphere(center=(0, -0.5, 0), radius=0.5)
     frame = settled(sp.Scene([block(position=(0, 0.103, 0))], obstacles=[ball]), steps=12)
     assert frame.report.details.contact_forces["cube"][1] == pytest.approx(WEIGHT, rel=0.02)
 

@@ -78,7 +78,7 @@ def test_contacts_lie_between_the_surfaces_and_sum_to_the_reported_forces():
         cube("lower", youngs=1e5, friction=0.6, position=(0, 0.1002, 0)),
         cube("upper", youngs=1e5, friction=0.6, position=(0.04, 0.3005, 0.03)),
     ]
-    table = sp.Box(center=(0, -0.5, 0), size=(2, 1, 2), friction=0.6, name="table")
+    table = sp.obstacles.Box(center=(0, -0.5, 0), size=(2, 1, 2), friction=0.6, name="table")
     wall = sp.HalfSpace(point=(-5, 0, 0), normal=(1, 0, 0), name="wall")
     last = run(sp.Scene(bodies, obstacles=[table, wall]), 0.05, 30)[-1]
     found, details = last.contacts, last.report.details
@@ -113,7 +113,7 @@ def scaled(size):
         sp.Body("one", mesh, material, position=(0, 0.18 * size, 0), rotation=(0.2, 0.1, 0.3), friction=0.3),
         sp.Body("two", mesh, material, position=(0.05 * size, 0.45 * size, 0.02 * size), friction=0.3),
     ]
-    table = sp.Box(center=(0, -0.5 * size, 0), size=(2 * size, size, 2 * size), friction=0.3)
+    table = sp.obstacles.Box(center=(0, -0.5 * size, 0), size=(2 * size, size, 2 * size), friction=0.3)
     return sp.Scene(bodies, obstacles=[table], gravity=(0, -9.81 * size, 0))
 
 
@@ -134,7 +134,7 @@ def cube(name, **body):
     material = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0)
     return sp.Body(name, sp.shapes.box((0.2,) * 3, (3,) * 3), material, friction=0.3, **body)
 bodies = [cube("one", position=(0, .105, 0)), cube("two", position=(.03, .31, .01), velocity=(0, -1, 0))]
-scene = sp.Scene(bodies, obstacles=[sp.Box(center=(0, -.5, 0), size=(2, 1, 2), friction=.3)])
+scene = sp.Scene(bodies, obstacles=[sp.obstacles.Box(center=(0, -.5, 0), size=(2, 1, 2), friction=.3)])
 frames = list(sp.simulate(scene, sp.Implicit(), 0.02, 4))
 assert frames[-1].report.details.contacts > 10
 print(hashlib.sha256(frames[-1].state.positions.tobytes()).hexdigest())

@@ -101,7 +101,7 @@ def start_angular_momentum():
 
 def swinging(damping):
     """A box that hangs on springs and tets, released in a stretched state, without gravity."""
-    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET)
+    sheet = sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET)
     stitches = [
         sp.SoftVertexTriangleStitch("a", "sheet", pairs=[[8, 0], [9, 1]], youngs=2e4, poisson=0.3, damping=damping),
         sp.VertexEdgeStitch("a", "sheet", pairs=[[20, 0]], stiffness=50.0, damping=damping),
@@ -175,7 +175,7 @@ def test_damping_is_a_potential_with_slope_two_and_is_zero_for_rotations():
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_body_hangs_on_an_obstacle(moving):
     motion = sp.Keyframes([0.0, 1.0], [[0, 0, 0], [0, 0.3, 0]]) if moving else None
-    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET, motion=motion)
+    sheet = sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET, motion=motion)
     floor = sp.HalfSpace(name="floor", point=(0, -2, 0))
     stitch = sp.SoftVertexTriangleStitch("a", "sheet", max_distance=0.021, youngs=3e5, poisson=0.3)
     scene = sp.Scene([box("a", -0.07)], [floor, sheet], stitches=[stitch], gravity=(0, -1, 0))

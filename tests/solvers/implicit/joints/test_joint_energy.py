@@ -43,9 +43,10 @@ JOINTS = {
     "limited ball": [
         sp.BallJoint("a", "b", point=POINT, axis=AXIS, max_swing=0.05, twist_limits=(-1e-3, 1e-3)),
     ],
+    "universal": [sp.UniversalJoint("a", "b", point=POINT, axis=AXIS, second_axis=(2, -1, 0), max_swing=0.05)],
     "obstacle": [sp.HingeJoint("a", "wheel", point=POINT, axis=AXIS, motor=sp.VelocityMotor(3.0))],
 }
-WHEEL = sp.Sphere(radius=0.1, center=(5, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 5]))
+WHEEL = sp.obstacles.Sphere(radius=0.1, center=(5, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 5]))
 
 
 # Control points of the two bodies.

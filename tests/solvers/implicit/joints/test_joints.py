@@ -1,13 +1,12 @@
 """Joints of rigid bodies: pendulums, a gyroscope, a chain, limits, motors, reactions."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
+from tests.recordings import set_in_scene
 from tests.scenes import G, bar, converged, gyroscope, hinge, rate_of_precession
 
 import supple as sp
@@ -271,17 +270,16 @@ def test_the_twist_of_a_ball_is_limited_and_the_check_finds_larger_ones(tmp_path
     assert twists[3.0].max() == pytest.approx(0.4, abs=1e-6)
     assert twists[-3.0].min() == pytest.approx(-0.2, abs=1e-6)
     with h5py.File(path, "r+") as file:
-        header = json.loads(file["supple/header"][()])
-        header["physics"]["joints"][0]["twist_limits"] = [-0.1, 0.4]
-        del file["supple/header"]
-        file["supple/header"] = json.dumps(header)
+        set_in_scene(file, "joints/0/conditions/functions/1/limits", (-0.1, 0.4))
     found = sp.check_recording(path)["joints"]
     assert (found.verdict, found.worst) == ("fail", pytest.approx(0.1, abs=1e-6))
 
 
 def test_a_joint_follows_an_obstacle():
     """A bar on the rim of a scripted wheel, clamped to it."""
-    wheel = sp.Sphere(radius=0.1, center=(-0.3, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0]))
+    wheel = sp.obstacles.Sphere(
+        radius=0.1, center=(-0.3, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0])
+    )
     scene = sp.Scene([bar()], obstacles=[wheel], joints=[sp.FixedJoint("bar", "wheel")])
     frame = run(scene, 0.02, 25, contact=sp.IPCContact())[-1]
     R, t = wheel.pose(0.5)

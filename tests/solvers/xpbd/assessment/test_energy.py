@@ -86,7 +86,7 @@ def test_the_work_of_loads_pins_and_obstacles_that_move_is_not_from_nowhere(mate
         pull = sp.Keyframes(times=[0, 0.3, 1], displacements=[[0, 0, 0], [0.05, 0, 0], [-0.1, 0.1, 0]])
         plate = sp.SurfaceMesh([[-0.051, y, z] for y in (-0.05, 0.05) for z in (-0.05, 0.05)], [[0, 1, 2], [3, 2, 1]])
         stitch = sp.VertexVertexStitch("box", "plate", max_distance=0.003, stiffness=100.0)
-        more = {"obstacles": [sp.TriangleObstacle(plate, name="plate", motion=pull)], "stitches": [stitch]}
+        more = {"obstacles": [sp.obstacles.TriangleObstacle(plate, name="plate", motion=pull)], "stitches": [stitch]}
     turn = sp.Keyframes(times=[0.0, 0.5, 1.0], angles=[0.0, 1.5, 0.0], axis=(0, 0, 1))
     pins = [sp.Pin("box", motion=turn if load == "pin" else None, **HELD)] if not load.endswith("obstacle") else []
     scene = sp.Scene([body], pins=pins, gravity=(0, -5, 0) if pins else (0, 0, 0), **more)

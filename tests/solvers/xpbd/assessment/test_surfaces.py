@@ -54,8 +54,8 @@ def test_a_body_through_itself_is_found_unless_self_contact_is_off():
 
 def test_depths_in_obstacles_and_crossed_triangles_are_found():
     floor = sp.HalfSpace(point=(0, -0.4, 0), name="floor")
-    sheet = sp.TriangleObstacle(PLATE, name="sheet")
-    inner = sp.Sphere(center=(0, 0, 0), radius=0.6, inside=True, name="room")
+    sheet = sp.obstacles.TriangleObstacle(PLATE, name="sheet")
+    inner = sp.obstacles.Sphere(center=(0, 0, 0), radius=0.6, inside=True, name="room")
     texts = found(sp.Scene([sp.Body("a", CUBE, JELLY)], [floor, sheet, inner]))
     assert texts[0].startswith("body 'a' passes through obstacle 'sheet' (")
     assert texts[1:] == ["body 'a' is 0.1 m deep in obstacle 'floor'", "body 'a' is 0.27 m deep in obstacle 'room'"]
@@ -68,9 +68,9 @@ def test_a_vertex_that_barely_overlaps_an_obstacle_is_not_found():
 @pytest.mark.parametrize(
     "solid",
     [
-        sp.Sphere(center=(0.1, -0.6, 0.2), radius=0.2, name="solid"),
-        sp.Capsule(start=(0.1, -0.6, -3), end=(0.1, -0.6, 3), radius=0.2, name="solid"),
-        sp.Cylinder(start=(0.1, -0.6, -3), end=(0.1, -0.6, 3), radius=0.2, name="solid"),
+        sp.obstacles.Sphere(center=(0.1, -0.6, 0.2), radius=0.2, name="solid"),
+        sp.obstacles.Capsule(start=(0.1, -0.6, -3), end=(0.1, -0.6, 3), radius=0.2, name="solid"),
+        sp.obstacles.Cylinder(start=(0.1, -0.6, -3), end=(0.1, -0.6, 3), radius=0.2, name="solid"),
     ],
     ids=lambda solid: solid.file_kind,
 )

@@ -39,7 +39,7 @@ def corner_sets(stitching, n):
 @pytest.mark.parametrize("second", ["b", "sheet"])
 def test_only_what_is_stitched_together_does_not_collide(kind, second):
     stitch = stitches_to(second, pairs=[[3, 1]])[kind]
-    obstacle = sp.TriangleObstacle(name="sheet", surface=SHEET)
+    obstacle = sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET)
     system = build_system(sp.Scene([box("a", 0.2), box("b", 0.05)], [obstacle], stitches=[stitch]))
     collisions = Collisions(system, XPBDContact())
     surfaces = collisions.surfaces.surfaces
@@ -67,7 +67,7 @@ def test_what_is_sewn_face_to_face_does_not_collide(pairs, second):
     """Where the point is stitched, or all of the triangle, and they are nearer than contact's gap at the start."""
     few = 48 if second == "b" else 2
     how = {"pairs": [[v, t % few] for v, t in pairs]} if pairs else {"max_distance": 0.0011}
-    obstacle = sp.TriangleObstacle(name="sheet", surface=SHEET)
+    obstacle = sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET)
     stitch = sp.SoftVertexTriangleStitch("a", second, youngs=1e5, poisson=0.3, **how)
     system = build_system(sp.Scene([box("a", 0.051), box("b", -0.05)], [obstacle], stitches=[stitch]))
     collisions = Collisions(system, XPBDContact())
@@ -156,7 +156,7 @@ def test_a_free_sewn_pair_keeps_its_momenta(kind):
 
 def test_a_body_hangs_on_a_scripted_obstacle():
     up = sp.Keyframes([0.0, 1.0], [[0, 0, 0], [0, 0.3, 0]])
-    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET, motion=up)
+    sheet = sp.obstacles.TriangleObstacle(name="sheet", surface=SHEET, motion=up)
     calm = sp.StableNeoHookean(youngs=5e4, poisson=0.4, density=1000, damping=0.05)
     stitch = sp.SoftVertexTriangleStitch("a", "sheet", max_distance=0.021, youngs=3e5, poisson=0.3, damping=0.05)
     scene = sp.Scene([box("a", -0.07, calm)], [sheet], stitches=[stitch], gravity=(0, -1, 0))

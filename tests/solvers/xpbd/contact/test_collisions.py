@@ -22,7 +22,7 @@ def pile():
         sp.Body(f"b{k}", mesh, SOFT, position=(0.02 * k, 0.07 + 0.13 * k, 0), rotation=(0, 0.3 * k, 0), friction=0.3)
         for k in range(3)
     ]
-    return sp.Scene(bodies, [sp.HalfSpace(friction=0.5), sp.Sphere(center=(0.05, -0.022, 0), radius=0.04)])
+    return sp.Scene(bodies, [sp.HalfSpace(friction=0.5), sp.obstacles.Sphere(center=(0.05, -0.022, 0), radius=0.04)])
 
 
 @pytest.mark.parametrize(

@@ -16,14 +16,14 @@ PLATE = sp.shapes.box_surface((2.0, 0.2, 2.0), (4, 1, 4))
 
 FLOORS = {
     "plane": lambda **options: sp.HalfSpace(name="floor", **options),
-    "block": lambda **options: sp.Box(center=(0, -0.1, 0), size=(2, 0.2, 2), name="floor", **options),
-    "ball": lambda **options: sp.Sphere(center=(0, -3, 0), radius=3, name="floor", **options),
-    "room": lambda **options: sp.Box(center=(0, 1, 0), size=(2, 2, 2), inside=True, name="floor", **options),
-    "bowl": lambda **options: sp.Sphere(center=(0, 3, 0), radius=3, inside=True, name="floor", **options),
-    "triangles": lambda **options: sp.TriangleObstacle(
+    "block": lambda **options: sp.obstacles.Box(center=(0, -0.1, 0), size=(2, 0.2, 2), name="floor", **options),
+    "ball": lambda **options: sp.obstacles.Sphere(center=(0, -3, 0), radius=3, name="floor", **options),
+    "room": lambda **options: sp.obstacles.Box(center=(0, 1, 0), size=(2, 2, 2), inside=True, name="floor", **options),
+    "bowl": lambda **options: sp.obstacles.Sphere(center=(0, 3, 0), radius=3, inside=True, name="floor", **options),
+    "triangles": lambda **options: sp.obstacles.TriangleObstacle(
         surface=PLATE.transformed(translation=(0, -0.1, 0)), name="floor", **options
     ),
-    "small ball": lambda **options: sp.Sphere(center=(0, -0.01, 0), radius=0.01, name="floor", **options),
+    "small ball": lambda **options: sp.obstacles.Sphere(center=(0, -0.01, 0), radius=0.01, name="floor", **options),
 }
 
 
@@ -81,7 +81,7 @@ def test_friction_of_a_pair_acts_on_a_slope_beside_a_body_without_a_pair(flat):
         floor = sp.HalfSpace(normal=NORMAL, friction=0.2, name="slope")
     else:
         plate = PLATE.transformed(rotation=rotation_matrix((0, 0, -SLOPE))).transformed(translation=-0.1 * NORMAL)
-        floor = sp.TriangleObstacle(surface=plate, friction=0.2, name="slope")
+        floor = sp.obstacles.TriangleObstacle(surface=plate, friction=0.2, name="slope")
     lifted = (0.05 if flat else 0.0565) * NORMAL
     bodies = [block(n, lifted + np.array([0, 0, z]), tilted=True) for n, z in (("own", -0.3), ("pair", 0.3))]
     scene = sp.Scene(bodies, [floor], contact_pairs=[sp.ContactPair("pair", "slope", friction=0.7)])

@@ -80,7 +80,7 @@ def test_a_bar_rests_across_another_and_keeps_the_thickness():
 def test_a_bar_stops_on_an_edge_of_a_triangle_obstacle():
     scene = crossing(2.0)
     low, high = scene.bodies
-    obstacle = sp.TriangleObstacle(sp.SurfaceMesh(low.place(low.mesh.vertices), low.mesh.surface.triangles))
+    obstacle = sp.obstacles.TriangleObstacle(sp.SurfaceMesh(low.place(low.mesh.vertices), low.mesh.surface.triangles))
     for frame in sp.simulate(sp.Scene([high], [obstacle], gravity=(0, 0, 0)), XPBD(substeps=20), 1 / 60, 20):
         assert frame.positions["high"][:, 1].mean() > 0.05
 

@@ -25,7 +25,7 @@ def box(name, position, divisions=(2, 1, 2), **more):
 def pile():
     """Three boxes that overlap at the start, the lowest one on a half-space and a small sphere, with friction."""
     bodies = [box(f"b{k}", (0.02 * k, 0.07 + 0.08 * k, 0), rotation=(0, 0.3 * k, 0)) for k in range(3)]
-    return sp.Scene(bodies, [sp.HalfSpace(friction=0.5), sp.Sphere(center=(0.05, 0, 0), radius=0.04)])
+    return sp.Scene(bodies, [sp.HalfSpace(friction=0.5), sp.obstacles.Sphere(center=(0.05, 0, 0), radius=0.04)])
 
 
 def folded_strip():
@@ -52,7 +52,9 @@ def self_contact():
 def stitched():
     """Two boxes stitched face to face, which fall on a moving triangle obstacle."""
     sheet = sp.SurfaceMesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 2, 1], [0, 3, 2]])
-    obstacle = sp.TriangleObstacle(name="sheet", surface=sheet, friction=0.4, motion=lambda t: (0.2 * t, 0.5 * t, 0))
+    obstacle = sp.obstacles.TriangleObstacle(
+        name="sheet", surface=sheet, friction=0.4, motion=lambda t: (0.2 * t, 0.5 * t, 0)
+    )
     stitch = sp.SoftVertexTriangleStitch("a", "b", max_distance=0.02, youngs=1e5, poisson=0.3, damping=0.01)
     bodies = [box("a", (0, 0.06, 0), velocity=(0.4, -1, 0)), box("b", (0, 0.17, 0), velocity=(0, -2, 0))]
     return sp.Scene(bodies, [obstacle], stitches=[stitch])
@@ -109,7 +111,12 @@ def difference(one, other):
     ("obstacle", "tolerance"),
     [
         (sp.HalfSpace(point=(0, -5, 0)), 0.0),
-        (sp.TriangleObstacle(name="t", surface=sp.SurfaceMesh([[9, 0, 0], [9, 0, 1], [9, 1, 0]], [[0, 1, 2]])), 1e-9),
+        (
+            sp.obstacles.TriangleObstacle(
+                name="t", surface=sp.SurfaceMesh([[9, 0, 0], [9, 0, 1], [9, 1, 0]], [[0, 1, 2]])
+            ),
+            1e-9,
+        ),
     ],
     ids=["half-space", "triangles"],
 )

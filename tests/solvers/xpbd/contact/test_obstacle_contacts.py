@@ -28,7 +28,7 @@ def sheet(size, cells=4, height=0.0):
 
 def ball_of_triangles():
     """A closed ball of triangles below the origin."""
-    return sp.TriangleObstacle(
+    return sp.obstacles.TriangleObstacle(
         sp.shapes.sphere_surface(radius=1.0, edge_length=0.15).transformed(translation=(0, -1, 0))
     )
 
@@ -41,16 +41,16 @@ def ball(height, velocity=(0, 0, 0), material=SOFT):
 
 RESTS = {
     "plane": (lambda: sp.HalfSpace(friction=0.5), 0.0),
-    "box": (lambda: sp.Box(center=(0, -0.5, 0), size=(1, 1, 1), friction=0.5), 0.0),
+    "box": (lambda: sp.obstacles.Box(center=(0, -0.5, 0), size=(1, 1, 1), friction=0.5), 0.0),
     "rotated box": (
-        lambda: sp.Box(
+        lambda: sp.obstacles.Box(
             center=(0, -0.5, 0), size=(1, 1, 1), rotation=Rotation.from_euler("yz", [0.4, np.pi]).as_rotvec()
         ),
         0.0,
     ),
-    "room": (lambda: sp.Box(center=(0, 0.5, 0), size=(0.3, 1, 0.3), inside=True, friction=0.5), 0.0),
-    "bowl": (lambda: sp.Sphere(center=(0, 0.3, 0), radius=0.3, inside=True, friction=0.5), 0.0),
-    "open triangles": (lambda: sp.TriangleObstacle(sheet(1.0), friction=0.5), "thickness"),
+    "room": (lambda: sp.obstacles.Box(center=(0, 0.5, 0), size=(0.3, 1, 0.3), inside=True, friction=0.5), 0.0),
+    "bowl": (lambda: sp.obstacles.Sphere(center=(0, 0.3, 0), radius=0.3, inside=True, friction=0.5), 0.0),
+    "open triangles": (lambda: sp.obstacles.TriangleObstacle(sheet(1.0), friction=0.5), "thickness"),
 }
 
 
@@ -72,7 +72,7 @@ def test_a_dropped_ball_comes_to_rest_on_it(kind):
 
 @pytest.mark.parametrize("kind", ["ball", "closed triangles"])
 def test_a_dropped_ball_lands_on_a_ball_and_rolls_off(kind):
-    obstacle = sp.Sphere(center=(0, -1, 0), radius=1) if kind == "ball" else ball_of_triangles()
+    obstacle = sp.obstacles.Sphere(center=(0, -1, 0), radius=1) if kind == "ball" else ball_of_triangles()
     scene = sp.Scene([ball(0.13)], [obstacle])
     gaps = []
     for frame in sp.simulate(scene, XPBD(substeps=60, accuracy=0.9), 1 / 60, 60):
@@ -111,13 +111,13 @@ def fly(obstacle, position, velocity, time, substeps=20):
     "obstacle",
     [
         sp.HalfSpace(),
-        sp.Box(center=(0, -0.002, 0), size=(1, 0.004, 1)),
-        sp.Box(center=(0, -0.05, 0), size=(0.1, 1, 1), rotation=(0, 0, np.pi / 2)),
-        sp.Sphere(center=(0, -0.2, 0), radius=0.2),
-        sp.Capsule(start=(-1, -0.2, 0), end=(1, -0.2, 0), radius=0.2),
-        sp.Cylinder(start=(0, -0.004, 0), end=(0, 0, 0), radius=0.5),
-        sp.TriangleObstacle(sheet(1.0, cells=2)),
-        sp.TriangleObstacle(sp.shapes.box_surface(size=(1, 0.004, 1), divisions=(4, 1, 4))),
+        sp.obstacles.Box(center=(0, -0.002, 0), size=(1, 0.004, 1)),
+        sp.obstacles.Box(center=(0, -0.05, 0), size=(0.1, 1, 1), rotation=(0, 0, np.pi / 2)),
+        sp.obstacles.Sphere(center=(0, -0.2, 0), radius=0.2),
+        sp.obstacles.Capsule(start=(-1, -0.2, 0), end=(1, -0.2, 0), radius=0.2),
+        sp.obstacles.Cylinder(start=(0, -0.004, 0), end=(0, 0, 0), radius=0.5),
+        sp.obstacles.TriangleObstacle(sheet(1.0, cells=2)),
+        sp.obstacles.TriangleObstacle(sp.shapes.box_surface(size=(1, 0.004, 1), divisions=(4, 1, 4))),
     ],
     ids=["plane", "thin box", "rotated box", "ball", "capsule", "thin cylinder", "sheet", "thin closed triangles"],
 )
@@ -125,7 +125,7 @@ def test_no_tunnelling_and_no_gain_of_energy(obstacle, speed, substeps):
     start = (0.013, 0.05, 0.017)
     x, _, energies = fly(obstacle, start, (0, -speed, 0), 0.25, substeps)
     above = np.abs(x[:, [0, 2]]).max(axis=1) < 0.2  # they slide off round obstacles to the side
-    is_round = isinstance(obstacle, (sp.Sphere, sp.Capsule))
+    is_round = isinstance(obstacle, (sp.obstacles.Sphere, sp.obstacles.Capsule))
     assert (x[above, 1] > (-0.2 if is_round else -0.0021)).all()
     assert obstacle.surface_mesh is not None or (obstacle.signed_distance(x)[0] > -1e-9).all()
     # Over the edges of a polyhedron, a point comes from one plane to the next within a substep.
@@ -133,21 +133,21 @@ def test_no_tunnelling_and_no_gain_of_energy(obstacle, speed, substeps):
 
 
 def test_an_open_sheet_has_two_sides():
-    x, _, _ = fly(sp.TriangleObstacle(sheet(1.0)), (0.05, -0.05, 0.07), (0, 10, 0), 0.2)
+    x, _, _ = fly(sp.obstacles.TriangleObstacle(sheet(1.0)), (0.05, -0.05, 0.07), (0, 10, 0), 0.2)
     assert x[:, 1].max() < 0
 
 
 def test_a_sheet_ends_at_its_edge():
-    x, _, _ = fly(sp.TriangleObstacle(sheet(1.0)), (0.6, 0.05, 0), (0, -1, 0), 0.5)
+    x, _, _ = fly(sp.obstacles.TriangleObstacle(sheet(1.0)), (0.6, 0.05, 0), (0, -1, 0), 0.5)
     assert x[:, 1].max() < -0.3
 
 
 @pytest.mark.parametrize("inside", [False, True])
 def test_a_particle_that_starts_inside_is_pushed_out_without_speed(inside):
     if inside:
-        obstacle, start = sp.Box(size=(1, 1, 1), inside=True), (0, 0.53, 0.1)
+        obstacle, start = sp.obstacles.Box(size=(1, 1, 1), inside=True), (0, 0.53, 0.1)
     else:
-        obstacle, start = sp.Box(size=(1, 1, 1), rotation=(0, 0.3, 0)), (0.05, 0.47, 0.1)
+        obstacle, start = sp.obstacles.Box(size=(1, 1, 1), rotation=(0, 0.3, 0)), (0.05, 0.47, 0.1)
     x, _, energies = fly(obstacle, start, (0, 0, 0), 2.0)
     assert (x[:, 1] <= 0.5).all() == inside or np.allclose(x[:, 1], 0.5)
     assert (np.abs(x[:, 1] - 0.5) < 0.0201).all()
@@ -157,8 +157,8 @@ def test_a_particle_that_starts_inside_is_pushed_out_without_speed(inside):
 def test_box_corners_and_small_balls_support_a_coarse_body():
     """No vertex of the body is near the obstacle: its points must support the body's faces."""
     for obstacle in (
-        sp.Box(center=(0.03, -0.05, 0.02), size=(0.05, 0.1, 0.05)),
-        sp.Sphere(center=(0.03, -0.05, 0.02), radius=0.05),
+        sp.obstacles.Box(center=(0.03, -0.05, 0.02), size=(0.05, 0.1, 0.05)),
+        sp.obstacles.Sphere(center=(0.03, -0.05, 0.02), radius=0.05),
     ):
         body = sp.Body(
             "b", sp.shapes.box((0.4, 0.1, 0.4), (1, 1, 1)), SOFT, position=(0, 0.055, 0), velocity=(0, -1, 0)
@@ -182,8 +182,8 @@ def test_a_moving_plane_compresses_a_body_and_leaves_a_pinned_vertex():
 
 def test_a_rotated_room_gives_the_rotated_motion():
     turn = Rotation.from_rotvec([0.3, -0.5, 0.8])
-    straight, _, _ = fly(sp.Box(size=(0.3, 0.2, 0.4), inside=True, friction=0.3), (0, 0, 0), (3, 1, 2), 0.4)
-    room = sp.Box(size=(0.3, 0.2, 0.4), inside=True, friction=0.3, rotation=turn.as_rotvec())
+    straight, _, _ = fly(sp.obstacles.Box(size=(0.3, 0.2, 0.4), inside=True, friction=0.3), (0, 0, 0), (3, 1, 2), 0.4)
+    room = sp.obstacles.Box(size=(0.3, 0.2, 0.4), inside=True, friction=0.3, rotation=turn.as_rotvec())
     body = sp.Body("dust", DUST, SOFT, rotation=turn.as_rotvec(), velocity=turn.apply([3, 1, 2]))
     scene = sp.Scene([body], [room], gravity=(0, 0, 0))
     x, v = initial_state(scene).positions.copy(), initial_state(scene).velocities.copy()
@@ -221,8 +221,8 @@ def test_a_frictionless_floor_corrects_along_its_normal_only():
 @pytest.mark.parametrize("cells", [1, 3])
 def test_the_edge_of_a_box_and_a_small_ball_do_not_enter_between_vertices(cells, tmp_path):
     """A cube on the edge of a long box, whose corners are beside it, and on a ball narrower than its face."""
-    edge = sp.Box(size=(1, 1, 4), rotation=(0, 0, np.pi / 4), friction=0.5)
-    ball = sp.Sphere(center=(6, 0.2, 0), radius=0.5, friction=0.5)
+    edge = sp.obstacles.Box(size=(1, 1, 4), rotation=(0, 0, np.pi / 4), friction=0.5)
+    ball = sp.obstacles.Sphere(center=(6, 0.2, 0), radius=0.5, friction=0.5)
     cube, rubber = sp.shapes.box((1, 1, 1), (cells,) * 3), sp.StableNeoHookean(youngs=1e5, poisson=0.3)
     bodies = [sp.Body(f"cube {x}", cube, rubber, position=(x, 1.24, 0.03)) for x in (0, 6)]
     recorder = sp.Recorder(tmp_path / "edge.vtkhdf")

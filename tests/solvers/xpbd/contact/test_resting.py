@@ -16,10 +16,10 @@ def box(name, size, divisions, position, material=STUFF, **more):
 def floors():
     sheet = sp.SurfaceMesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 2, 1], [0, 3, 2]])
     yield "plane", sp.HalfSpace(friction=0.6)
-    yield "box", sp.Box(center=(0, -0.5, 0), size=(1, 1, 1), friction=0.6)
-    yield "room", sp.Box(center=(0, 0.5, 0), size=(0.4, 1, 0.4), inside=True, friction=0.6)
-    yield "bowl", sp.Sphere(center=(0, 0.4, 0), radius=0.4, inside=True, friction=0.6)
-    yield "sheet", sp.TriangleObstacle(sheet, friction=0.6)
+    yield "box", sp.obstacles.Box(center=(0, -0.5, 0), size=(1, 1, 1), friction=0.6)
+    yield "room", sp.obstacles.Box(center=(0, 0.5, 0), size=(0.4, 1, 0.4), inside=True, friction=0.6)
+    yield "bowl", sp.obstacles.Sphere(center=(0, 0.4, 0), radius=0.4, inside=True, friction=0.6)
+    yield "sheet", sp.obstacles.TriangleObstacle(sheet, friction=0.6)
 
 
 @pytest.mark.parametrize(("name", "floor"), list(floors()), ids=[name for name, _ in floors()])
@@ -32,7 +32,7 @@ def test_resting_contact_passes_the_checks_of_contact(tmp_path, name, floor):
     scene = sp.Scene([low, high], [floor])
     solver = XPBD(substeps=20)
     *_, frame = sp.simulate(scene, solver, 1 / 60, 60, sinks=[sp.Recorder(path, solver=solver)])
-    report = sp.check_recording(path, sp.CheckSettings(only=["intersection", "containment", "distance"]))
+    report = sp.check_recording(path, only=["intersection", "containment", "distance"])
     assert {result.name: result.verdict for result in report.results if result.verdict == "fail"} == {}
     assert frame.positions["high"][:, 1].mean() > frame.positions["low"][:, 1].mean() + 0.055
 

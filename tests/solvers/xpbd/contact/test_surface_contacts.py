@@ -84,7 +84,7 @@ def test_bodies_that_start_deep_inside_each_other_separate_slowly():
 
 def test_a_heap_comes_to_rest_without_overlaps():
     bodies = [ball(f"b{k}", (0.01 * k, 0.11 + 0.22 * k, -0.007 * k), friction=0.4) for k in range(3)]
-    room = sp.Box(center=(0, 1, 0), size=(0.25, 2, 0.25), inside=True, friction=0.4)
+    room = sp.obstacles.Box(center=(0, 1, 0), size=(0.25, 2, 0.25), inside=True, friction=0.4)
     frames = list(sp.simulate(sp.Scene(bodies, [room]), XPBD(substeps=10), 1 / 60, 60))
     for frame in frames[9::10]:
         assert overlapping(frame) == 0

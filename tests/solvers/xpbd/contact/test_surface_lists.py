@@ -18,7 +18,7 @@ def _scene() -> sp.Scene:
         ),
     ]
     floor = sp.shapes.box_surface((1.0, 0.1, 1.0), (2, 1, 2)).transformed(translation=(0, -0.051, 0))
-    return sp.Scene(bodies, [sp.TriangleObstacle(surface=floor, friction=0.4)])
+    return sp.Scene(bodies, [sp.obstacles.TriangleObstacle(surface=floor, friction=0.4)])
 
 
 def _run(monkeypatch: pytest.MonkeyPatch, keep: bool) -> tuple[np.ndarray, int]:

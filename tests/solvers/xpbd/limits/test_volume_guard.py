@@ -151,7 +151,7 @@ def test_a_soft_body_that_hits_the_floor_keeps_every_tet_positive_and_gains_noth
 @MATERIALS
 def test_a_body_between_plates_and_under_a_hammer_keeps_every_tet_positive(material):
     blow = sp.Keyframes(times=[0, 0.02, 0.04, 1], displacements=[[0, 0, 0], [0, -0.07, 0], [0, 0, 0], [0, 0, 0]])
-    hammer = sp.Box(center=(0, 0.16, 0), size=(0.08, 0.1, 0.08), motion=blow)
+    hammer = sp.obstacles.Box(center=(0, 0.16, 0), size=(0.08, 0.1, 0.08), motion=blow)
     scene = sp.Scene([sp.Body("cube", CUBE, material, position=(0, 0.05, 0))], [sp.HalfSpace(), hammer])
     for frame in sp.simulate(scene, XPBD(), DT, 20):
         assert frame.report.min_det_F > 0.0

@@ -58,7 +58,6 @@ def check(
         Print only failed checks.
     """
     from supple.results.check.checker import check_recording
-    from supple.results.check.settings import CheckSettings
     from supple.runtime.replacing import refuse_to_replace
 
     given = {
@@ -71,10 +70,9 @@ def check(
         "max_momentum_change": max_momentum_change,
     }
     recording = recording_at(recording)
-    settings = CheckSettings(**{key: value for key, value in given.items() if value is not None})
     if json is not None:
         refuse_to_replace(recording, json)
-    report = check_recording(recording, settings)
+    report = check_recording(recording, **{key: value for key, value in given.items() if value is not None})
     if json is not None:
         report.save(json)
     if not quiet or not report.ok:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from supple.model.state import State
     from supple.model.system import System
     from supple.scene.body import PlacedBody
-    from supple.scene.joints.joint import Joint
     from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene.stitches.stitching import Stitching
 
@@ -198,7 +197,10 @@ def _scene(file: Path, timed: bool) -> None:
         unit = "m^3" if each.kind == "cavity" else "m"
         rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} {unit} at the start"))
     rows += _stitch_rows(system.stitching)
-    rows += [(joint.label, _joint_text(joint)) for joint in scene.joints]
+    rows += [(each.label, each.summary()) for each in (*scene.loads, *scene.sensors)]
+    for joint in scene.joints:
+        text = f"{type(joint).__name__} of {joint.first} and {joint.second or 'the world'}"
+        rows.append((joint.label, ", ".join([text, joint.summary()] if joint.summary() else [text])))
     for k, weld in enumerate(scene.welds):
         count = int((scene.welding.weld == k).sum())
         rows.append((weld.name or weld.kind, f"{count} vertices of {weld.body} are points of {weld.rigid}"))
@@ -234,27 +236,6 @@ def _frame_time(run: Run) -> str:
     seconds = min(report.wall_seconds for report in reports[1:] or reports)
     whole = seconds * run.steps
     return f"{1e3 * seconds:.3g} ms at the start; {run.steps} steps take about {whole:.3g} s if all are like these"
-
-
-def _joint_text(joint: Joint) -> str:
-    from supple.scene.joints.axis_joint import AxisJoint
-    from supple.scene.joints.ball_joint import BallJoint
-
-    text = f"{type(joint).__name__} of {joint.first} and {joint.second or 'the world'}"
-    if isinstance(joint, AxisJoint):
-        if joint.limits is not None:
-            text += f", from {joint.limits[0]:g} to {joint.limits[1]:g}"
-        if joint.motor is not None:
-            bound = "" if joint.motor.max_force is None else f" of at most {joint.motor.max_force:g}"
-            text += f", {joint.motor.label}{bound}"
-        given = {"damping": joint.damping, "friction": joint.friction, "largest effort": joint.max_effort}
-        given |= {"largest rate": joint.max_velocity}
-        text += "".join(f", {key} {value:g}" for key, value in given.items() if value)
-    elif isinstance(joint, BallJoint) and joint.max_swing is not None:
-        text += f", swings by {joint.max_swing:g} rad at most"
-        if joint.twist_limits is not None:
-            text += f", twists from {joint.twist_limits[0]:g} to {joint.twist_limits[1]:g}"
-    return text
 
 
 def _material_text(body: PlacedBody) -> str:

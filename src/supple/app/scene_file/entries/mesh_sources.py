@@ -85,6 +85,9 @@ class SurfaceModel(Model):
     rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the origin [rad]")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
 
+    def build(self, meshes: MeshStore) -> SurfaceMesh:
+        return meshes.surface(self)
+
 
 class MeshStore:
     """Reads and makes meshes; equal descriptions share one mesh.

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from supple.app.scene_file.entries.materials import ElasticMaterialModel
-from supple.app.scene_file.entries.selections import InBoxModel
-from supple.app.scene_file.model import Index, Model, Name
+from supple.app.scene_file.model import Index, Model, Name, Vector
 from supple.errors import SceneError
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Hyperelastic, Material
@@ -17,9 +16,12 @@ from supple.scene.located import at
 from supple.scene.selection import InBox
 
 
-class BoxOfMeshModel(InBoxModel):
+class BoxOfMeshModel(Model):
     """The tets whose center is inside an axis-aligned box, in the coordinates of the mesh: before `position`,
     `rotation` and `copies`."""
+
+    low: Vector = Field(description="corner with the lowest coordinates [m]")
+    high: Vector = Field(description="corner with the highest coordinates [m]")
 
 
 class RegionModel(Model):

@@ -13,7 +13,7 @@ from supple.app.viewer.uploads import Upload, mesh_of_upload
 from supple.errors import CommandError, SuppleError
 
 _HINT = f"A closed surface, at most {limits.LARGEST_UPLOAD // 2**20} MiB and {limits.MOST_UPLOADED_TRIANGLES} triangles"
-# Characters that are not allowed in names of bodies, see `supple.scene.values.check_name`.
+# Characters that are not allowed in names of bodies, see `supple.kinds.checks.check_name`.
 _FORBIDDEN = '/\\:*?"<>|'
 
 

@@ -18,7 +18,7 @@ from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.parameters import Value, find_parameter
 from supple.app.viewer.protocol.values import displayed, number, whole
 from supple.errors import CommandError, SceneError
-from supple.scene.values import check_name
+from supple.kinds.checks import check_name
 
 Point = tuple[float, float, float]
 

@@ -35,10 +35,6 @@ class Coordinate(ABC):
     def renumbered(self, new: NDArray[np.int32]) -> Self:
         """The same where vertex i has the number new[i]."""
 
-    @abstractmethod
-    def described(self) -> dict[str, NDArray]:
-        """The arrays that recordings keep, by name."""
-
     @property
     @abstractmethod
     def count(self) -> int:

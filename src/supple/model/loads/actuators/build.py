@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.kind import Kind
 from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.cable_length import CableLength
 from supple.model.loads.actuators.enclosed_volume import EnclosedVolume
 from supple.model.loads.actuators.laws import ElasticCable, GivenForce, GivenGas, GivenValue, Law
 from supple.scene.actuators.cable import Cable
 from supple.scene.actuators.cavity import Cavity
-from supple.scene.actuators.gas import GAS_CONSTANT, Gas
+from supple.scene.actuators.gas import AMOUNT, GAS_CONSTANT
 from supple.scene.body import PlacedBody
-from supple.scene.loads.over_time import Curve, OverTime, magnitude_at, value_at
+from supple.scene.loads.over_time import Curve, OverTime, script_of
 
 
 def actuators_of(
@@ -72,12 +72,12 @@ def cable_actuator(
 
 def _cable_law(cable: Cable, start: float) -> Law:
     if cable.tension is not None:
-        tension = partial(magnitude_at, cable.tension, what=f"{cable.label}: tension")
-        return GivenForce(lambda time: -tension(time), start)
+        tension = script_of(cable, "tension")
+        return GivenForce(lambda time: -float(tension(time)), start)
     assert cable.stiffness is not None
     if cable.length is not None:
-        return ElasticCable(cable.stiffness, partial(magnitude_at, cable.length, what=f"{cable.label}: length"))
-    wound = Wound(partial(_number, cable.winch_speed, f"{cable.label}: winch_speed"), cable.winch_speed)
+        return ElasticCable(cable.stiffness, _number(cable, "length"))
+    wound = Wound(_number(cable, "winch_speed"), cable.winch_speed)
     return ElasticCable(cable.stiffness, lambda time: max(start - wound(time), 0.0))
 
 
@@ -114,22 +114,22 @@ class Wound:
 
 def _law(cavity: Cavity, start: float) -> Law:
     if cavity.pressure is not None:
-        return GivenForce(partial(_number, cavity.pressure, f"{cavity.label}: pressure"), start)
+        return GivenForce(_number(cavity, "pressure"), start)
     if cavity.volume is not None:
-        return GivenValue(partial(magnitude_at, cavity.volume, what=f"{cavity.label}: volume", zero=False))
+        return GivenValue(_number(cavity, "volume"))
     gas = cavity.gas
     assert gas is not None
-    energy = partial(_gas_energy, gas, start, f"{cavity.label}: gas: amount")
+    if gas.amount is None:
+        return GivenGas(lambda time: gas.ambient * start, start, gas.gamma, gas.ambient)
+    what = f"{cavity.label}: gas: amount"
+    amount, temperature = gas.amount, gas.temperature
+
+    def energy(time: float) -> float:
+        return float(AMOUNT.at(amount, time, what)) * GAS_CONSTANT * temperature
+
     return GivenGas(energy, start, gas.gamma, gas.ambient)
 
 
-def _number(given: OverTime | None, what: str, time: float) -> float:
-    assert given is not None
-    return float(value_at(given, time, what, ()))
-
-
-def _gas_energy(gas: Gas, start: float, what: str, time: float) -> float:
-    """n R T [J] at `time` [s]."""
-    if gas.amount is None:
-        return gas.ambient * start
-    return magnitude_at(gas.amount, time, what, zero=False) * GAS_CONSTANT * gas.temperature
+def _number(thing: Kind, key: str) -> Callable[[float], float]:
+    script = script_of(thing, key)
+    return lambda time: float(script(time))

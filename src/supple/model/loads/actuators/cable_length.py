@@ -38,9 +38,6 @@ class CableLength(Coordinate):
     def renumbered(self, new: NDArray[np.int32]) -> CableLength:
         return replace(self, vertices=new[self.vertices])
 
-    def described(self) -> dict[str, NDArray]:
-        return {"vertices": self.vertices[:, None], "weights": self.weights, "offsets": self.offsets}
-
     @property
     def count(self) -> int:
         return len(self.weights) - 1

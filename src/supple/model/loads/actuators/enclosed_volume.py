@@ -34,9 +34,6 @@ class EnclosedVolume(Coordinate):
     def renumbered(self, new: NDArray[np.int32]) -> EnclosedVolume:
         return replace(self, vertices=new[self.vertices])
 
-    def described(self) -> dict[str, NDArray]:
-        return {"triangles": self.vertices[self.triangles]}
-
     @property
     def count(self) -> int:
         return 1

@@ -35,7 +35,7 @@ def clearances(scene: Scene, at: Snapshot) -> Iterator[tuple[str, Clearance]]:
     """The clearance of each body from each obstacle that is a formula: where, and how far."""
     surfaces = scene.surfaces
     for j, obstacle in enumerate(scene.recording.obstacles):
-        if obstacle.obstacle.has_exact_triangles:
+        if obstacle.obstacle.checked_by_triangles:
             continue
         for i in range(surfaces.bodies):
             if not surfaces.allowed[i, surfaces.bodies + j]:
@@ -59,7 +59,7 @@ class Obstacles(FrameCheck):
     bad = "a body is in an obstacle, at {worst}"
 
     def begin(self) -> None:
-        if all(recorded.obstacle.has_exact_triangles for recorded in self.scene.recording.obstacles):
+        if all(recorded.obstacle.checked_by_triangles for recorded in self.scene.recording.obstacles):
             self.why_not = "the scene has no half-space, round solid or room"
 
     def see(self, at: Snapshot) -> None:
@@ -106,7 +106,7 @@ class Containment(FrameCheck):
         surfaces = self.scene.surfaces
         for j, obstacle in enumerate(self.scene.recording.obstacles):
             shape = obstacle.obstacle
-            if shape.has_exact_triangles or shape.is_room or shape.plane is not None:
+            if shape.checked_by_triangles or shape.is_room or shape.plane is not None:
                 continue
             # Of a convex solid, the mean of points about it is inside.
             center = moved(shape.triangles()[0].mean(axis=0)[None], at.poses[j])[0]

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.recording.actions.joints import RecordedJoint
+from supple.results.recording.actions.joints import RecordedFunction, RecordedJoint
 
 # Largest violations, as a share of the joint's size: of `Implicit`, and of solvers that correct positions step by step.
 _IMPLICIT, _OTHERS = 1e-6, 1e-3
@@ -88,9 +88,6 @@ class _Frame:
     @classmethod
     def of(cls, scene: Scene, joint: RecordedJoint) -> _Frame:
         R, t = joint.placed[:, :, :3], joint.placed[:, :, 3]
-        e = joint.axis / np.linalg.norm(joint.axis)
-        across = np.linalg.svd(e[None])[2][1]
-        axes = np.array([e, across, np.cross(e, across)])
         bodies, sizes = scene.recording.bodies, []
         for side in joint.sides:
             if side is not None and side < len(bodies):
@@ -98,48 +95,49 @@ class _Frame:
                 sizes.append(2.0 * np.linalg.norm(control - control.mean(axis=0)) / np.sqrt(len(control)))
         size = float(min(sizes))
         points = np.einsum("sji,sj->si", R, joint.point - t)
-        return cls(scene, joint, points, (axes @ R).astype(np.float64), size, size if joint.kind == "slider" else 1.0)
+        measure = joint.conditions.coordinate
+        unit = size if measure is not None and measure.is_length else 1.0
+        return cls(scene, joint, points, (joint.axes @ R).astype(np.float64), size, unit)
 
     def error(self, at: Snapshot, near: float | None) -> tuple[float, float, float]:
         """The error, the coordinate, and the larger |F^T F - 1| of the two sides.
 
         Of an angle, the coordinate is the one nearest to `near`, or to the middle of the limits.
         """
-        kind = self.joint.kind
         (F, p), (G, q) = (self._side(at, k) for k in (0, 1))
-        gap = p - q
-        first, second = self.axes[0] @ F.T, self.axes[1] @ G.T
-        turned = np.linalg.norm(first - second, axis=1)
+        first, second, holds = self.axes[0] @ F.T, self.axes[1] @ G.T, self.joint.conditions
+        vectors = {"apart": p - q} | {
+            f"{side}.{k}": e for side, rows in (("first", first), ("second", second)) for k, e in enumerate(rows)
+        }
+        errors = [float(np.linalg.norm(p - q)) / self.size] if holds.together else [0.0]
+        errors += [float(np.linalg.norm(first[k] - second[k])) for k in holds.parallel]
         coordinate = 0.0
-        if kind == "slider":
-            coordinate, *across = (second @ gap).tolist()
-            gap = np.array(across)
-        errors = [float(np.linalg.norm(gap)) / self.size]
-        if kind == "hinge":
-            errors.append(float(turned[0]))
-            angle = float(np.arctan2(first[1] @ second[2], first[1] @ second[1]))
-            ends = [end for end in self.joint.limits if np.isfinite(end)]
-            middle = sum(ends) / len(ends) if near is None and ends else near or 0.0
-            coordinate = angle + _TURN * round((middle - angle) / _TURN)
-        elif kind == "ball":
-            coordinate = float(np.arccos(np.clip(first[0] @ second[0], -1.0, 1.0)))
-            errors.append(self._twisted_beyond(second @ first.T))
-        else:
-            errors.append(float(turned.max()))
-        low, high = self.joint.limits
-        errors.append(max(low - coordinate, coordinate - high, 0.0) / self.unit)
+        for one in holds.functions:
+            value = self._value(one, [vectors[name] for name in one.vectors], second @ first.T, near)
+            unit, (low, high) = self.size if one.is_length else 1.0, one.limits
+            errors.append(abs(value) / unit if one.vanishes else max(low - value, value - high, 0.0) / unit)
+            coordinate = value if one is holds.coordinate else coordinate
         strain = max(float(np.linalg.norm(side.T @ side - np.eye(3))) for side in (F, G))
         return max(errors), coordinate, strain
 
-    def _twisted_beyond(self, R: NDArray[np.float64]) -> float:
-        """How far the twist of the rotation R (3, 3), in the joint's axes, is beyond its limits [rad]."""
-        low, high = self.joint.twist_limits
-        if not np.isfinite([low, high]).any():
-            return 0.0
-        about, _, _, w = Rotation.from_matrix(R).as_quat()
-        twist = 2.0 * np.arctan2(about, w)
-        twist -= _TURN * np.round(twist / _TURN)
-        return float(max(low - twist, twist - high, 0.0))
+    @staticmethod
+    def _value(
+        one: RecordedFunction, vectors: list[NDArray[np.float64]], R: NDArray[np.float64], near: float | None
+    ) -> float:
+        """The value of a function; R : (3, 3) the rotation of the first side against the second, in the axes."""
+        if one.form == "twist":
+            about, _, _, w = Rotation.from_matrix(R).as_quat()
+            twist = 2.0 * np.arctan2(about, w)
+            return float(twist - _TURN * np.round(twist / _TURN))
+        a, b, *more = vectors
+        if one.form == "product":
+            return float(a @ b)
+        if one.form == "cosine":
+            return float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
+        angle = float(np.arctan2(a @ more[0], a @ b))
+        ends = [end for end in one.limits if np.isfinite(end)]
+        middle = sum(ends) / len(ends) if near is None and ends else near or 0.0
+        return angle + _TURN * round((middle - angle) / _TURN)
 
     def _side(self, at: Snapshot, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The linear part (3, 3) of the motion of a side from its own coordinates, and where the joint's point is."""

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.model.loads.actuators.cable_length import CableLength
+from supple.model.loads.actuators.enclosed_volume import EnclosedVolume
 from supple.model.system import System
-from supple.results.recording.checked_hdf5 import CheckedFile
-
-_GROUP = "supple/physics"
+from supple.results.checkpoint.typed import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +19,7 @@ class RecordedCavity:
     """A cavity; triangles : (t, 3) vertices of the surface around it, seen counter-clockwise from inside."""
 
     name: str
-    triangles: NDArray[np.int32]
+    triangles: Annotated[NDArray[np.int32], Rows("t", 3, below="n")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,44 +32,24 @@ class RecordedCable:
     """
 
     name: str
-    vertices: NDArray[np.int32]
-    weights: NDArray[np.float64]
-    offsets: NDArray[np.float64]
+    vertices: Annotated[NDArray[np.int32], Rows("v", below="n")]
+    weights: Annotated[NDArray[np.float64], Rows("p", "v", finite=True)]
+    offsets: Annotated[NDArray[np.float64], Rows("p", 3, finite=True)]
 
 
-def write_actuators(group: h5py.Group, system: System) -> list[dict[str, str]]:
-    """Write the arrays to the group of the physics; returns the entries of the header, one for each actuator."""
-    for k, each in enumerate(system.actuators):
-        for name, values in each.coordinate.described().items():
-            group[f"actuator_{k}/{name}"] = values
-    return [{"kind": each.kind, "name": each.name} for each in system.actuators]
+def cavities_of(system: System) -> tuple[RecordedCavity, ...]:
+    """The cavities of a scene."""
+    volumes = ((each.name, each.coordinate) for each in system.actuators)
+    return tuple(
+        RecordedCavity(name, one.vertices[one.triangles]) for name, one in volumes if isinstance(one, EnclosedVolume)
+    )
 
 
-def read_actuators(
-    file: CheckedFile, header: dict[str, Any], vertices: int
-) -> tuple[tuple[RecordedCavity, ...], tuple[RecordedCable, ...]]:
-    """The cavities and the cables.
-
-    Raises
-    ------
-    OutputError : where the data are contradictory.
-    """
-    cavities, cables = [], []
-    for k, entry in enumerate(header["physics"]["actuators"]):
-        try:
-            kind, name = entry["kind"], str(entry["name"])
-        except (KeyError, TypeError):
-            raise file.broken("its cavities and cables are not described as they should be") from None
-        own = f"{_GROUP}/actuator_{k}"
-        if kind == "cavity":
-            cavities.append(RecordedCavity(name, file.indices(f"{own}/triangles", 3, vertices)))
-        elif kind == "cable":
-            rows = np.ascontiguousarray(file.indices(f"{own}/vertices", 1, vertices)[:, 0])
-            weights = file.array(f"{own}/weights", "f", (None, len(rows)))
-            offsets = file.array(f"{own}/offsets", "f", (len(weights), 3))
-            if len(weights) < 2 or not (np.isfinite(weights).all() and np.isfinite(offsets).all()):
-                raise file.broken("a cable has no span, or a number of it is not finite")
-            cables.append(RecordedCable(name, rows, weights, offsets))
-        else:
-            raise file.of_another_version(f"an actuator has the unknown kind {kind!r}")
-    return tuple(cavities), tuple(cables)
+def cables_of(system: System) -> tuple[RecordedCable, ...]:
+    """The cables of a scene."""
+    lengths = ((each.name, each.coordinate) for each in system.actuators)
+    return tuple(
+        RecordedCable(name, one.vertices, one.weights, one.offsets)
+        for name, one in lengths
+        if isinstance(one, CableLength)
+    )

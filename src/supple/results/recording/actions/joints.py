@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.results.recording.checked_hdf5 import CheckedFile
-from supple.scene.joints.axis_joint import AxisJoint
-from supple.scene.joints.ball_joint import BallJoint
+from supple.results.checkpoint.typed import Rows
+from supple.scene.joints.conditions import Conditions, Function
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 
-KINDS = ("fixed", "ball", "hinge", "slider")
+RecordedFunction = Function
+
+# How many vectors a function of each form has, and the names of those of a joint.
+_VECTORS = {"angle": 3, "product": 2, "cosine": 2, "twist": 4}
+_NAMES = {"apart", *(f"{side}.{k}" for side in ("first", "second") for k in range(3))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +28,12 @@ class RecordedJoint:
 
     Attributes
     ----------
-    name : of the joint; kind : one of `KINDS`
+    name : of the joint; kind : as scene files write it
     sides : numbers of what it joins: bodies, then obstacles; None for the world
     placed : (2, 3, 4) rotations and translations of the sides where the scene places everything, where the coordinate
         of the joint is zero
-    point, axis : (3,) there, in the world [m], [-]
-    limits : of its coordinate [rad] or [m]; twist_limits : of the twist of a ball [rad]; infinite where there are none
+    point : (3,) there, in the world [m]; axes : (3, 3) unit vectors there (rows), which `conditions` numbers
+    conditions : what it holds and measures
     max_force : of its motor [N m] or [N]; max_velocity : of its coordinate [rad/s] or [m/s]; infinite where there is
         none
     """
@@ -37,28 +41,28 @@ class RecordedJoint:
     name: str
     kind: str
     sides: tuple[int, int | None]
-    placed: NDArray[np.float64]
-    point: NDArray[np.float64]
-    axis: NDArray[np.float64]
-    limits: tuple[float, float]
+    placed: Annotated[NDArray[np.float64], Rows(2, 3, 4, finite=True)]
+    point: Annotated[NDArray[np.float64], Rows(3, finite=True)]
+    axes: Annotated[NDArray[np.float64], Rows(3, 3, finite=True)]
+    conditions: Conditions
     max_force: float
     max_velocity: float
-    twist_limits: tuple[float, float]
 
-    def described(self) -> dict[str, Any]:
-        """As the header has it."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "sides": list(self.sides),
-            "placed": self.placed.tolist(),
-            "point": self.point.tolist(),
-            "axis": self.axis.tolist(),
-            "limits": [end if np.isfinite(end) else None for end in self.limits],
-            "twist_limits": [end if np.isfinite(end) else None for end in self.twist_limits],
-            "max_force": self.max_force if np.isfinite(self.max_force) else None,
-            "max_velocity": self.max_velocity if np.isfinite(self.max_velocity) else None,
-        }
+    def check(self, jointed: Sequence[bool], bodies: int) -> None:
+        """Raise `ValueError` where it joins what does not exist or is soft, or a number of it is not finite.
+
+        `jointed` tells of bodies, then obstacles, whether a joint may hold them.
+        """
+        first, second = self.sides
+        ends = [first] if second is None else [first, second]
+        there = first < bodies and all(0 <= end < len(jointed) and jointed[end] for end in ends)
+        holds, upright = self.conditions, np.allclose(self.axes @ self.axes.T, np.eye(3), atol=1e-6)
+        named = {*holds.lines, *(name for one in holds.functions for name in one.vectors)}
+        known = named <= _NAMES and "apart" not in holds.lines and {*holds.parallel} <= {0, 1, 2}
+        if not there or not known or any(len(one.vectors) != _VECTORS.get(one.form) for one in holds.functions):
+            raise ValueError(f"joint {self.name!r} is not between rigid bodies of the scene, or not one that is known")
+        if not upright:
+            raise ValueError(f"the axes of joint {self.name!r} are not perpendicular unit vectors")
 
 
 def joints_of(system: System) -> tuple[RecordedJoint, ...]:
@@ -78,61 +82,9 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
             placed.append(np.column_stack([R, t]))
         first = bodies[joint.first]
         assert isinstance(first, RigidBody)
-        axis = joint.axis if isinstance(joint, AxisJoint | BallJoint) else None
-        ends = (joint.limits if isinstance(joint, AxisJoint) else None) or (-np.inf, np.inf)
-        if isinstance(joint, BallJoint) and joint.max_swing is not None:
-            ends = 0.0, joint.max_swing
-        most = joint.motor.max_force if isinstance(joint, AxisJoint) and joint.motor is not None else None
-        fastest = joint.max_velocity if isinstance(joint, AxisJoint) else None
-        joints.append(
-            RecordedJoint(
-                str(joint.name),
-                joint.kind,
-                (number[joint.first], number.get(joint.second)),
-                np.array(placed),
-                np.asarray(joint.place(first), dtype=np.float64),
-                np.array([1.0, 0.0, 0.0] if axis is None else axis, dtype=np.float64),
-                ends,
-                np.inf if most is None else most,
-                np.inf if fastest is None else fastest,
-                (joint.twist_limits if isinstance(joint, BallJoint) else None) or (-np.inf, np.inf),
-            )
-        )
-    return tuple(joints)
-
-
-def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoint, ...]:
-    """The joints of a recording.
-
-    Raises
-    ------
-    OutputError : where one is not described as it should be, or joins what does not exist or is soft.
-    """
-    jointed = [body.get("rigid") is True for body in header["bodies"]] + [True] * len(header["obstacles"])
-    joints = []
-    try:
-        for given in header["physics"]["joints"]:
-            first, second = int(given["sides"][0]), given["sides"][1]
-            low, high = given["limits"]
-            least, most = given["twist_limits"]
-            joint = RecordedJoint(
-                name=str(given["name"]),
-                kind=str(given["kind"]),
-                sides=(first, None if second is None else int(second)),
-                placed=np.array(given["placed"], dtype=np.float64).reshape(2, 3, 4),
-                point=np.array(given["point"], dtype=np.float64).reshape(3),
-                axis=np.array(given["axis"], dtype=np.float64).reshape(3),
-                limits=(-np.inf if low is None else float(low), np.inf if high is None else float(high)),
-                max_force=np.inf if given["max_force"] is None else float(given["max_force"]),
-                max_velocity=np.inf if given["max_velocity"] is None else float(given["max_velocity"]),
-                twist_limits=(-np.inf if least is None else float(least), np.inf if most is None else float(most)),
-            )
-            joints.append(joint)
-            numbers = np.concatenate([joint.placed.ravel(), joint.point, joint.axis])
-            ends = [first] if second is None else [first, int(second)]
-            there = first < len(header["bodies"]) and min(ends) >= 0 and all(jointed[end] for end in ends)
-            if joint.kind not in KINDS or not np.isfinite(numbers).all() or not joint.axis.any() or not there:
-                raise ValueError
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
-        raise file.broken("its joints are not described as they should be") from None
+        most = [getattr(getattr(joint, "motor", None), "max_force", None), getattr(joint, "max_velocity", None)]
+        sides = number[joint.first], number.get(joint.second)
+        where = np.array(placed), np.asarray(joint.place(first), dtype=np.float64), joint.axes()
+        ends = [np.inf if end is None else float(end) for end in most]
+        joints.append(RecordedJoint(str(joint.name), joint.kind, sides, *where, joint.conditions(), *ends))
     return tuple(joints)

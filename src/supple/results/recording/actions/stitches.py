@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System, initial_state
-from supple.results.recording.checked_hdf5 import CheckedFile
+from supple.results.checkpoint.typed import Rows
 from supple.scene.stitches.measures import attachments
 
 
@@ -23,9 +23,9 @@ class StitchLaws:
     springs : (s, 2) stiffness [N/m] and rest length [m]
     """
 
-    rest_shape_inverse: NDArray[np.float64]
-    moduli: NDArray[np.float64]
-    springs: NDArray[np.float64]
+    rest_shape_inverse: Annotated[NDArray[np.float64], Rows("t", 3, 3)]
+    moduli: Annotated[NDArray[np.float64], Rows("t", 2)]
+    springs: Annotated[NDArray[np.float64], Rows("s", 2)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +41,21 @@ class RecordedStitches:
     anchor_owners : (a,) which obstacle those vertices belong to; anchors : (a, 3) at time 0, before its pose [m]
     """
 
-    nodes: NDArray[np.int32]
-    weights: NDArray[np.float64]
-    rigid_control: NDArray[np.int32]
-    rigid_weights: NDArray[np.float64]
-    anchor_owners: NDArray[np.int32]
-    anchors: NDArray[np.float64]
+    nodes: Annotated[NDArray[np.int32], Rows("k", 4)]
+    weights: Annotated[NDArray[np.float64], Rows("k", 3)]
+    rigid_control: Annotated[NDArray[np.int32], Rows("r", 4, below="n")]
+    rigid_weights: Annotated[NDArray[np.float64], Rows("r", 4)]
+    anchor_owners: Annotated[NDArray[np.int32], Rows("a", below="obstacles")]
+    anchors: Annotated[NDArray[np.float64], Rows("a", 3)]
     laws: StitchLaws
+
+    def check(self, n: int) -> None:
+        """Raise `ValueError` where a node is none of a scene with n vertices, or a stitch has no law."""
+        count = n + len(self.rigid_control) + len(self.anchors)
+        if len(self.nodes) and not 0 <= self.nodes.min() <= self.nodes.max() < count:
+            raise ValueError(f"a stitch joins node {self.nodes.max()} of {count}")
+        if len(self.laws.moduli) + len(self.laws.springs) != len(self.nodes):
+            raise ValueError("there is another number of laws of stitches than of stitches")
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -81,35 +89,6 @@ def recorded_stitches(system: System) -> RecordedStitches:
         np.column_stack([springs.stiffness, springs.rest_lengths]),
     )
     return RecordedStitches(nodes, weights, rigid.control, rigid.weights, anchors.owner, anchors.points, laws)
-
-
-def write_stitches(own: h5py.Group, system: System) -> None:
-    """Write the stitches to the group of a recording; nothing where there are none."""
-    if not len(system.stitching):
-        return
-    group, stitches = own.create_group("stitches"), recorded_stitches(system)
-    for name in ("nodes", "weights", "rigid_control", "rigid_weights", "anchor_owners", "anchors"):
-        group[name] = getattr(stitches, name)
-    for name, values in vars(stitches.laws).items():
-        group[name] = values
-
-
-def read_stitches(file: CheckedFile, n: int, obstacles: int) -> RecordedStitches:
-    """The stitches of a recording with n vertices."""
-    if "supple/stitches" not in file:
-        return no_stitches()
-    anchors = file.array("supple/stitches/anchors", "f", (None, 3))
-    owners = file.array("supple/stitches/anchor_owners", "i", (len(anchors),))
-    if len(owners) and not 0 <= owners.min() <= owners.max() < obstacles:
-        raise file.broken("a stitch is attached to an obstacle that does not exist")
-    control = file.indices("supple/stitches/rigid_control", 4, n)
-    on_rigid = file.array("supple/stitches/rigid_weights", "f", (len(control), 4))
-    nodes = file.indices("supple/stitches/nodes", 4, n + len(control) + len(anchors))
-    weights = file.array("supple/stitches/weights", "f", (len(nodes), 3))
-    moduli = file.array("supple/stitches/moduli", "f", (None, 2))
-    inverses = file.array("supple/stitches/rest_shape_inverse", "f", (len(moduli), 3, 3))
-    springs = file.array("supple/stitches/springs", "f", (len(nodes) - len(moduli), 2))
-    return RecordedStitches(nodes, weights, control, on_rigid, owners, anchors, StitchLaws(inverses, moduli, springs))
 
 
 def no_stitches() -> RecordedStitches:

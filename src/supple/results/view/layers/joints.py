@@ -27,7 +27,7 @@ class JointView(Layer):
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         joints = moment.model.joints
-        self._lines = [_lines(joint, _size(moment.model, joint)) for joint in joints]
+        self._lines = [joint_lines(joint, _size(moment.model, joint)) for joint in joints]
         self.nodes = []
         if joints:
             ends = single(joint_segments(moment, self._lines))
@@ -67,35 +67,42 @@ def _size(model: Model, joint: RecordedJoint) -> float:
     return float(np.ptp(model.rest_positions[model.bodies[joint.sides[0]].vertices], axis=0).max())
 
 
-def _lines(joint: RecordedJoint, size: float) -> Sides:
+def joint_lines(joint: RecordedJoint, size: float) -> Sides:
     """Lines (k, 2, 3) that move with the first side, and with the second, in their coordinates."""
-    p, e = joint.point, joint.axis / np.linalg.norm(joint.axis)
-    low, high = joint.limits
-    limited = bool(np.isfinite(low) and np.isfinite(high))
-    across = np.linalg.svd(e[None])[2][1:]
-    if np.dot(np.cross(e, across[0]), across[1]) < 0.0:
-        across = across[::-1]
-    first = [(p - _POINT * size * d, p + _POINT * size * d) for d in np.eye(3)]
-    second: list[Any] = []
-    if joint.kind in ("hinge", "slider"):
-        second.append((p - _AXIS * size * e, p + _AXIS * size * e))
-    turn = joint.limits if joint.kind == "hinge" else joint.twist_limits
-    if np.isfinite(turn).all():
-        ends = np.linspace(turn[0], min(turn[1], turn[0] + 2.0 * np.pi), _ARC)
-        rim = p + _LIMIT * size * np.column_stack([np.cos(ends), np.sin(ends)]) @ across
-        second += [*pairwise(rim), (p, rim[0]), (p, rim[-1])]
-        first.append((p, p + 1.2 * _LIMIT * size * across[0]))
-    if joint.kind == "slider" and limited:
-        tick = _POINT * size * across[0]
-        second += [(p + end * e - tick, p + end * e + tick) for end in (low, high)]
-    elif joint.kind == "ball" and limited:
-        turn = np.linspace(0.0, 2.0 * np.pi, _ARC)
-        circle = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
-        rim = p + _LIMIT * size * (np.cos(high) * e + np.sin(high) * circle)
-        second += [*pairwise(rim), *((p, rim[k]) for k in range(0, _ARC, 8))]
-        first.append((p, p + 1.2 * _LIMIT * size * e))
+    p, holds = joint.point, joint.conditions
+    lines: dict[str, list[Any]] = {"first": [(p - _POINT * size * d, p + _POINT * size * d) for d in np.eye(3)]}
+    lines["second"] = []
+
+    def named(vector: str) -> tuple[str, NDArray[np.float64]]:
+        side, _, axis = vector.partition(".")
+        return side, joint.axes[int(axis)]
+
+    for line in holds.lines:
+        side, e = named(line)
+        lines[side].append((p - _AXIS * size * e, p + _AXIS * size * e))
+    for one in holds.functions:
+        low, high = one.limits
+        if one.vanishes or not np.isfinite([low, high]).all():
+            continue
+        hand = named(one.vectors[0])[1] if not one.is_length else named(one.vectors[1])[1]
+        if one.is_length:
+            tick = _POINT * size * joint.axes[1]
+            lines["second"] += [(p + end * hand - tick, p + end * hand + tick) for end in (low, high)]
+            continue
+        if one.form == "cosine":
+            turn = np.linspace(0.0, 2.0 * np.pi, _ARC)
+            across = np.linalg.svd(hand[None])[2][1:]
+            circle = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
+            rim = p + _LIMIT * size * (np.cos(high) * hand + np.sin(high) * circle)
+            lines["second"] += [*pairwise(rim), *((p, rim[k]) for k in range(0, _ARC, 8))]
+        else:  # an angle or a twist from the second vector to the third
+            turn = np.linspace(low, min(high, low + 2.0 * np.pi), _ARC)
+            across = np.array([named(vector)[1] for vector in one.vectors[1:3]])
+            rim = p + _LIMIT * size * np.column_stack([np.cos(turn), np.sin(turn)]) @ across
+            lines["second"] += [*pairwise(rim), (p, rim[0]), (p, rim[-1])]
+        lines["first"].append((p, p + 1.2 * _LIMIT * size * hand))
     own = []
-    for lines, pose in zip((first, second), joint.placed, strict=True):
-        ends = np.array(lines, dtype=np.float64).reshape(-1, 3)
+    for ends_of_side, pose in zip((lines["first"], lines["second"]), joint.placed, strict=True):
+        ends = np.array(ends_of_side, dtype=np.float64).reshape(-1, 3)
         own.append(((ends - pose[:, 3]) @ pose[:, :3]).reshape(-1, 2, 3))
     return own[0], own[1]

@@ -52,6 +52,16 @@ class Plan:
     memory: History | None = None
     place: float = 1.0
 
+    def motion(self, state: State) -> tuple[NDArray[np.float64], float]:
+        """The velocities (n, 3) [m/s] where forces act, affine in the positions x there: at x_n, and their rate [1/s].
+
+        A share p of the way, they are (1 - p) v_n + p v of that at the end. Zero without inertia.
+        """
+        if self.scale is None:
+            return np.zeros_like(state.velocities), 0.0
+        at_end = self.velocity(state.positions)
+        return (1.0 - self.place) * state.velocities + self.place * at_end, 1.0 / float(np.sqrt(self.scale))
+
     @property
     def contact_weight(self) -> float:
         """Factor of contact energies in the objective. Contact acts at the end of a step in every method (Kane et al.,

@@ -14,7 +14,8 @@ from supple.solvers.implicit.energies.damping import Damping
 from supple.solvers.implicit.energies.elasticity import Elasticity
 from supple.solvers.implicit.energies.inertia import Inertia
 from supple.solvers.implicit.energies.inversion_barrier import inversion_barrier
-from supple.solvers.implicit.energies.loads.actuators import ActuatorPotential, actuators_at
+from supple.solvers.implicit.energies.loads.actuators import actuators_at
+from supple.solvers.implicit.energies.loads.drag import drags_at
 from supple.solvers.implicit.energies.loads.external_forces import ExternalForces, total_forces
 from supple.solvers.implicit.energies.loads.muscles import muscles_at
 from supple.solvers.implicit.energies.loads.pressure import pressures_at
@@ -122,7 +123,8 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     elasticity = grown.in_step(state.internal, h)
     mu = workspace.elasticity.material.mu
     actuators = actuators_at(system, state.positions, (state.time, middle), plan.scale, mu)
-    base = _objective(elasticity, state.positions, middle, plan, forces, workspace, actuators)
+    terms = [*actuators, *drags_at(system, state, *plan.motion(state), middle)]
+    base = _objective(elasticity, state.positions, middle, plan, forces, workspace, terms)
     onset = settings.barrier_onset
     barriers = (inversion_barrier(workspace.elasticity, guard.guarded, onset), guard.quadratic_barrier(onset))
     base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
@@ -188,7 +190,7 @@ def _objective(
     plan: Plan,
     forces: NDArray[np.float64],
     workspace: Workspace,
-    actuators: Sequence[ActuatorPotential],
+    more: Sequence[Potential],
 ) -> Objective:
     """All but contact and the inversion barrier, with the loads of `time` [s]; energies of loads are zero at x."""
     system = workspace.system
@@ -202,7 +204,7 @@ def _objective(
     terms += pressures_at(system, x, time)
     terms += springs_at(system, time)
     terms += muscles_at(system, time)
-    terms += actuators
+    terms += more
     if plan.scale is not None and workspace.viscosity is not None:
         terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
     if plan.scale is not None and workspace.quadratic_viscosity is not None:

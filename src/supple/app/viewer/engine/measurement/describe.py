@@ -19,7 +19,6 @@ from supple.results.readings.joint_readings import joint_readings
 from supple.results.recording.actions.joints import joints_of
 from supple.results.recording.actions.stitches import recorded_stitches
 from supple.results.recording.scene import RecordedObstacle
-from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.solvers.xpbd.details import XPBDDetails
 
@@ -33,7 +32,7 @@ def describe(live: LiveScene) -> SceneDescription:
         generation=live.generation,
         revision=live.revision,
         bodies=tuple(_body(part, system.masses, setup.added) for part in system.bodies),
-        obstacles=tuple(_obstacle(obstacle) for obstacle in system.obstacles),
+        obstacles=tuple(map(RecordedObstacle.of, system.obstacles)),
         solver=kind_of(setup.solver),
         values={**solver_values(setup.solver), "dt": setup.dt, "gravity": gravity},
         up=live.up,
@@ -73,14 +72,6 @@ def _material_values(material: Any) -> dict[str, Value]:
         if field.name in PARAMETERS and np.ndim(value) == 0:
             values[field.name] = float(value)
     return values
-
-
-def _obstacle(obstacle: Obstacle) -> RecordedObstacle:
-    mesh, name = obstacle.surface_mesh, obstacle.name or obstacle.label
-    vertices = np.zeros((0, 3)) if mesh is None else mesh.vertices
-    triangles = np.zeros((0, 3), dtype=np.int32) if mesh is None else mesh.triangles.astype(np.int32)
-    parameters = {"friction": obstacle.friction, **obstacle.values()}
-    return RecordedObstacle(name, type(obstacle).__name__, parameters, vertices, triangles)
 
 
 def measures(live: LiveScene) -> Measures:

@@ -1,4 +1,4 @@
-"""Checks of a scene's values. Each error is one line with the name, the value and the remedy."""
+"""Checks of values. Each error is one line with the name, the value and the remedy."""
 
 from __future__ import annotations
 
@@ -49,26 +49,27 @@ def unit_vector(value: object, what: str) -> NDArray[np.float64]:
     return vector if abs(length - 1.0) <= 4e-16 else finite_vector(vector / length, what)
 
 
-def _number(value: object, what: str) -> float:
+def number(value: object, what: str) -> float:
+    """`value` as a float that is finite."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise SceneError(f"{what} is {value!r}; give a number")
-    number = float(value)
-    if not np.isfinite(number):
-        raise SceneError(f"{what} is {number}; it must be finite")
-    return number
+    given = float(value)
+    if not np.isfinite(given):
+        raise SceneError(f"{what} is {given}; it must be finite")
+    return given
 
 
 def non_negative(value: object, what: str) -> float:
     """`value` as a float that is finite and zero or more."""
-    number = _number(value, what)
-    if number < 0.0:
-        raise SceneError(f"{what} is {number:g}; it must be zero or more")
-    return number
+    given = number(value, what)
+    if given < 0.0:
+        raise SceneError(f"{what} is {given:g}; it must be zero or more")
+    return given
 
 
 def positive(value: object, what: str) -> float:
     """`value` as a float that is finite and above zero."""
-    number = _number(value, what)
-    if number <= 0.0:
-        raise SceneError(f"{what} is {number:g}; it must be above zero")
-    return number
+    given = number(value, what)
+    if given <= 0.0:
+        raise SceneError(f"{what} is {given:g}; it must be above zero")
+    return given

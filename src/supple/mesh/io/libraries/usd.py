@@ -8,9 +8,6 @@ Source: OpenUSD, UsdGeomTetMesh (https://openusd.org/release/api/class_usd_geom_
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 from textwrap import shorten
@@ -18,68 +15,43 @@ from textwrap import shorten
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import TETRA, CellSoup, FormatError
+from supple.mesh.io.cells import TETRA, CellSoup, FormatError, MeshFile
+from supple.mesh.io.in_child import read_in_child
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc")
-
-# OpenUSD trusts the numbers in binary files, and asks for terabytes where they are damaged: it reads them in a child.
-_CONVERSION = """
-import sys
-try:
-    import resource
-    resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]),) * 2)
-except (ImportError, ValueError, OSError):
-    pass
-from pxr import Sdf
-Sdf.Layer.FindOrOpen(sys.argv[2]).Export(sys.argv[3])
-"""
-_LEAST_MEMORY, _MEMORY_OF_A_BYTE = 2**31, 64  # [bytes]
-_SECONDS = 120
 
 INSTALL = "files of USD need OpenUSD, which is not installed; pip install 'supple[usd]'"
 
 
-def read(data: bytes) -> CellSoup:
+def read_usd(data: bytes) -> CellSoup:
     """The tets of all TetMesh prims of a text or binary file, in the coordinates of its world, in metres.
 
     Files that it refers to are not read.
     """
     if find_spec("pxr") is None:
         raise FormatError(INSTALL)
-    from pxr import Tf, Usd
-
-    with tempfile.TemporaryDirectory(prefix="supple-usd-") as folder:
-        text = _as_text(data, Path(folder))
-        try:
-            text.read_text("utf-8")  # OpenUSD repeats what it cannot read in an error that Python cannot decode
-            return _tets_of(Usd.Stage.Open(str(text), Usd.Stage.LoadNone))
-        except UnicodeDecodeError as error:
-            raise FormatError(f"byte {error.start} is not UTF-8") from None
-        except Tf.ErrorException as error:
-            # The text is the place in USD's source, then the reason in quotes.
-            reason = str(error).rpartition(" : ")[2].strip("' \n").replace(str(text), "the file")
-            raise FormatError(f"OpenUSD cannot read it: {shorten(reason, 200)}") from None
-
-
-def _as_text(data: bytes, folder: Path) -> Path:
-    """A text file in `folder` with the contents of a text or binary file."""
-    text = folder / "mesh.usda"
-    if data.startswith(b"#usda"):
-        text.write_bytes(data)
-        return text
-    if not data.startswith(b"PXR-USDC"):
+    if not data.startswith((b"#usda", b"PXR-USDC")):
         raise FormatError("it is no USD file: it begins with neither PXR-USDC nor #usda")
-    binary = folder / "mesh.usdc"
-    binary.write_bytes(data)
-    memory = _LEAST_MEMORY + _MEMORY_OF_A_BYTE * len(data)
-    command = [sys.executable, "-c", _CONVERSION, str(memory), str(binary), str(text)]
+    return read_in_child(data, "usd", ".usda" if data.startswith(b"#usda") else ".usdc").soup
+
+
+def read_file(path: Path) -> MeshFile:
+    """The same, in this process."""
+    from pxr import Sdf, Tf, Usd
+
+    if path.suffix == ".usdc":  # as text, in which references are not followed
+        text = path.with_name("text.usda")
+        Sdf.Layer.FindOrOpen(str(path)).Export(str(text))
+        path = text
     try:
-        done = subprocess.run(command, capture_output=True, timeout=_SECONDS, check=False)
-    except subprocess.TimeoutExpired:
-        raise FormatError(f"OpenUSD did not read it within {_SECONDS} s: it is damaged") from None
-    if done.returncode != 0 or not text.exists():
-        raise FormatError("OpenUSD cannot read it: it is damaged")
-    return text
+        path.read_text("utf-8")  # OpenUSD repeats what it cannot read in an error that Python cannot decode
+        return MeshFile(_tets_of(Usd.Stage.Open(str(path), Usd.Stage.LoadNone)))
+    except UnicodeDecodeError as error:
+        raise FormatError(f"byte {error.start} is not UTF-8") from None
+    except Tf.ErrorException as error:
+        # The text is the place in USD's source, then the reason in quotes.
+        reason = str(error).rpartition(" : ")[2].strip("' \n").replace(str(path), "the file")
+        raise FormatError(f"OpenUSD cannot read it: {shorten(reason, 200)}") from None
 
 
 def _tets_of(stage) -> CellSoup:
@@ -114,7 +86,7 @@ def _rows_of(attribute, time, kind: type, columns: int) -> NDArray:
     return rows.astype(kind)
 
 
-def write(path: Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
+def write_usd(path: Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
     """Write one TetMesh with its surface, in metres; coordinates are stored in single precision, as USD has them."""
     if tets.shape[1] != 4:
         raise FormatError("USD has linear tets only; save mesh.to_order(1)")

@@ -1,0 +1,114 @@
+"""Every kind of a scene as a part of a scene file: its keys are the declared fields of its class."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import MISSING
+from functools import cache, singledispatch
+from typing import Annotated, Any, ClassVar, Literal, Self, Union
+
+import numpy as np
+from pydantic import Field, create_model, model_validator
+
+from supple.app.scene_file.entries.mesh_sources import MeshStore
+from supple.app.scene_file.model import Model
+from supple.kinds.descriptions import first_paragraph
+from supple.kinds.forms import Form
+from supple.kinds.kind import Kind, declared
+from supple.scene.located import at
+
+
+class KindModel(Model):
+    """One object of a kind.
+
+    Attributes
+    ----------
+    made : the kind; choices : keys of which at most one may be given, for each selection
+    """
+
+    made: ClassVar[type[Kind]]
+    choices: ClassVar[tuple[tuple[str, ...], ...]] = ()
+
+    def build(self, meshes: MeshStore) -> Any:
+        """The object; errors get the key that is wrong."""
+        values = {}
+        for name, one in declared(self.made).items():
+            keys = list(keys_of(one.form, name))
+            key = next((key for key in keys if getattr(self, key) is not None), keys[0])
+            with at(key):
+                values[name] = built(getattr(self, key), meshes)
+        return self.made(**values)
+
+    @model_validator(mode="after")
+    def _one_of_the_choices(self) -> Self:
+        for *others, last in self.choices:
+            if sum(getattr(self, key) is not None for key in (*others, last)) > 1:
+                raise ValueError(f"give the {last if last != 'set' else others[0]} by either {_listed(others, last)}")
+        return self
+
+
+def _listed(others: Sequence[str], last: str) -> str:
+    return f"{', '.join(f'`{key}`' for key in others)} or `{last}`"
+
+
+@singledispatch
+def spelled(form: Form) -> Any:
+    """The type of the value of a key; see `supple.app.scene_file.entries.spelling`."""
+    raise TypeError(f"scene files do not know how to write a {type(form).__name__}; register it beside the others")
+
+
+@singledispatch
+def keys_of(form: Form, name: str) -> dict[str, tuple[Any, str]]:
+    """The keys that a field of this name has, with their types, and descriptions where the field's does not fit."""
+    return {name: (spelled(form), "")}
+
+
+@cache
+def model_of(kind: type[Kind], tagged: bool) -> type[KindModel]:
+    """The part of a scene file that describes an object of a kind; tagged : whether it has a key `kind`."""
+    keys: dict[str, Any] = {"kind": (Literal[kind.kind], ...)} if tagged else {}
+    choices = []
+    for name, one in declared(kind).items():
+        own = keys_of(one.form, name)
+        text = one.description.replace("None", "null")
+        for key, (spelled, words) in own.items():
+            description = words or text
+            if one.default is MISSING and len(own) == 1:
+                keys[key] = (spelled, Field(description=description))
+                continue
+            default = None if len(own) > 1 else _default(one.default)
+            spelled = spelled | None if default is None else spelled
+            keys[key] = (spelled, Field(default=default, description=description))
+        if len(own) > 1:
+            choices.append(tuple(own))
+    model = create_model(
+        f"{kind.__name__}Model", __base__=KindModel, __doc__=first_paragraph(kind), __module__=__name__, **keys
+    )
+    model.made, model.choices = kind, tuple(choices)
+    return model
+
+
+def entry_of(kinds: Sequence[type[Kind]]) -> Any:
+    """The type of an entry that is of one of several kinds: told apart by their key `kind`, or of one alone."""
+    if len(kinds) == 1:
+        return model_of(kinds[0], False)
+    return Annotated[Union[tuple(model_of(kind, True) for kind in kinds)], Field(discriminator="kind")]  # noqa: UP007
+
+
+def _default(value: Any) -> Any:
+    """A default of a class as a scene file has it."""
+    if isinstance(value, Kind):
+        return model_of(type(value), False)()
+    return list(value) if isinstance(value, (tuple, np.ndarray)) else value
+
+
+def built(value: Any, meshes: MeshStore) -> Any:
+    """What a part of a scene file describes: a value as it is, or the object that it builds."""
+    if isinstance(value, list):
+        found = []
+        for i, item in enumerate(value):
+            with at(i):
+                found.append(built(item, meshes))
+        return found
+    build = getattr(value, "build", None)
+    return value if build is None else build(meshes)

@@ -1,0 +1,219 @@
+"""Forms of values: how the fields of a kind are checked. What a scene file writes for each form is in
+`supple.app.scene_file.spelling`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+from supple.kinds.checks import check_name, finite_vector, float_array, number, unit_vector
+
+
+class Form(ABC):
+    """How one value is checked and stored."""
+
+    @abstractmethod
+    def checked(self, value: Any, what: str) -> Any:
+        """The value as it is stored.
+
+        Raises
+        ------
+        SceneError : where it is impossible; the text begins with `what`.
+        """
+
+
+@dataclass(frozen=True)
+class Number(Form):
+    """A finite number within bounds; those of `above` and `below` are excluded."""
+
+    above: float | None = None
+    least: float | None = None
+    below: float | None = None
+    most: float | None = None
+
+    def checked(self, value: Any, what: str) -> float:
+        given = number(value, what)
+        self.check_bounds(given, what)
+        return given
+
+    def check_bounds(self, given: float, what: str) -> None:
+        """Raise `SceneError` for a number beyond the bounds."""
+        if not (
+            (self.above is None or given > self.above)
+            and (self.least is None or given >= self.least)
+            and (self.below is None or given < self.below)
+            and (self.most is None or given <= self.most)
+        ):
+            raise SceneError(f"{what} is {given:g}; it must be {self.bounds}")
+
+    @property
+    def bounds(self) -> str:
+        """In words."""
+        if self.least is not None and self.most is not None:
+            return f"from {self.least:g} to {self.most:g}"
+        words = {"above": self.above, "below": self.below, "at most": self.most}
+        parts = [f"{word} {_word(end)}" for word, end in words.items() if end is not None]
+        if self.least is not None:
+            parts.insert(0, f"{_word(self.least)} or more")
+        return " and ".join(parts) or "finite"
+
+
+def _word(end: float) -> str:
+    return "zero" if end == 0.0 else f"{end:g}"
+
+
+POSITIVE, NON_NEGATIVE, ANY_NUMBER = Number(above=0.0), Number(least=0.0), Number()
+
+
+@dataclass(frozen=True)
+class Whole(Form):
+    """A whole number of at least `least`, and at most `most`."""
+
+    least: int = 0
+    most: int | None = None
+
+    def checked(self, value: Any, what: str) -> int:
+        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < self.least:
+            beginning = "from 0" if self.least == 0 else f"of {'one' if self.least == 1 else self.least} or more"
+            raise SceneError(f"{what} is {value!r}; give a whole number {beginning}")
+        if self.most is not None and value > self.most:
+            raise SceneError(f"{what} is {value!r}; give at most {self.most}")
+        return int(value)
+
+
+@dataclass(frozen=True)
+class Counts(Form):
+    """A number of whole numbers of one or more."""
+
+    count: int
+
+    def checked(self, value: Any, what: str) -> tuple[int, ...]:
+        try:
+            numbers = tuple(value)
+        except TypeError:
+            numbers = ()
+        if len(numbers) != self.count or not all(isinstance(n, (int, np.integer)) and n >= 1 for n in numbers):
+            words = ("one", "two", "three")[self.count - 1]
+            raise SceneError(f"{what} is {value!r}; give {words} whole numbers of 1 or more")
+        return tuple(map(int, numbers))
+
+
+@dataclass(frozen=True)
+class Flag(Form):
+    """True or False."""
+
+    def checked(self, value: Any, what: str) -> bool:
+        if not isinstance(value, (bool, np.bool_)):
+            raise SceneError(f"{what} is {value!r}; give True or False")
+        return bool(value)
+
+
+@dataclass(frozen=True)
+class Choice(Form):
+    """One of several words."""
+
+    words: tuple[str, ...]
+
+    def checked(self, value: Any, what: str) -> str:
+        if value not in self.words:
+            *others, last = map(repr, self.words)
+            raise SceneError(f"{what} is {value!r}; give {', '.join(others)} or {last}")
+        return value
+
+
+@dataclass(frozen=True)
+class Name(Form):
+    """A name; see `check_name`. Kinds check their names first, because messages contain them."""
+
+    def checked(self, value: Any, what: str) -> str:
+        check_name(value, what)
+        return value
+
+
+@dataclass(frozen=True)
+class Vector(Form):
+    """Three finite numbers (3,)."""
+
+    def checked(self, value: Any, what: str) -> NDArray[np.float64]:
+        return finite_vector(value, what)
+
+
+@dataclass(frozen=True)
+class Direction(Form):
+    """A vector (3,) of any length above zero, stored as a unit vector."""
+
+    def checked(self, value: Any, what: str) -> NDArray[np.float64]:
+        return unit_vector(value, what)
+
+
+@dataclass(frozen=True)
+class Extents(Form):
+    """Three numbers (3,) above zero."""
+
+    def checked(self, value: Any, what: str) -> NDArray[np.float64]:
+        vector = finite_vector(value, what)
+        if np.any(vector <= 0.0):
+            raise SceneError(f"{what} is {vector.tolist()}; every edge must be above zero")
+        return vector
+
+
+@dataclass(frozen=True)
+class Limits(Form):
+    """Two numbers (low, high), the first below the second; an end may be infinite."""
+
+    remedy: str = "exchange them"
+
+    def checked(self, value: Any, what: str) -> tuple[float, float]:
+        ends = float_array(value, what, "give two numbers (low, high)")
+        if ends.shape != (2,) or np.isnan(ends).any():
+            raise SceneError(f"{what} is {value!r}; give two numbers (low, high)")
+        low, high = float(ends[0]), float(ends[1])
+        if not low < high:
+            raise SceneError(f"{what} are ({low:g}, {high:g}), and the first is not below the second; {self.remedy}")
+        return low, high
+
+
+@dataclass(frozen=True)
+class ListOf(Form):
+    """A list of numbers, of vectors, or of either; the kind checks shapes and values.
+
+    Attributes
+    ----------
+    things : "numbers", "vectors" or both; most : the largest length in a scene file
+    """
+
+    things: tuple[str, ...] = ("numbers",)
+    most: int | None = None
+
+    def checked(self, value: Any, what: str) -> NDArray[np.float64]:
+        return float_array(value, what)
+
+
+NUMBERS, VECTORS = ListOf(), ListOf(("vectors",))
+
+
+@dataclass(frozen=True)
+class OneOf(Form):
+    """An object of one of several classes; a scene file names them by their `kind`, or one alone without.
+
+    Attributes
+    ----------
+    classes : all of them; give : the remedy where the object is of another one
+    also : words that stand for themselves
+    """
+
+    classes: Sequence[type]
+    give: str
+    also: tuple[str, ...] = ()
+
+    def checked(self, value: Any, what: str) -> Any:
+        if value not in self.also and not isinstance(value, tuple(self.classes)):
+            raise SceneError(f"{what} is {value!r}; give {self.give}")
+        return value

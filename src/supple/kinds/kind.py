@@ -1,0 +1,120 @@
+"""A kind of thing that a user describes is one class: a frozen dataclass whose fields declare what is known of them.
+
+    @dataclass(frozen=True, eq=False)
+    class Spring(Load):
+        stiffness: Annotated[float, POSITIVE]
+
+The form beside the type checks the field and says how a scene file writes it. The text under "Parameters" in the
+docstring describes it in the schema of scene files, in `supple info` and in the tables of the documentation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from functools import cache
+from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from supple.errors import SceneError
+from supple.kinds.descriptions import descriptions
+from supple.kinds.forms import Form, Name
+
+
+@dataclass(frozen=True)
+class Declared:
+    """One field of a kind: its form, its default (`MISSING` where it must be given), and its description."""
+
+    form: Form
+    default: Any
+    description: str
+
+
+@cache
+def declared(kind: type) -> Mapping[str, Declared]:
+    """The declared fields of a class by name, in their order."""
+    hints, texts, found = get_type_hints(kind, include_extras=True), descriptions(kind), {}
+    for field in fields(kind):
+        hint = hints[field.name]
+        forms = [one for one in get_args(hint) if isinstance(one, Form)] if get_origin(hint) is Annotated else []
+        if forms:
+            default = field.default if field.default_factory is MISSING else field.default_factory()
+            default = MISSING if field.name in getattr(kind, "required", ()) else default
+            found[field.name] = Declared(forms[0], default, texts.get(field.name, ""))
+    return found
+
+
+class Kind:
+    """The base class of kinds.
+
+    Attributes
+    ----------
+    kind : the value of `kind` in scene files; title : what it is called in messages, where that is another word
+    required : fields that have a default only because those of a base class come before them
+    exactly_one : fields of which exactly one must be given
+    """
+
+    kind: ClassVar[str]
+    title: ClassVar[str] = ""
+    required: ClassVar[tuple[str, ...]] = ()
+    exactly_one: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        all_declared = declared(type(self))
+        for of_names in (True, False):
+            for key, one in all_declared.items():
+                value = getattr(self, key)
+                if isinstance(one.form, Name) != of_names or (value is None and one.default is None):
+                    continue
+                if value is None and key in self.required:
+                    raise SceneError(f"{self.label}: there is no {key}; give {key}=..., {one.description}")
+                what = (self.word if key == "name" else f"{self.word}: {key}") if of_names else f"{self.label}: {key}"
+                object.__setattr__(self, key, one.form.checked(value, what))
+        if self.exactly_one:
+            given = [key for key in self.exactly_one if getattr(self, key) is not None]
+            if len(given) != 1:
+                *others, last = self.exactly_one
+                found = " and ".join(given) or "none of them"
+                raise SceneError(f"{self.label}: {found} given; give exactly one of {', '.join(others)} and {last}")
+
+    @property
+    def word(self) -> str:
+        """What the kind is called in messages."""
+        return self.title or self.kind.replace("_", " ")
+
+    @property
+    def label(self) -> str:
+        """The name of this object in messages."""
+        name = getattr(self, "name", None)
+        return f"{self.word} {name!r}" if name else self.word
+
+    def summary(self) -> str:
+        """What was given, without names and what has its default."""
+        parts = []
+        for key, one in declared(type(self)).items():
+            value = getattr(self, key)
+            if not isinstance(one.form, Name) and not _same(value, one.default):
+                parts.append(f"{key.replace('_', ' ')} {_short(value)}")
+        return ", ".join(parts)
+
+
+def _same(value: Any, default: Any) -> bool:
+    try:
+        return value is default or bool(np.array_equal(value, default))
+    except (TypeError, ValueError):
+        return False
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, Kind):
+        inner = value.summary()
+        return f"{type(value).__name__}({inner})" if inner else type(value).__name__
+    if isinstance(value, bool | str | None):
+        return str(value)
+    if callable(value):
+        return "over time"
+    array = np.asarray(value)
+    if array.dtype.kind in "iuf" and array.size <= 4:
+        return f"{array[()]:g}" if array.ndim == 0 else f"({', '.join(f'{x:g}' for x in array.ravel())})"
+    return f"of {len(value)}" if hasattr(value, "__len__") else type(value).__name__

@@ -1,0 +1,1 @@
+"""Readers that use a library which trusts its file; they run in a child process."""
