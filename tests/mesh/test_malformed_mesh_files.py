@@ -83,14 +83,14 @@ MALFORMED_SURFACES = {
     "ply format": ("a.ply", "ply\nformat morse 1.0\nend_header\n", "none of ascii"),
     "ply word": ("a.ply", PLY.replace("float z", "quaternion z") + PLY_FACES, "a.ply:6: .*quaternion"),
     "ply huge": ("a.ply", PLY.replace("vertex 3", "vertex 4000000000") + PLY_FACES, "a.ply:3: 4000000000 rows"),
-    "ply cut": ("a.ply", PLY + PLY_FACES + "0 0 0\n1 0 0\n", "only 2 lines are left"),
+    "ply cut": ("a.ply", PLY + PLY_FACES + "0 0 0\n1 0 0\n", "announces 3 rows of 'vertex', but only 2 are left"),
     "ply no z": (
         "a.ply",
         PLY.replace("property float z\n", "") + PLY_FACES + "0 0\n" * 3 + "3 0 1 2\n",
         "no x, y and z",
     ),
     "ply no faces": ("a.ply", PLY + "end_header\n" + "0 0 0\n" * 3, "no 'face' element"),
-    "ply list": ("a.ply", PLY + PLY_FACES + "0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n", "a.ply:13: .*too short"),
+    "ply list": ("a.ply", PLY + PLY_FACES + "0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n", "row 0 of 'face' goes beyond the end"),
     "ply index": ("a.ply", PLY + PLY_FACES + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "cell 0 names point 3"),
     "ply binary cut": (
         "a.ply",

@@ -7,25 +7,34 @@ import pytest
 
 import supple as sp
 from supple.mesh.surface import SurfaceMesh
-from supple.results.drawing import evenly, obstacle_pictures, pictures, vertex_normals, view_of
+from supple.results.export.floor_shadow import FloorShadow
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
+from supple.results.view.creases import split_at_creases, vertex_normals
+from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame, view_of
+from supple.results.view.surfaces import body_surface, obstacle_surfaces
 from supple.simulate import simulate
 
 
-def test_bodies_are_drawn_by_their_skin_or_boundary(recording):
-    cube, slab = pictures(recording)
-    assert len(cube.at(recording[0])) == 6
-    assert len(slab.at(recording[0])) == 26  # all vertices of a 2 x 2 x 2 box but the one within
+@pytest.fixture
+def model(recording):
+    return model_of_recording(recording)
+
+
+def test_bodies_are_drawn_by_their_skin_or_boundary(recording, model):
+    cube, slab = (body_surface(model, body) for body in model.bodies)
+    first = moment_of_frame(model, recording[0])
+    assert len(cube.at(first)) == 6
+    assert len(slab.at(first)) == 26  # all vertices of a 2 x 2 x 2 box but the one within
     for frame in (recording[0], recording[9]):
         stretch = (1.0 + 0.3 * np.sin(4.0 * frame.time)) if frame.index else 1.0
-        volume = SurfaceMesh(slab.at(frame), slab.triangles).volume
+        volume = SurfaceMesh(slab.at(moment_of_frame(model, frame)), slab.triangles).volume
         assert volume == pytest.approx(0.3 * stretch)
     assert cube.color != slab.color
 
 
-def test_obstacles_are_closed_and_face_outward(recording):
-    drawn = {picture.name.split()[0]: picture for picture in obstacle_pictures(recording.obstacles, view_of(recording))}
+def test_obstacles_are_closed_and_face_outward(model):
+    drawn = {surface.name.split()[0]: surface for surface in obstacle_surfaces(model)}
     volumes = {name: SurfaceMesh(p.vertices, p.triangles).volume for name, p in drawn.items()}
     assert volumes["Box"] == pytest.approx(0.25)
     assert volumes["Sphere"] == pytest.approx(4.0 / 3.0 * np.pi * 0.027, rel=0.03)
@@ -36,10 +45,10 @@ def test_obstacles_are_closed_and_face_outward(recording):
     np.testing.assert_allclose(normals, np.tile([0.0, 1.0, 0.0], (4, 1)), atol=1e-12)
 
 
-def test_moving_obstacles_follow_their_pose(recording):
-    view = view_of(recording)
-    box = next(p for p in obstacle_pictures(recording.obstacles, view) if p.name.startswith("Box"))
-    np.testing.assert_allclose(box.at(recording[24]) - box.at(recording[0]), np.tile([0, 0, 0.8], (8, 1)), atol=1e-12)
+def test_moving_obstacles_follow_their_pose(recording, model):
+    box = next(surface for surface in obstacle_surfaces(model) if surface.name.startswith("Box"))
+    first, last = (box.at(moment_of_frame(model, recording[k])) for k in (0, 24))
+    np.testing.assert_allclose(last - first, np.tile([0, 0, 0.8], (8, 1)), atol=1e-12)
 
 
 @pytest.mark.parametrize("angle", [30.0, 60.0])
@@ -60,9 +69,37 @@ def test_normals_of_a_ball_point_outward(tools):
     np.testing.assert_allclose(vertex_normals(ball.vertices, ball.triangles), ball.vertices / 2.0, atol=1e-12)
 
 
-def test_frames_are_chosen_evenly(recording):
-    assert [frame.number for frame in evenly(recording, 4)] == [0, 8, 16, 24]
-    assert len(evenly(recording, 100)) == 25
+def test_frames_are_chosen_evenly():
+    assert evenly(25, 4) == [0, 8, 16, 24]
+    assert evenly(25, 100) == list(range(25))
+
+
+def test_vertices_are_split_where_edges_are_sharp(tools):
+    box = sp.shapes.box(divisions=(1, 1, 1)).surface
+    rows, triangles = split_at_creases(box.vertices, box.triangles)
+    assert len(rows) == 24  # three sides at each corner
+    np.testing.assert_array_equal(rows[triangles], box.triangles)
+    normals = np.abs(vertex_normals(box.vertices[rows], triangles))
+    np.testing.assert_allclose(np.sort(normals, axis=1), np.tile([0, 0, 1.0], (24, 1)), atol=1e-12)
+    ball = sp.shapes.sphere(0.5, 0.2).surface.compact()
+    rows, triangles = split_at_creases(ball.vertices, ball.triangles)
+    np.testing.assert_array_equal(np.sort(rows), np.arange(len(ball.vertices)))
+    # A triangle without area, and an edge of three triangles, are no faults of a picture.
+    x = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [2, 0, 0.0]])
+    rows, triangles = split_at_creases(x, np.array([[0, 1, 2], [0, 1, 3], [1, 0, 2], [0, 1, 4]], dtype=np.int32))
+    np.testing.assert_array_equal(rows[triangles], [[0, 1, 2], [0, 1, 3], [1, 0, 2], [0, 1, 4]])
+
+
+def test_a_shadow_is_below_its_body_and_fades_with_height():
+    box = sp.shapes.box(size=(0.4, 0.2, 0.4), divisions=(1, 1, 1)).surface  # two triangles on each side
+    shadow = FloorShadow(np.zeros(3), np.array([0, 1.0, 0]), np.array([0.3, 0.5, 0]), 1.0)
+    low, high = (shadow.darkness([(box.vertices + np.array([0, y, 0]), box.triangles)]) for y in (0.1, 0.9))
+    assert low.max() > 0.6 > 0.3 > high.max() > 0.02
+    rows, columns = np.nonzero(low > 0.3)
+    sides = (shadow.corners[1] - shadow.corners[0]) / 256, (shadow.corners[3] - shadow.corners[0]) / 256
+    at = shadow.corners[0] + (columns.mean() + 0.5) * sides[0] + (rows.mean() + 0.5) * sides[1]
+    np.testing.assert_allclose(at[[0, 2]], 0.0, atol=0.03)
+    assert low[0].max() == 0.0
 
 
 def test_obstacles_that_would_hide_the_bodies_are_transparent(tmp_path, tools):
@@ -79,5 +116,5 @@ def test_obstacles_that_would_hide_the_bodies_are_transparent(tmp_path, tools):
     path = tmp_path / "walls.vtkhdf"
     list(simulate(scene, tools.Prescribed(), 1 / 30, 1, sinks=[Recorder(path)]))
     with read_recording(path) as recording:
-        drawn = obstacle_pictures(recording.obstacles, view_of(recording))
+        drawn = obstacle_surfaces(model_of_recording(recording))
     assert {p.name for p in drawn if p.opacity < 1.0} == {"wall", "lid", "room"}

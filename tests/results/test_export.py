@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from supple.errors import OutputError
-from supple.results.drawing import pictures
 from supple.results.export import glb as export_glb
 from supple.results.export import video
 from supple.results.export.exporter import FORMATS, export
 from supple.results.recording.reader import read_recording
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.surfaces import body_surface, surfaces_of
 
 _TYPES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 
@@ -55,18 +56,24 @@ class Glb:
         return next(mesh for mesh in self.json["meshes"] if mesh["name"] == name)
 
 
-def test_glb_plays_every_frame(tmp_path, recorded, recording):
+@pytest.fixture
+def model(recording):
+    return model_of_recording(recording)
+
+
+def test_glb_plays_every_frame(tmp_path, recorded, recording, model):
     glb = Glb(export(recorded[0], "glb", tmp_path / "bodies.glb"))
     animation = glb.json["animations"][0]
-    for picture in pictures(recording):
-        mesh = glb.mesh(picture.name)
+    for body in model.bodies:
+        surface = body_surface(model, body).creased(model)
+        mesh = glb.mesh(surface.name)
         primitive = mesh["primitives"][0]
         base = glb.accessor(primitive["attributes"]["POSITION"])
         assert "min" in glb.json["accessors"][primitive["attributes"]["POSITION"]]
-        np.testing.assert_array_equal(glb.accessor(primitive["indices"]).reshape(-1, 3), picture.triangles)
+        np.testing.assert_array_equal(glb.accessor(primitive["indices"]).reshape(-1, 3), surface.triangles)
         targets = primitive["targets"]
         assert len(targets) == len(mesh["weights"]) == len(recording) - 1
-        node = next(i for i, n in enumerate(glb.json["nodes"]) if n["name"] == picture.name)
+        node = next(i for i, n in enumerate(glb.json["nodes"]) if n["name"] == surface.name)
         channel = next(c for c in animation["channels"] if c["target"] == {"node": node, "path": "weights"})
         sampler = animation["samplers"][channel["sampler"]]
         assert sampler["interpolation"] == "LINEAR"
@@ -78,7 +85,7 @@ def test_glb_plays_every_frame(tmp_path, recorded, recording):
         normals = glb.accessor(primitive["attributes"]["NORMAL"])
         for k, frame in enumerate(recording):
             shown = base + np.einsum("t,tvc->vc", weights[k], deltas)
-            np.testing.assert_allclose(shown, picture.at(frame), atol=1e-5)
+            np.testing.assert_allclose(shown, surface.at(moment_of_frame(model, frame)), atol=1e-5)
             lengths = np.linalg.norm(normals + np.einsum("t,tvc->vc", weights[k], turns), axis=1)
             np.testing.assert_allclose(lengths, 1.0, atol=1e-5)
 
@@ -107,14 +114,15 @@ def test_glb_of_one_frame_has_no_animation(tmp_path, tools):
     assert not glb.json.get("animations")
 
 
-def test_obj_folder_has_each_frame(tmp_path, recorded, recording):
+def test_obj_folder_has_each_frame(tmp_path, recorded, recording, model):
     meshio = pytest.importorskip("meshio")
     folder = export(recorded[0], "obj", tmp_path / "frames")
     files = sorted(folder.iterdir())
     assert [f.name for f in files] == [f"frame_{k:05}.obj" for k in range(25)]
     mesh = meshio.read(files[20])
-    drawn = pictures(recording)
-    expected = np.concatenate([picture.at(recording[20]) for picture in drawn])
+    drawn = surfaces_of(model)[:2]
+    moment = moment_of_frame(model, recording[20])
+    expected = np.concatenate([surface.at(moment) for surface in drawn])
     np.testing.assert_allclose(mesh.points[: len(expected)], expected, atol=1e-8)
     faces = mesh.cells_dict["triangle"]
     np.testing.assert_array_equal(faces[: len(drawn[0].triangles)], drawn[0].triangles)
@@ -140,7 +148,7 @@ def test_vtu_is_read_by_vtk_and_meshio(tmp_path, recorded, recording):
     np.testing.assert_array_equal(vtk_to_numpy(grid.GetPointData().GetArray("velocities")), frame.state.velocities)
 
 
-def test_usd_has_time_samples(tmp_path, recorded, recording):
+def test_usd_has_time_samples(tmp_path, recorded, recording, model):
     pytest.importorskip("pxr")
     from pxr import Usd, UsdGeom
 
@@ -151,11 +159,13 @@ def test_usd_has_time_samples(tmp_path, recorded, recording):
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0.0, 24.0)
     meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
     assert len(meshes) == 6
-    for picture, mesh in zip(pictures(recording), meshes, strict=False):
+    for surface, mesh in zip(surfaces_of(model), meshes[:2], strict=False):
         assert mesh.GetPointsAttr().GetNumTimeSamples() == 25
         for k in (0, 11, 24):
-            np.testing.assert_allclose(mesh.GetPointsAttr().Get(k), picture.at(recording[k]), atol=1e-5)
-        np.testing.assert_array_equal(np.reshape(mesh.GetFaceVertexIndicesAttr().Get(), (-1, 3)), picture.triangles)
+            np.testing.assert_allclose(
+                mesh.GetPointsAttr().Get(k), surface.at(moment_of_frame(model, recording[k])), atol=1e-5
+            )
+        np.testing.assert_array_equal(np.reshape(mesh.GetFaceVertexIndicesAttr().Get(), (-1, 3)), surface.triangles)
 
 
 @pytest.mark.parametrize(
@@ -185,7 +195,7 @@ def test_gif_shows_motion(tmp_path, tools):
         for k in (0, 4):
             pages.seek(k)
             shown.append(np.asarray(pages.convert("RGB")).astype(int))
-    assert shown[0].shape == (360, 480, 3)
+    assert shown[0].shape == (360, 640, 3)
     red = (shown[0][..., 0] - shown[0][..., 2]) > 80
     assert red.sum() > 200  # the red body is seen
     assert np.abs(shown[0] - shown[1]).max(axis=2).astype(bool).mean() > 0.01
@@ -204,11 +214,51 @@ def test_mp4_plays_every_frame_at_the_speed_of_the_simulation(tmp_path, tools):
     assert ffmpeg.count_frames_and_secs(str(path)) == (5, pytest.approx(5 / 30, abs=0.01))
     frames = ffmpeg.read_frames(str(path))
     facts = next(frames)
-    assert (facts["size"], facts["codec"], facts["fps"]) == ((960, 720), "h264", 30.0)
-    shown = [np.frombuffer(frame, np.uint8).reshape(720, 960, 3).astype(int) for frame in frames]
+    assert (facts["size"], facts["codec"], facts["fps"]) == ((1280, 720), "h264", 30.0)
+    shown = [np.frombuffer(frame, np.uint8).reshape(720, 1280, 3).astype(int) for frame in frames]
     red = (shown[0][..., 0] - shown[0][..., 2]) > 80
     assert red.sum() > 800  # the red body is seen
     assert (np.abs(shown[0] - shown[4]).max(axis=2) > 30).mean() > 0.01
+
+
+def test_a_picture_is_colored_by_a_field_has_a_legend_and_a_shadow(tmp_path, tools):
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("pyvista")
+    tools.record(tmp_path / "r.vtkhdf", 4)
+    looks = [{"color": "J", "camera": "follow", "view": "front"}, {"time": 0.0}, {"time": 0.0, "shadows": False}]
+    shown = []
+    for k, look in enumerate(looks):
+        try:
+            path = export(tmp_path / "r.vtkhdf", "png", tmp_path / f"{k}.png", size=(320, 200), **look)
+        except OutputError as error:
+            if "OpenGL" not in str(error) or os.environ.get("CI"):
+                raise
+            pytest.skip(str(error))
+        with image.open(path) as page:
+            shown.append(np.asarray(page.convert("RGB")).astype(int))
+    assert all(picture.shape == (200, 320, 3) for picture in shown)
+    legend = shown[0][40:160, 270:300]
+    assert (legend[..., 0] - legend[..., 2] > 80).any()
+    assert (legend[..., 2] - legend[..., 0] > 80).any()
+    darker = (shown[2] - shown[1]).sum(axis=2) > 30
+    assert 0.002 < darker.mean() < 0.3
+    assert ((shown[2] - shown[1]).sum(axis=2) < -30).mean() < 1e-3  # a shadow makes nothing brighter
+
+
+@pytest.mark.parametrize(
+    ("to", "film", "words"),
+    [
+        ("mp4", {"camera": "fly"}, "camera is 'fly'; give one of fit, follow, orbit"),
+        ("mp4", {"size": (1281, 720)}, r"size is \(1281, 720\); give even pixels"),
+        ("gif", {"rate": 0}, "rate is 0; give a number above zero"),
+        ("png", {"colour": "J"}, "there is no colour; there are size, rate"),
+        ("csv", {"size": (64, 64)}, "size: only gif, mp4, png are drawn"),
+    ],
+)
+def test_a_film_that_cannot_be_is_an_error(recorded, tmp_path, to, film, words):
+    with pytest.raises(OutputError, match=words):
+        export(recorded[0], to, tmp_path / f"x.{to}", **film)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_crash_of_the_drawing_process_is_an_error_of_one_line(tmp_path, recorded, monkeypatch):

@@ -18,9 +18,9 @@ from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.kinds.forms import POSITIVE
-from supple.results.drawing import obstacle_pictures, view_of
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.layers.obstacles import ObstacleView
+from supple.results.view.surfaces import obstacle_surfaces
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.polyhedra import hull, round_ball
 from supple.scene.obstacles.registry import KINDS, register
@@ -99,7 +99,7 @@ def test_a_recording_restores_it(recorded):
         assert isinstance(found.obstacle, RoundedCube)
         assert (found.obstacle.half, found.obstacle.rounding, found.obstacle.friction) == (0.5, 0.1, 0.4)
         np.testing.assert_allclose(recording[20].obstacle_poses[0, :, 3], [0, 0.1 / 3, 0], atol=1e-12)
-        (drawn,) = obstacle_pictures(recording.obstacles, view_of(recording))
+        (drawn,) = obstacle_surfaces(model_of_recording(recording))
         assert drawn.vertices[:, 0].max() == pytest.approx(0.5, abs=1e-3)
     del KINDS["RoundedCube"]
     with pytest.raises(sp.OutputError, match="'RoundedCube 1' is of an unknown kind, 'RoundedCube'; register"):
@@ -153,8 +153,7 @@ def test_pages_draw_it(recorded):
         view = ObstacleView(stage, begins)
         assert stage.name == "/obstacles/0 RoundedCube 1"
         assert np.abs(stage.vertices).max() == pytest.approx(0.5, abs=1e-3)
-        assert stage.options["flat_shading"]
-        (handle, _), *_ = view._handles.values()
+        handle, *_ = view.nodes
         view.update(ends)
         np.testing.assert_allclose(handle.position, [0, 0.1 / 3, 0], atol=1e-12)
 

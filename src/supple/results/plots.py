@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.drawing import body_color
 from supple.results.recording.reader import Recording, opened
+from supple.results.view.colors import body_color
 from supple.runtime.figures import MOST_ENTRIES, legend_below, paper_figure, spans_decades
 
 STITCH_LINE = "#c77700"

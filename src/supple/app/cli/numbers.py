@@ -38,5 +38,14 @@ def seconds(_: Any, tokens: Sequence[Token]) -> float:
         raise ValueError(f"{text!r} is neither a number nor a fraction such as 1/60") from None
 
 
+def pixels(_: Any, tokens: Sequence[Token]) -> tuple[int, int]:
+    """Width and height, as 1280x720."""
+    width, cross, height = (text := tokens[0].value).lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal()):
+        raise ValueError(f"{text!r} is not a width and a height such as 1280x720")
+    return int(width), int(height)
+
+
 Steps = Annotated[int | None, Parameter(converter=steps)]
+Pixels = Annotated[tuple[int, int] | None, Parameter(converter=pixels, n_tokens=1, accepts_keys=False)]
 Seconds = Annotated[float | None, Parameter(converter=seconds)]

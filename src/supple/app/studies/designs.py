@@ -65,7 +65,28 @@ class OneAtATime(Design):
 
 
 @dataclass(frozen=True)
-class LatinHypercube(Design):
+class _Random(Design):
+    samples: int
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if isinstance(self.samples, bool) or not isinstance(self.samples, int) or self.samples < 1:
+            raise StudyError(f"the number of samples is {self.samples!r}; give a whole number above zero")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
+            raise StudyError(f"the seed is {self.seed!r}; give a whole number of zero or more")
+        _check_count(self.samples)
+
+    def points(self, factors: Mapping[str, Factor]) -> list[dict[str, Any]]:
+        shares = self._shares(len(factors))
+        columns = [factor.quantiles(shares[:, k]) for k, factor in enumerate(factors.values())]
+        return [dict(zip(factors, values, strict=True)) for values in zip(*columns, strict=True)]
+
+    @abstractmethod
+    def _shares(self, dimensions: int) -> NDArray[np.float64]:
+        """(samples, dimensions) from 0 to 1."""
+
+
+class LatinHypercube(_Random):
     """Random points, of which exactly one lies in each of `samples` equally likely strata of every factor.
 
     McKay, Beckman, Conover, "A comparison of three methods for selecting values of input variables in the analysis of
@@ -80,20 +101,13 @@ class LatinHypercube(Design):
     StudyError : where `samples` is not a whole number above zero.
     """
 
-    samples: int
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        _check_samples(self.samples, self.seed)
-
-    def points(self, factors: Mapping[str, Factor]) -> list[dict[str, Any]]:
+    def _shares(self, dimensions: int) -> NDArray[np.float64]:
         from scipy.stats import qmc
 
-        return _mapped(qmc.LatinHypercube(len(factors), rng=self.seed).random(self.samples), factors)
+        return qmc.LatinHypercube(dimensions, rng=self.seed).random(self.samples)
 
 
-@dataclass(frozen=True)
-class Sobol(Design):
+class Sobol(_Random):
     """The scrambled sequence of Sobol', which fills the space more evenly than random points.
 
     Owen, "Scrambling Sobol' and Niederreiter-Xing points", Journal of Complexity 14 (1998).
@@ -107,11 +121,8 @@ class Sobol(Design):
     StudyError : where `samples` is not a power of two.
     """
 
-    samples: int
-    seed: int = 0
-
     def __post_init__(self) -> None:
-        _check_samples(self.samples, self.seed)
+        super().__post_init__()
         if self.samples & (self.samples - 1):
             above = 1 << self.samples.bit_length()
             raise StudyError(
@@ -119,23 +130,10 @@ class Sobol(Design):
                 "other numbers of points are not balanced"
             )
 
-    def points(self, factors: Mapping[str, Factor]) -> list[dict[str, Any]]:
+    def _shares(self, dimensions: int) -> NDArray[np.float64]:
         from scipy.stats import qmc
 
-        return _mapped(qmc.Sobol(len(factors), rng=self.seed).random(self.samples), factors)
-
-
-def _mapped(shares: NDArray[np.float64], factors: Mapping[str, Factor]) -> list[dict[str, Any]]:
-    columns = [factor.quantiles(shares[:, k]) for k, factor in enumerate(factors.values())]
-    return [dict(zip(factors, values, strict=True)) for values in zip(*columns, strict=True)]
-
-
-def _check_samples(samples: Any, seed: Any) -> None:
-    if isinstance(samples, bool) or not isinstance(samples, int) or samples < 1:
-        raise StudyError(f"the number of samples is {samples!r}; give a whole number above zero")
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise StudyError(f"the seed is {seed!r}; give a whole number of zero or more")
-    _check_count(samples)
+        return qmc.Sobol(dimensions, rng=self.seed).random(self.samples)
 
 
 def _check_count(count: int) -> None:

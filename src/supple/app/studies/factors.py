@@ -62,54 +62,35 @@ class Levels(Factor):
 
 
 @dataclass(frozen=True)
-class Uniform(Factor):
-    """A range of numbers, equally likely everywhere. A grid divides it evenly; see `uniform`."""
-
+class _Range(Factor):
     low: float
     high: float
     count: int | None = None
 
     def __post_init__(self) -> None:
-        _check_range(self)
+        ends, name = (self.low, self.high), type(self).__name__.lower()
+        if any(isinstance(end, bool) or not isinstance(end, int | float | np.number) for end in ends):
+            raise StudyError(f"{name}({self.low!r}, {self.high!r}): give two numbers")
+        if not all(math.isfinite(end) for end in ends) or not self.low < self.high:
+            raise StudyError(f"{self._text}: give two finite numbers, the lower one first")
+        n = self.count
+        if n is not None and (isinstance(n, bool) or not isinstance(n, int) or not 0 < n <= MOST_LEVELS):
+            raise StudyError(f"{self._text}: count is {n!r}; give a whole number from 1 to {MOST_LEVELS}")
+        object.__setattr__(self, "low", float(self.low))
+        object.__setattr__(self, "high", float(self.high))
+
+    @property
+    def _text(self) -> str:
+        return f"{type(self).__name__.lower()}({self.low:g}, {self.high:g})"
 
     def levels(self, name: str) -> list[float]:
-        return self.quantiles(_shares(self, name))
-
-    def quantiles(self, u: NDArray[np.float64]) -> list[float]:
-        # Not low + u (high - low), which can miss `high` by round-off at u = 1.
-        return [float((1.0 - share) * self.low + share * self.high) for share in u]
-
-    def extremes(self) -> tuple[float, float, float]:
-        return self.low, 0.5 * (self.low + self.high), self.high
+        if self.count is None:
+            call = f"{self._text[:-1]}, count)"
+            raise StudyError(f"factor {name!r}: a grid needs the number of levels; give {call}")
+        return self.quantiles(np.linspace(0.0, 1.0, self.count))
 
 
-@dataclass(frozen=True)
-class LogUniform(Factor):
-    """A range of numbers whose logarithm is equally likely everywhere; see `loguniform`."""
-
-    low: float
-    high: float
-    count: int | None = None
-
-    def __post_init__(self) -> None:
-        _check_range(self)
-        if self.low <= 0.0:
-            raise StudyError(f"loguniform({self.low:g}, {self.high:g}): the low end must be above zero")
-
-    def levels(self, name: str) -> list[float]:
-        values = self.quantiles(_shares(self, name))
-        values[0], values[-1] = self.low, self.high if len(values) > 1 else self.low  # exact ends
-        return values
-
-    def quantiles(self, u: NDArray[np.float64]) -> list[float]:
-        ratio = math.log(self.high / self.low)
-        return [float(min(self.low * math.exp(share * ratio), self.high)) for share in u]
-
-    def extremes(self) -> tuple[float, float, float]:
-        return self.low, math.sqrt(self.low) * math.sqrt(self.high), self.high
-
-
-def uniform(low: float, high: float, count: int | None = None) -> Uniform:
+class Uniform(_Range):
     """Numbers from `low` to `high`, equally likely everywhere.
 
     Parameters
@@ -121,10 +102,16 @@ def uniform(low: float, high: float, count: int | None = None) -> Uniform:
     ------
     StudyError : where the range is empty or not finite, or `count` is not a whole number above zero.
     """
-    return Uniform(low, high, count)
+
+    def quantiles(self, u: NDArray[np.float64]) -> list[float]:
+        # Not low + u (high - low), which can miss `high` by round-off at u = 1.
+        return [float((1.0 - share) * self.low + share * self.high) for share in u]
+
+    def extremes(self) -> tuple[float, float, float]:
+        return self.low, 0.5 * (self.low + self.high), self.high
 
 
-def loguniform(low: float, high: float, count: int | None = None) -> LogUniform:
+class LogUniform(_Range):
     """Numbers from `low` to `high`, whose logarithms are equally likely everywhere.
 
     Parameters
@@ -134,9 +121,23 @@ def loguniform(low: float, high: float, count: int | None = None) -> LogUniform:
 
     Raises
     ------
-    StudyError : as for `uniform`, and where `low` is not above zero.
+    StudyError : as for `Uniform`, and where `low` is not above zero.
     """
-    return LogUniform(low, high, count)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.low <= 0.0:
+            raise StudyError(f"{self._text}: the low end must be above zero")
+
+    def quantiles(self, u: NDArray[np.float64]) -> list[float]:
+        ratio = math.log(self.high / self.low)
+        return [self.high if share == 1.0 else min(self.low * math.exp(share * ratio), self.high) for share in u]
+
+    def extremes(self) -> tuple[float, float, float]:
+        return self.low, math.sqrt(self.low) * math.sqrt(self.high), self.high
+
+
+uniform, loguniform = Uniform, LogUniform
 
 
 def as_factor(name: str, given: Any) -> Factor:
@@ -177,27 +178,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, dict) and all(isinstance(key, str) for key in value):
         return {key: plain(item) for key, item in value.items()}
     raise StudyError(f"the value {value!r} is a {type(value).__name__}; give numbers, texts, or lists of these")
-
-
-def _check_range(factor: Uniform | LogUniform) -> None:
-    name = type(factor).__name__.lower()
-    ends = (factor.low, factor.high)
-    if any(isinstance(end, bool) or not isinstance(end, int | float | np.number) for end in ends):
-        raise StudyError(f"{name}({factor.low!r}, {factor.high!r}): give two numbers")
-    text = f"{name}({factor.low:g}, {factor.high:g})"
-    if not all(math.isfinite(end) for end in ends) or not factor.low < factor.high:
-        raise StudyError(f"{text}: give two finite numbers, the lower one first")
-    count = factor.count
-    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or not 0 < count <= MOST_LEVELS):
-        raise StudyError(f"{text}: count is {count!r}; give a whole number from 1 to {MOST_LEVELS}")
-    object.__setattr__(factor, "low", float(factor.low))
-    object.__setattr__(factor, "high", float(factor.high))
-
-
-def _shares(factor: Uniform | LogUniform, name: str) -> NDArray[np.float64]:
-    if factor.count is None:
-        kind = type(factor).__name__.lower()
-        raise StudyError(
-            f"factor {name!r}: a grid needs the number of levels; give {kind}({factor.low:g}, {factor.high:g}, count)"
-        )
-    return np.linspace(0.0, 1.0, factor.count)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.io.cells import POLYGON, CellSoup, FormatError
-from supple.mesh.io.text import integer, numbers, shortened, without_mark
+from supple.mesh.io.text import integer, shortened, without_mark
 
 SCALARS = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -38,7 +38,12 @@ def read(data: bytes) -> CellSoup:
     """Polygons of a PLY file; other elements and columns are ignored."""
     data = without_mark(data)
     order, elements, start, line = _header(data)
-    body = _Text(data, start, line) if order == "" else _Binary(data, start, order)
+    if order == "":  # text: its numbers are read as those of a binary file in double precision
+        data, start, order = _numbers_of_text(data[start:], line), 0, "="
+        elements = [
+            e._replace(properties=[Property(p.name, "f8", p.length and "f8") for p in e.properties]) for e in elements
+        ]
+    body = _Body(data, start, order)
     points: NDArray[np.float64] | None = None
     faces: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
     for element in elements:
@@ -52,6 +57,19 @@ def read(data: bytes) -> CellSoup:
     if points is None or faces is None:
         raise FormatError("it has no 'vertex' element with x, y, z, or no 'face' element: it has no surface")
     return CellSoup.of_blocks(points, [(POLYGON, *faces)])
+
+
+def _numbers_of_text(body: bytes, line: int) -> bytes:
+    try:
+        return np.array(body.split(), dtype=np.float64).tobytes()
+    except ValueError:
+        for number, text in enumerate(body.split(b"\n"), start=line + 1):
+            try:
+                np.array(text.split(), dtype=np.float64)
+            except ValueError:
+                shown = shortened(text.decode("utf-8", errors="replace").split())
+                raise FormatError(f"'{shown}' holds something that is not a number", number) from None
+        raise
 
 
 def _header(data: bytes) -> tuple[str, list[Element], int, int]:
@@ -111,13 +129,13 @@ def _which_list(element: Element) -> int:
     return found[0] if found else -1
 
 
-def _truncated(element: Element, left: str) -> FormatError:
-    return FormatError(
-        f"its header announces {element.count} rows of '{element.name}', but only {left} are left: it is truncated"
-    )
+def _whole(values: NDArray) -> NDArray[np.int64]:
+    if values.dtype.kind == "f" and not ((np.abs(values) < 2.0**53) & (values == np.floor(values))).all():
+        raise FormatError("a length of a list, or an index of a face, is not a whole number")
+    return values.astype(np.int64)
 
 
-class _Binary:
+class _Body:
     def __init__(self, data: bytes, start: int, order: str) -> None:
         self.data, self.at, self.order = data, start, order
 
@@ -125,7 +143,10 @@ class _Binary:
         left = len(self.data) - self.at
         smallest_row = sum(np.dtype(p.length or p.kind).itemsize for p in element.properties)
         if element.count * smallest_row > left:
-            raise _truncated(element, f"{left} bytes")
+            raise FormatError(
+                f"its header announces {element.count} rows of '{element.name}', but only {left // smallest_row} are "
+                "left: it is truncated"
+            )
 
     def points(self, element: Element) -> NDArray[np.float64]:
         columns = _columns(element)
@@ -148,7 +169,7 @@ class _Binary:
                 kind = np.dtype(self.order + p.length)
                 if at + kind.itemsize > len(self.data):
                     return None
-                lengths[k] = int(np.frombuffer(self.data, kind, 1, at)[0])
+                lengths[k] = int(_whole(np.frombuffer(self.data, kind, 1, at))[0])
                 if lengths[k] < 0 or lengths[k] > 64:
                     return None
                 columns.append((f"n{k}", kind))
@@ -163,7 +184,7 @@ class _Binary:
         if any((table[f"n{k}"] != length).any() for k, length in lengths.items()):
             return None
         self.at += dtype.itemsize * element.count
-        flat = table[f"c{column}"].astype(np.int64).ravel() if column >= 0 else np.empty(0, dtype=np.int64)
+        flat = _whole(table[f"c{column}"]).ravel() if column >= 0 else np.empty(0, dtype=np.int64)
         return np.full(element.count, lengths.get(column, 0), dtype=np.int64), flat
 
     def _any_lists(self, element: Element, column: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -177,7 +198,7 @@ class _Binary:
                 try:
                     size = 1
                     if length is not None:
-                        size = int(np.frombuffer(self.data, length, 1, self.at)[0])
+                        size = int(_whole(np.frombuffer(self.data, length, 1, self.at))[0])
                         self.at += length.itemsize
                     if size < 0 or size * kind.itemsize > len(self.data) - self.at:
                         raise ValueError
@@ -188,50 +209,8 @@ class _Binary:
                 if k == column:
                     sizes.append(size)
                     pieces.append(values)
-        flat = np.concatenate(pieces).astype(np.int64) if pieces else np.empty(0, dtype=np.int64)
+        flat = _whole(np.concatenate(pieces)) if pieces else np.empty(0, dtype=np.int64)
         return np.array(sizes, dtype=np.int64), flat
-
-
-class _Text:
-    def __init__(self, data: bytes, start: int, line: int) -> None:
-        text = data[start:].decode("utf-8", errors="replace")
-        self.lines = [(k, words) for k, t in enumerate(text.split("\n"), start=line + 1) if (words := t.split())]
-        self.at = 0
-
-    def expect(self, element: Element) -> None:
-        left = len(self.lines) - self.at
-        if element.count > left:
-            raise _truncated(element, f"{left} lines")
-
-    def _rows(self, element: Element) -> list[tuple[int, list[str]]]:
-        rows = self.lines[self.at : self.at + element.count]
-        self.at += element.count
-        return rows
-
-    def points(self, element: Element) -> NDArray[np.float64]:
-        columns = _columns(element)
-        width = len(element.properties)
-        table = [numbers(words, width, line, "vertex") for line, words in self._rows(element)]
-        return np.array(table, dtype=np.float64).reshape(-1, width)[:, columns]
-
-    def lists(self, element: Element) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        column = _which_list(element)
-        sizes: list[int] = []
-        flat: list[int] = []
-        for line, words in self._rows(element):
-            at = 0
-            for k, p in enumerate(element.properties):
-                size = 1
-                if p.length is not None:
-                    size = integer(words[at], line, "length of a list") if at < len(words) else -1
-                    at += 1
-                if size < 0 or at + size > len(words):
-                    raise FormatError(f"'{shortened(words)}' is too short for '{p.name}'", line)
-                if k == column:
-                    sizes.append(size)
-                    flat += [integer(word, line, "face index") for word in words[at : at + size]]
-                at += size
-        return np.array(sizes, dtype=np.int64), np.array(flat, dtype=np.int64)
 
 
 def written(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> bytes:

@@ -18,6 +18,7 @@ from supple.errors import OutputError
 from supple.materials.flows.internal import COLUMNS
 from supple.model.state import State
 from supple.results.checkpoint.memories import MEMORIES
+from supple.results.checkpoint.typed import Known, check
 from supple.results.checkpoint.values import decoded, described, encoded, restored
 from supple.runtime.replacing import whole_file
 
@@ -113,10 +114,10 @@ def read_checkpoint(path: Path) -> Checkpoint:
         line, _, rest = content.partition(b"\n")
         header = json.loads(line)
         checkpoint = decoded(header["content"], restored(header["arrays"], memoryview(rest)), _classes())
+        check(checkpoint, Checkpoint, Known(), "checkpoint")
+        _check_consistency(checkpoint)
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError) as error:
         raise _damaged(path, f"its content is not what this version writes ({error})") from None
-    if not isinstance(checkpoint, Checkpoint) or not _is_consistent(checkpoint):
-        raise _damaged(path, "its content is contradictory")
     return checkpoint
 
 
@@ -128,39 +129,14 @@ def _damaged(path: Path, what: str) -> OutputError:
     return OutputError(f"{path}: is damaged: {what}; delete it, so that an earlier checkpoint is used")
 
 
-def _is_consistent(checkpoint: Checkpoint) -> bool:
-    run = checkpoint.run
-    return (
-        isinstance(run, RunFacts)
-        and all(type(number) is int for number in (checkpoint.index, run.first_index, run.steps))
-        and run.first_index <= checkpoint.index <= run.last_index
-        and len(run.span) == 2
-        and all(type(number) is float for number in (run.dt, *run.span))
-        and all(isinstance(text, str) for text in (run.scene, run.solver, *checkpoint.versions.values()))
-        and len(checkpoint.start_states) > 0
-        and all(_is_a_state(state, checkpoint.state) for state in (checkpoint.state, *checkpoint.start_states))
-        and all(isinstance(anchors, np.ndarray) for anchors in checkpoint.anchors)
-    )
-
-
-def _is_a_state(state: object, like: State) -> bool:
-    return (
-        isinstance(state, State)
-        and isinstance(state.time, float)
-        and isinstance(state.inputs, dict)
-        and isinstance(state.hinge_angles, dict)
-        and all(isinstance(angle, float) for angle in state.hinge_angles.values())
-        and isinstance(state.internal, np.ndarray)
-        and state.internal.dtype == np.float64
-        and state.internal.ndim == 2
-        and state.internal.shape[1] == COLUMNS
-        and bool(np.isfinite(state.internal).all())
-        and all(
-            isinstance(rows, np.ndarray)
-            and rows.dtype == np.float64
-            and rows.ndim == 2
-            and rows.shape == (len(like.positions), 3)
-            and bool(np.isfinite(rows).all())
-            for rows in (state.positions, state.velocities)
-        )
-    )
+def _check_consistency(checkpoint: Checkpoint) -> None:
+    """Raise `ValueError` for what the annotations cannot say."""
+    run, states = checkpoint.run, (checkpoint.state, *checkpoint.start_states)
+    if not run.first_index <= checkpoint.index <= run.last_index or not checkpoint.start_states:
+        raise ValueError("it is of no frame of its run")
+    for state in states:
+        internal, shape = state.internal, (len(checkpoint.state.positions), 3)
+        if state.positions.shape != shape or state.velocities.shape != shape or internal.shape[1:] != (COLUMNS,):
+            raise ValueError("its states are of different sizes")
+        if not all(np.isfinite(rows).all() for rows in (state.positions, state.velocities, internal)):
+            raise ValueError("its numbers are not finite")

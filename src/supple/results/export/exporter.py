@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from supple.errors import OutputError
+from supple.results.export.film import Film
 from supple.results.recording.reader import Recording, opened
 from supple.results.recording.recorder import SUFFIXES as RECORDING_SUFFIXES
 from supple.runtime.replacing import refuse_to_replace
 
-Writer = Callable[[Recording, Path], None]
+Writer = Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -23,10 +25,12 @@ class Format:
     ----------
     home : the module in this package, and its function that writes the format
     suffixes : that a file of this format may have; none where the format is a folder
+    film : of a format that is drawn, what differs from the defaults of `Film`; None of the others
     """
 
     home: str
     suffixes: tuple[str, ...] = ()
+    film: Mapping[str, Any] | None = None
 
     def writer(self) -> Writer:
         module, _, name = self.home.partition(":")
@@ -39,22 +43,24 @@ FORMATS = {
     "vtu": Format("export.vtu:write_last_vtu", (".vtu",)),  # the last frame as a VTK unstructured grid
     "vtkhdf": Format("export.vtkhdf:write_vtkhdf", RECORDING_SUFFIXES),  # a recording again, compressed and repaired
     "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
-    "gif": Format("export.video:write_video", (".gif",)),  # (extra: video)
-    "mp4": Format("export.video:write_video", (".mp4",)),  # (extra: video)
+    "gif": Format("export.video:write_video", (".gif",), {"size": (640, 360), "rate": 20.0}),  # (extra: video)
+    "mp4": Format("export.video:write_video", (".mp4",), {}),  # (extra: video)
+    "png": Format("export.video:write_video", (".png",), {}),  # one moment (extra: video)
     "csv": Format("export.table:write_csv", (".csv",)),  # the reports of all frames
     "html": Format("view.page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }
 
 
-def export(recording: Recording | str | Path, to: str, output: str | Path | None = None) -> Path:
+def export(recording: Recording | str | Path, to: str, output: str | Path | None = None, **film: Any) -> Path:
     """Write a recording in another format; the path of what was written.
 
     Parameters
     ----------
     recording : an open recording, or its path.
-    to : "glb", "obj", "vtu", "vtkhdf", "usd", "gif", "mp4", "csv" or "html"; see `FORMATS`.
+    to : "glb", "obj", "vtu", "vtkhdf", "usd", "gif", "mp4", "png", "csv" or "html"; see `FORMATS`.
     output : file, with a suffix of the format, or folder; beside the recording, under its name, where it is not given.
         What is there is replaced.
+    film : how a film or picture is drawn, such as `size=(1920, 1080)` or `camera="follow"`: the parameters of `Film`.
 
     Raises
     ------
@@ -66,10 +72,18 @@ def export(recording: Recording | str | Path, to: str, output: str | Path | None
         raise OutputError(f"export: there is no format {to!r}; take one of {', '.join(FORMATS)}")
     if output is not None:
         _require_suffix(name, Path(output))
+    chosen = FORMATS[name]
+    if film and chosen.film is None:
+        drawn = ", ".join(key for key, one in FORMATS.items() if one.film is not None)
+        raise OutputError(f"export: {', '.join(film)}: only {drawn} are drawn; leave that out for {name}")
+    unknown = film.keys() - Film.__dataclass_fields__.keys()
+    if unknown:
+        raise OutputError(f"export: there is no {min(unknown)}; there are {', '.join(Film.__dataclass_fields__)}")
+    look = () if chosen.film is None else (Film(**{**chosen.film, **film}),)
     with opened(recording) as source:
         path = Path(output) if output is not None else source.path.with_name(source.path.stem + _ending(name))
         refuse_to_replace(source.path, path)
-        FORMATS[name].writer()(source, path)
+        chosen.writer()(source, path, *look)
     return path
 
 

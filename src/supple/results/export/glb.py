@@ -17,17 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.drawing import (
-    ObstaclePicture,
-    Picture,
-    evenly,
-    obstacle_pictures,
-    pictures,
-    vertex_normals,
-    view_of,
-)
-from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
+from supple.results.view.creases import vertex_normals
+from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
+from supple.results.view.model import Moment
+from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of
 from supple.runtime.replacing import whole_file
 
 logger = logging.getLogger(__name__)
@@ -40,17 +34,13 @@ _VERTICES, _INDICES = 34962, 34963
 
 def write_glb(recording: Recording, output: Path) -> None:
     """Write bodies (their skins, where they have one) and obstacles; at most 300 frames, evenly spaced."""
-    frames = evenly(recording, _MOST_FRAMES)
+    frames = evenly(len(recording), _MOST_FRAMES)
     if len(frames) < len(recording):
         logger.warning("%s: holds %d of %d frames, evenly spaced", output, len(frames), len(recording))
-    glb = _Glb(frames)
-    for picture in pictures(recording):
-        if picture.body.rigid:
-            glb.add_rigid_body(picture, picture.rest(recording))
-        else:
-            glb.add_body(picture)
-    for obstacle in obstacle_pictures(recording.obstacles, view_of(recording)):
-        glb.add_obstacle(obstacle)
+    model = model_of_recording(recording)
+    glb = _Glb([moment_of_frame(model, recording[k]) for k in frames])
+    for surface in surfaces_of(model):
+        glb.add(surface.creased(model))
     with whole_file(output) as fresh:
         fresh.write_bytes(glb.to_bytes())
 
@@ -58,8 +48,8 @@ def write_glb(recording: Recording, output: Path) -> None:
 class _Glb:
     """A glTF document and its one buffer, to which meshes are added."""
 
-    def __init__(self, frames: list[RecordedFrame]) -> None:
-        self.frames = frames
+    def __init__(self, moments: list[Moment]) -> None:
+        self.moments = moments
         self.blob = bytearray()
         self.document: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": "Supple"},
@@ -69,37 +59,28 @@ class _Glb:
         }
         self.channels: list[dict[str, Any]] = []
         self.samplers: list[dict[str, Any]] = []
-        times = np.array([frame.time for frame in frames])
+        times = np.array([moment.time for moment in moments])
         self.times = self._accessor((times - times[0])[:, None], "SCALAR", bounds=True)
 
-    def add_body(self, picture: Picture) -> None:
-        """Add a mesh whose base shape is frame 0, and whose k-th morph target gives frame k."""
-        x0 = picture.at(self.frames[0])
-        n0 = vertex_normals(x0, picture.triangles)
+    def add(self, surface: SoftSurface | RigidSurface) -> None:
+        """Add a mesh: of a rigid one, the poses of its node are animated; of a soft one, target k gives frame k."""
+        triangles = surface.triangles
+        if isinstance(surface, RigidSurface):
+            x, normals = surface.vertices, vertex_normals(surface.vertices, triangles)
+            material = self._material(surface.color, surface.opacity)
+            node = self._mesh_node(surface.name, x, normals, triangles, material, [])
+            self._place(node, np.stack([surface.pose(moment) for moment in self.moments]))
+            return
+        x0 = surface.at(self.moments[0])
+        n0 = vertex_normals(x0, triangles)
         targets = []
-        for frame in self.frames[1:]:
-            x = picture.at(frame)
-            n = vertex_normals(x, picture.triangles)
-            targets.append({"POSITION": self._vectors(x - x0, bounds=True), "NORMAL": self._vectors(n - n0)})
-        node = self._mesh_node(picture.name, x0, n0, picture.triangles, self._material(picture.color, 1.0), targets)
+        for moment in self.moments[1:]:
+            x = surface.at(moment)
+            normals = vertex_normals(x, triangles)
+            targets.append({"POSITION": self._vectors(x - x0, bounds=True), "NORMAL": self._vectors(normals - n0)})
+        node = self._mesh_node(surface.name, x0, n0, triangles, self._material(surface.color, 1.0), targets)
         if targets:
             self._animate(node, "weights", self._weights)
-
-    def add_rigid_body(self, picture: Picture, x: NDArray[np.float64]) -> None:
-        """Add a mesh of its surface x (k, 3) at rest, whose poses are animated."""
-        material = self._material(picture.color, 1.0)
-        poses = np.stack([picture.pose(frame) for frame in self.frames])
-        node = self._mesh_node(picture.name, x, vertex_normals(x, picture.triangles), picture.triangles, material, [])
-        self._place(node, poses)
-
-    def add_obstacle(self, obstacle: ObstaclePicture) -> None:
-        """Add a rigid mesh; its poses are animated where it moves."""
-        # Triangles share no corners, so that edges stay sharp.
-        x = obstacle.vertices[obstacle.triangles.ravel()]
-        triangles = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
-        material = self._material(obstacle.color, obstacle.opacity)
-        node = self._mesh_node(obstacle.name, x, vertex_normals(x, triangles), triangles, material, [])
-        self._place(node, np.stack([frame.obstacle_poses[obstacle.number] for frame in self.frames]))
 
     def to_bytes(self) -> bytes:
         """The whole file."""
@@ -116,7 +97,7 @@ class _Glb:
     @cached_property
     def _weights(self) -> int:
         """Target k has weight 1 in frame k and 0 in all others; the first frame is the mesh itself."""
-        k = len(self.frames)
+        k = len(self.moments)
         return self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
 
     def _mesh_node(

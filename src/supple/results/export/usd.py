@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from supple.errors import OutputError
-from supple.results.drawing import ObstaclePicture, Picture, obstacle_pictures, pictures, view_of
 from supple.results.recording.reader import Recording
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.surfaces import RigidSurface, body_surface, obstacle_surfaces
 from supple.runtime.replacing import whole_file
 
 
@@ -49,45 +50,45 @@ def _write(recording: Recording, path: Path) -> None:
     stage.SetStartTimeCode(0)
     stage.SetEndTimeCode(len(recording) - 1)
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/recording").GetPrim())
-    obstacles = obstacle_pictures(recording.obstacles, view_of(recording))
-    for group, drawn in (("bodies", pictures(recording)), ("obstacles", obstacles)):
+    model = model_of_recording(recording)
+    bodies = [body_surface(model, body) for body in model.bodies]
+    for group, drawn in (("bodies", bodies), ("obstacles", obstacle_surfaces(model))):
         folder = UsdGeom.Scope.Define(stage, f"/recording/{group}").GetPath()
-        for i, picture in enumerate(drawn):
-            mesh = _define(stage, f"{folder}/{_identifier(picture.name, i)}", picture)
-            if isinstance(picture, Picture) and picture.body.rigid:
-                _set_points(mesh, picture.rest(recording), None)
-                _set_poses(mesh, [picture.pose(frame) for frame in recording])
-                continue
-            if isinstance(picture, ObstaclePicture) and not picture.moves(recording):
-                _set_points(mesh, picture.at(recording[0]), None)
-                continue
-            for k, frame in enumerate(recording):
-                _set_points(mesh, picture.at(frame), k)
+        for i, surface in enumerate(drawn):
+            mesh = _define(stage, f"{folder}/{_identifier(surface.name, i)}", surface)
+            moments = (moment_of_frame(model, frame) for frame in recording)
+            if isinstance(surface, RigidSurface):
+                _set_points(mesh, surface.vertices, None)
+                _set_poses(mesh, [surface.pose(moment) for moment in moments])
+            else:
+                for k, moment in enumerate(moments):
+                    _set_points(mesh, surface.at(moment), k)
     stage.GetRootLayer().Save()
 
 
-def _define(stage, path: str, picture):
+def _define(stage, path: str, surface):
     from pxr import Gf, UsdGeom, Vt
 
     mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.GetPrim().SetDisplayName(picture.name)
+    mesh.GetPrim().SetDisplayName(surface.name)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    triangles = picture.triangles
+    triangles = surface.triangles
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, dtype=np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(triangles.ravel(), dtype=np.int32)))
-    color = np.array(picture.color) / 255.0
+    color = np.array(surface.color) / 255.0
     mesh.CreateDisplayColorAttr([Gf.Vec3f(*(float(c) for c in color**2.2))])
     return mesh
 
 
 def _set_poses(mesh, poses) -> None:
-    """A time sample of the transform for each pose (3, 4)."""
+    """The transform: a time sample for each pose (3, 4), or one value where they are the same."""
     from pxr import Gf, Usd
 
     operation = mesh.AddTransformOp()
-    for k, pose in enumerate(poses):
+    moves = any(np.any(pose != poses[0]) for pose in poses)
+    for k, pose in enumerate(poses if moves else poses[:1]):
         matrix = np.vstack([pose, [0.0, 0.0, 0.0, 1.0]]).T  # USD multiplies rows from the left
-        operation.Set(Gf.Matrix4d(*matrix.ravel().tolist()), Usd.TimeCode(k))
+        operation.Set(Gf.Matrix4d(*matrix.ravel().tolist()), Usd.TimeCode(k) if moves else Usd.TimeCode.Default())
 
 
 def _set_points(mesh, x, time: int | None) -> None:

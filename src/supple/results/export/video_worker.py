@@ -1,8 +1,9 @@
-"""The child process that draws a .gif or .mp4: `python -m supple.results.export.video_worker RECORDING OUTPUT`."""
+"""The child process that draws a .gif, .mp4 or .png: `video_worker RECORDING OUTPUT FILM`, the last one as JSON."""
 
 from __future__ import annotations
 
 import errno
+import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,79 +13,225 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SuppleError
-from supple.results.drawing import evenly, obstacle_pictures, pictures, vertex_normals, view_of
-from supple.results.recording.frame import RecordedFrame
+from supple.results.export.film import COLORS, Film
+from supple.results.export.floor_shadow import FloorShadow
 from supple.results.recording.reader import Recording, read_recording
+from supple.results.view.camera import eye_of
+from supple.results.view.color_scale import Limits, Range
+from supple.results.view.creases import vertex_normals
+from supple.results.view.fields import Field
+from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
+from supple.results.view.model import Model, Moment
+from supple.results.view.surfaces import SoftSurface, Surface, surfaces_of
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
-_SIZES = {"gif": (480, 360), "mp4": (960, 720)}
-_RATES = {"gif": 20.0, "mp4": 60.0}  # most frames per second
-_MOST_FRAMES = {"gif": 400, "mp4": 10_000}
+_MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
+_BACKGROUND, _HORIZON = "#e3e8ef", "#fbfcfd"
+# Direction [share of the radius of the scene, across, up, ahead], color and strength of each light.
+_LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4), ((0.5, 1.0, -4.0), "#ffffff", 0.25))
+_BODY: Any = {"ambient": 0.28, "diffuse": 0.8, "specular": 0.25, "specular_power": 30}
+_OBSTACLE: Any = {"ambient": 0.7, "diffuse": 0.55, "specular": 0.0}
+_SHADOW = (30, 34, 48)
+_SAMPLED = 24  # moments from which the ends of a color scale are found
 
 
-def draw(recording: Recording, frames: list[RecordedFrame], size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
-    """Each frame as a picture (height, width, 3), from one viewpoint that shows the whole recording."""
+class Studio:
+    """A scene of VTK with all surfaces of a recording, and its camera."""
+
+    def __init__(self, model: Model, moments: list[Moment], film: Film) -> None:
+        import pyvista
+
+        self._film, self._view = film, model.view
+        self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
+        plotter.set_background(_BACKGROUND, top=_HORIZON)  # pyright: ignore[reportArgumentType]
+        plotter.enable_anti_aliasing("msaa", multi_samples=4)
+        self._add_lights(pyvista)
+        self._field = COLORS.get(film.color)
+        self._meshes: list[tuple[Any, Surface]] = []
+        ends = self._ends(moments)
+        for number, flat in enumerate(surfaces_of(model)):
+            surface = flat.creased(model)
+            mesh = pyvista.PolyData.from_regular_faces(surface.at(moments[0]), surface.triangles)
+            look: dict[str, Any] = {"color": [c / 255.0 for c in surface.color]}
+            if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
+                mesh.point_data["field"] = np.zeros(mesh.n_points)
+                look = _scale(self._field, ends)
+            room = getattr(surface, "room", False)
+            opacity = 1.0 if room else getattr(surface, "opacity", 1.0)
+            actor = plotter.add_mesh(
+                mesh, opacity=opacity, culling="front" if room else None, **look,
+                **(_BODY if number < len(model.bodies) else _OBSTACLE),
+            )  # fmt: skip
+            actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
+            self._meshes.append((mesh, surface))
+        self._bodies = self._meshes[: len(model.bodies)]
+        floor = self._floor(model, pyvista) if film.shadows else None
+        self._shadow: FloorShadow | None
+        self._floor_actor: Any
+        self._shadow, self._floor_actor = floor or (None, None)
+        plotter.show(auto_close=False, interactive=False)  # pyvista renders nothing before
+
+    def _add_lights(self, pyvista: Any) -> None:
+        center, radius, up = self._view.center, self._view.radius, self._view.up
+        ahead = self._view.eye(_ANGLE) - center
+        ahead -= float(ahead @ up) * up
+        ahead /= np.linalg.norm(ahead)
+        axes = np.stack([np.cross(up, ahead), up, ahead])
+        for direction, color, strength in _LIGHTS:
+            place = center + radius * np.array(direction) @ axes
+            self._plotter.add_light(
+                pyvista.Light(position=tuple(place), focal_point=tuple(center), color=color, intensity=strength)
+            )
+
+    def _ends(self, moments: list[Moment]) -> tuple[float, float] | None:
+        """Of the color scale, for the whole film."""
+        if self._field is None:
+            return None
+        chosen = [moments[i] for i in evenly(len(moments), _SAMPLED)]
+        return Limits(self._field, Range()).follow(np.concatenate([self._field.values(moment) for moment in chosen]))
+
+    def _floor(self, model: Model, pyvista: Any) -> tuple[FloorShadow, Any] | None:
+        view = model.view
+        planes = [one.obstacle.plane for one in model.obstacles]
+        floors = [plane for plane in planes if plane is not None and float(plane[1] @ view.up) > 0.99]
+        if not floors:
+            return None
+        point, _ = max(floors, key=lambda plane: float(plane[0] @ view.up))
+        shadow = FloorShadow(point, view.up, view.center, view.radius)
+        mesh = pyvista.PolyData(shadow.corners, np.array([4, 0, 1, 2, 3]))
+        mesh.active_texture_coordinates = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
+        return shadow, self._plotter.add_mesh(mesh, texture=_texture(np.zeros((4, 4))), lighting=False)
+
+    def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
+        """(height, width, 3) of a moment, at a share of the film's length."""
+        points = []
+        nodal = _nodal(moment, self._field.values(moment)) if self._field is not None else None
+        for mesh, surface in self._meshes:
+            x = surface.at(moment)
+            points.append(x)
+            mesh.points = x.astype(np.float32)
+            mesh.point_data["Normals"] = vertex_normals(x, surface.triangles).astype(np.float32)
+            mesh.GetPointData().SetActiveNormals("Normals")
+            if nodal is not None and "field" in mesh.point_data and isinstance(surface, SoftSurface):
+                mesh.point_data["field"] = surface.of(nodal)[:, 0]
+        bodies = points[: len(self._bodies)]
+        if self._shadow is not None:
+            dark = self._shadow.darkness([(x, s.triangles) for x, (_, s) in zip(bodies, self._bodies, strict=True)])
+            self._floor_actor.texture = _texture(dark)
+        self._aim(np.concatenate(bodies), share)
+        self._plotter.render()
+        return np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
+
+    def _aim(self, points: NDArray[np.float64], share: float) -> None:
+        view, film = self._view, self._film
+        away = eye_of(film.view, view) - view.center
+        away /= np.linalg.norm(away)
+        center, radius = view.center, view.radius
+        if film.camera == "follow":
+            center = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            radius = self._followed(points, center)
+        elif film.camera == "orbit":
+            angle, u = 2.0 * np.pi * share, view.up
+            away = np.cos(angle) * away + np.sin(angle) * np.cross(u, away) + (1 - np.cos(angle)) * (u @ away) * u
+        half = np.radians(0.5 * _ANGLE)
+        narrow = min(half, float(np.arctan(np.tan(half) * film.size[0] / film.size[1])))
+        camera = self._plotter.camera
+        camera.position = tuple(center + 1.05 * radius / np.sin(narrow) * away)
+        camera.focal_point, camera.up, camera.view_angle = tuple(center), tuple(view.up), _ANGLE
+        self._plotter.reset_camera_clipping_range()
+
+    def _followed(self, points: NDArray[np.float64], center: NDArray[np.float64]) -> float:
+        """The largest radius until now, so that the picture does not breathe."""
+        self._reach = max(getattr(self, "_reach", 0.0), 1.3 * float(np.linalg.norm(points - center, axis=1).max()))
+        return self._reach
+
+
+def _scale(field: Field, ends: tuple[float, float]) -> dict[str, Any]:
+    """Colors by a field, and their legend."""
+    title = f"{field.name} [{field.unit}]" if field.unit else field.name
+    bar = {"title": title, "color": "#30343a", "vertical": True, "fmt": "%.3g", "title_font_size": 18}
+    bar |= {"position_x": 0.86, "position_y": 0.2, "width": 0.06, "height": 0.6}
+    colors = "coolwarm" if field.center is not None else "viridis"
+    return {"scalars": "field", "cmap": colors, "clim": ends, "scalar_bar_args": bar}
+
+
+def _nodal(moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values (n, 3), thrice the mean of the tets around each vertex; middle nodes have that of their neighbours."""
+    model = moment.model
+    known = np.asarray(np.isfinite(values))
+    corners, own = model.tets[known].ravel(), np.repeat(values[known], 4)
+    n = len(moment.positions)
+    total, count = np.bincount(corners, own, minlength=n), np.bincount(corners, minlength=n)
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    for body in model.bodies:
+        triangles = body.triangles + body.vertices.start
+        unknown = np.asarray(np.isnan(mean[triangles]))
+        if unknown.any():
+            around = np.nanmean(np.where(np.all(unknown, axis=1, keepdims=True), 0.0, mean[triangles]), axis=1)
+            rows = triangles[unknown]
+            filled = np.bincount(rows, np.repeat(around, unknown.sum(axis=1)), minlength=n)
+            times = np.bincount(rows, minlength=n)
+            mean = np.where(np.isnan(mean) & (times > 0), filled / np.maximum(times, 1), mean)
+    return np.repeat(np.nan_to_num(mean)[:, None], 3, axis=1)
+
+
+def _texture(darkness: NDArray[np.float64]) -> Any:
+    """Of the color of shadows, as opaque as they are dark."""
     import pyvista
 
-    view = view_of(recording)
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="three lights")
-    plotter.set_background("#eef1f5", top="#ffffff")  # pyright: ignore[reportArgumentType]
-    moving = []
-    for picture in pictures(recording):
-        mesh = _polydata(pyvista, picture.at(frames[0]), picture.triangles)
-        color = [c / 255.0 for c in picture.color]
-        actor = plotter.add_mesh(mesh, color=color, specular=0.4, specular_power=25, ambient=0.15)
-        actor.prop.interpolation = "phong"  # uses the normals that are set for each frame below
-        moving.append((mesh, picture, True))
-    for obstacle in obstacle_pictures(recording.obstacles, view):
-        mesh = _polydata(pyvista, obstacle.at(frames[0]), obstacle.triangles)
-        plotter.add_mesh(mesh, color=[c / 255.0 for c in obstacle.color], opacity=obstacle.opacity, ambient=0.3)
-        moving.append((mesh, obstacle, False))
-    camera = plotter.camera
-    camera.position, camera.focal_point, camera.up = tuple(view.eye(_ANGLE)), tuple(view.center), tuple(view.up)
-    camera.view_angle = _ANGLE
-    plotter.reset_camera_clipping_range()
-    for frame in frames:
-        for mesh, picture, smooth in moving:
-            x = picture.at(frame)
-            mesh.points = x.astype(np.float32)
-            if smooth:
-                mesh.point_data["Normals"] = vertex_normals(x, picture.triangles).astype(np.float32)
-                mesh.GetPointData().SetActiveNormals("Normals")
-        plotter.reset_camera_clipping_range()
-        plotter.render()
-        image = np.asarray(plotter.screenshot(None, return_img=True))
-        yield np.ascontiguousarray(image[..., :3])
-    plotter.close()
+    image = np.empty((*darkness.shape, 4), dtype=np.uint8)
+    image[..., :3], image[..., 3] = _SHADOW, np.round(255.0 * darkness)
+    texture = pyvista.Texture(np.ascontiguousarray(image[::-1]))  # its first row is the upper one
+    texture.interpolate = True
+    return texture
 
 
-def _polydata(pyvista: Any, x: NDArray[np.float64], triangles: NDArray[np.int32]) -> Any:
-    faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
-    return pyvista.PolyData(x.astype(np.float32), faces)
-
-
-def write(source: Path, output: Path) -> None:
-    """Draw a recording to a file, .gif or .mp4."""
+def write(source: Path, output: Path, film: Film) -> None:
+    """Draw a recording to a file: .gif, .mp4, or .png of one moment."""
     kind = output.suffix[1:].lower()
     with read_recording(source) as recording:
-        duration = max(float(recording.times[-1] - recording.times[0]), recording.dt)
-        count = min(_MOST_FRAMES[kind], max(2, round(duration * _RATES[kind]) + 1))
-        frames = evenly(recording, count)
-        rate = max((len(frames) - 1) / duration, 1.0)
-        images = draw(recording, frames, _SIZES[kind])
-        if kind == "gif":
+        numbers, rate = _chosen(recording, film, kind)
+        model = model_of_recording(recording)
+        moments = [moment_of_frame(model, recording[k]) for k in numbers]
+        studio = Studio(model, moments, film)
+        images = (studio.picture(moment, k / max(1, len(moments) - 1)) for k, moment in enumerate(moments))
+        if kind == "png":
+            from PIL import Image
+
+            Image.fromarray(next(images)).save(output, format="PNG")
+        elif kind == "gif":
             _write_gif(images, output, rate)
         else:
-            _write_mp4(images, output, rate, _SIZES[kind])
+            _write_mp4(images, output, rate, film.size)
+
+
+def _chosen(recording: Recording, film: Film, kind: str) -> tuple[list[int], float]:
+    """The frames that are drawn, and how many of them a second."""
+    times = recording.times
+    if kind == "png":
+        wanted = times[-1] if film.time is None else film.time
+        return [int(np.argmin(np.abs(times - wanted)))], 1.0
+    duration = film.slow * max(float(times[-1] - times[0]), recording.dt)
+    count = min(_MOST_FRAMES[kind], max(2, round(duration * film.rate) + 1))
+    places = np.linspace(times[0], times[-1], count)
+    nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), places)
+    return [int(k) for k in nearest], max((count - 1) / duration, 1.0)
 
 
 def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float) -> None:
+    """One palette for all pages, from a page of several moments: one for each page would flicker."""
     from PIL import Image
 
-    pages = [Image.fromarray(image).quantize(128, dither=Image.Dither.NONE) for image in images]
+    pages = [Image.fromarray(image) for image in images]
+    some = [pages[i] for i in evenly(len(pages), 6)]
+    sheet = Image.new("RGB", (some[0].width, some[0].height * len(some)))
+    for k, page in enumerate(some):
+        sheet.paste(page, (0, k * page.height))
+    palette = sheet.quantize(255, method=Image.Quantize.MAXCOVERAGE, kmeans=4)
+    drawn = [page.quantize(palette=palette, dither=Image.Dither.NONE) for page in pages]
     # GIF has a time unit of a hundredth of a second.
     duration = max(20, round(100.0 / rate) * 10)
-    pages[0].save(output, format="GIF", save_all=True, append_images=pages[1:], duration=duration, loop=0)
+    drawn[0].save(output, format="GIF", save_all=True, append_images=drawn[1:], duration=duration, loop=0)
 
 
 def _write_mp4(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, size: tuple[int, int]) -> None:
@@ -121,9 +268,9 @@ def _fail(reason: str) -> int:
 
 
 def main(arguments: list[str]) -> int:
-    source, output = arguments
+    source, output, film = arguments
     try:
-        write(Path(source), Path(output))
+        write(Path(source), Path(output), Film(**json.loads(film)))
     except SuppleError as error:
         return _fail(str(error))
     except OSError as error:

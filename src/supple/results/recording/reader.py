@@ -88,21 +88,22 @@ class Recording(RecordedContents, Showable, Sequence[RecordedFrame]):
         """
         return supplied("plot")(self)
 
-    def export(self, to: str, output: str | Path | None = None) -> Path:
+    def export(self, to: str, output: str | Path | None = None, **film: Any) -> Path:
         """Write the recording in another format; the path of what was written.
 
         Parameters
         ----------
-        to : "glb", "obj", "vtu", "vtkhdf", "usd", "gif", "mp4", "csv" or "html".
+        to : "glb", "obj", "vtu", "vtkhdf", "usd", "gif", "mp4", "png", "csv" or "html".
         output : file, with a suffix of the format, or folder; beside the recording, under its name, where it is not
             given. What is there is replaced.
+        film : how a film or picture is drawn: `size`, `rate`, `slow`, `camera`, `view`, `color`, `shadows`, `time`.
 
         Raises
         ------
         OutputError : where the format is unknown, needs something that is not installed or does not agree with the
             output's suffix, or the output cannot be written. No incomplete file is left.
         """
-        return supplied("export")(self, to, output)
+        return supplied("export")(self, to, output, **film)
 
     @property
     def frames(self) -> Recording:

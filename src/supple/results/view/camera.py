@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.drawing import View
+from supple.results.view.bounds import View
 
 ANGLE = 35.0  # vertical field of view [degrees]
 _ROOM = 1.2

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from supple.results.drawing import view_of
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
+from supple.results.view.bounds import View
 from supple.results.view.model import Model, ModelBody, Moment
 
 
@@ -42,3 +42,24 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
         laws=replace(frame.recording.laws, active=frame.active),
         pinned=frame.recording.pinned_vertices.astype(np.int64),
     )
+
+
+def view_of(recording: Recording) -> View:
+    """Bounds over all frames, of which at most about 200 are read."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for frame in recording[:: max(1, len(recording) // 200)]:
+        x = np.concatenate(list(frame.positions.values()))
+        x = x[np.isfinite(x).all(axis=1)]
+        if len(x):
+            low, high = np.minimum(low, x.min(axis=0)), np.maximum(high, x.max(axis=0))
+    if not np.isfinite(low).all():
+        low, high = np.zeros(3), np.ones(3)
+    g = recording.gravity
+    size = np.linalg.norm(g)
+    up = -g / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
+    return View(low, high, up)
+
+
+def evenly(count: int, most: int) -> list[int]:
+    """At most `most` numbers below `count`, evenly spaced, with the first and the last one."""
+    return [int(i) for i in np.unique(np.linspace(0, count - 1, min(count, most)).round())]

@@ -12,16 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from supple.results.drawing import View
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording, opened
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.bounds import View
+from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.gate import new_token
-from supple.results.view.layers.skin import drawn_points
 from supple.results.view.model import Model, Moment
 from supple.results.view.options import ViewOptions
 from supple.results.view.server import gated_server
 from supple.results.view.stage import Stage
+from supple.results.view.surfaces import body_surface
 from supple.runtime.replacing import whole_file
 
 # Bytes of moving points before compression, which at least halves them; longer pages have fewer moments.
@@ -52,7 +52,7 @@ def write_page(
 def page_of_frames(recording: Recording, frames: Sequence[RecordedFrame], options: ViewOptions) -> str:
     """The HTML of a page that plays frames of a recording in a loop."""
     model = model_of_recording(recording)
-    played = (frames[i] for i in _evenly(len(frames), _most_moments(model, options)))
+    played = (frames[i] for i in evenly(len(frames), _most_moments(model, options)))
     return _page(((frame.time, moment_of_frame(model, frame)) for frame in played), options)
 
 
@@ -64,7 +64,7 @@ def page_of_moments(moments: Sequence[tuple[float, Moment]], options: ViewOption
     moments : at least one, each with its time on the page [s], ascending
     options : how they are drawn
     """
-    return _page((moments[i] for i in _evenly(len(moments), _most_moments(moments[0][1].model, options))), options)
+    return _page((moments[i] for i in evenly(len(moments), _most_moments(moments[0][1].model, options))), options)
 
 
 def _page(moments: Iterator[tuple[float, Moment]], options: ViewOptions) -> str:
@@ -84,13 +84,9 @@ def _page(moments: Iterator[tuple[float, Moment]], options: ViewOptions) -> str:
 
 def _most_moments(model: Model, options: ViewOptions) -> int:
     """Number of moments for a page of at most _MOST_BYTES."""
-    size = 12 * (drawn_points(model) if options.surface in ("skin", "wireframe") else 24 * len(model.tets))
+    points = sum(len(body_surface(model, body).creased(model).at_rest(model)) for body in model.bodies)
+    size = 12 * (points if options.surface in ("skin", "wireframe") else 24 * len(model.tets))
     return max(2, _MOST_BYTES // max(1, size + 24 * len(model.stitches)))
-
-
-def _evenly(count: int, most: int) -> list[int]:
-    """At most `most` numbers below `count`, evenly spaced, with the first and the last one."""
-    return [int(i) for i in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
 
 
 def quantum_of(view: View) -> float:

@@ -39,7 +39,6 @@ class Capsule(SegmentObstacle):
     """
 
     kind: ClassVar[str] = "capsule"
-    smooth: ClassVar[bool] = True
 
     def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         a, b = np.asarray(self.start), np.asarray(self.end)

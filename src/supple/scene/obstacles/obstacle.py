@@ -52,8 +52,6 @@ class Obstacle(Kind, ABC):
     name: Annotated[str | None, Name()] = None
 
     title: ClassVar[str] = "obstacle"
-    smooth: ClassVar[bool] = False
-    """Whether the surface is drawn without edges."""
 
     @classmethod
     def parameters(cls) -> dict[str, Declared]:

@@ -40,7 +40,6 @@ class Sphere(Obstacle):
     inside: Annotated[bool, Flag()] = False
 
     kind: ClassVar[str] = "sphere"
-    smooth: ClassVar[bool] = True
 
     def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         r, normals = lengths_and_directions(points - np.asarray(self.center), np.array([0.0, 1.0, 0.0]))

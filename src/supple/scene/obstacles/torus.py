@@ -37,7 +37,6 @@ class Torus(Obstacle):
     tube_radius: Annotated[float, POSITIVE] = 0.2
 
     kind: ClassVar[str] = "torus"
-    smooth: ClassVar[bool] = True
     checked_by_triangles: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from supple.app.viewer.controls.measures import GAP, MOST_POINTS, plot, shown
 from supple.app.viewer.protocol.snapshots import Snapshot
-from supple.results.drawing import body_color
+from supple.results.view.colors import body_color
 
 _TITLES = {"N": "Force [N]", "Pa": "Pressure [Pa]"}
 

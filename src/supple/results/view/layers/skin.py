@@ -1,4 +1,4 @@
-"""Bodies as smooth shaded surfaces: the fine skin where there is one, otherwise the boundary of the mesh."""
+"""Bodies as shaded surfaces: the fine skin where there is one, otherwise the boundary of the mesh."""
 
 from __future__ import annotations
 
@@ -7,41 +7,28 @@ from typing import Any
 import numpy as np
 
 from supple.results.view.layers.layer import Layer, single
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Moment
+from supple.results.view.surfaces import body_surface, boundary_surface
 
 
 class SkinView(Layer):
-    """One mesh for each body, or only its lines."""
+    """One mesh for each body, or only the lines of its boundary."""
 
     def __init__(self, scene: Any, moment: Moment, *, lines: bool = False) -> None:
-        self._parts = []
-        for i, body in enumerate(moment.model.bodies):
-            if body.skin is not None and not lines:
-                used, triangles = None, body.skin.triangles
-            else:
-                used, rows = np.unique(body.triangles, return_inverse=True)
-                triangles = rows.reshape(-1, 3)
+        model, self._parts = moment.model, []
+        for i, body in enumerate(model.bodies):
+            surface = boundary_surface(body) if lines else body_surface(model, body).creased(model)
             handle = scene.add_mesh_simple(
                 f"/bodies/{i} {body.name}",
-                single(_points(moment, body, used)),
-                triangles.astype(np.uint32),
-                color=body.color,
+                single(surface.at(moment)),
+                surface.triangles.astype(np.uint32),
+                color=surface.color,
                 wireframe=lines,
                 side="double",
             )
-            self._parts.append((handle, body, used))
-        self.nodes = [handle for handle, _, _ in self._parts]
+            self._parts.append((handle, surface))
+        self.nodes = [handle for handle, _ in self._parts]
 
     def update(self, moment: Moment) -> None:
-        for handle, body, used in self._parts:
-            handle.vertices = single(_points(moment, body, used))
-
-
-def _points(moment: Moment, body: Any, used: Any) -> Any:
-    x = moment.finite_positions[body.vertices]
-    return body.skin.positions(x) if used is None else x[used]
-
-
-def drawn_points(model: Model) -> int:
-    """Number of points of the smooth surfaces."""
-    return sum(len(np.unique(b.triangles)) if b.skin is None else len(b.skin.corners) for b in model.bodies)
+        for handle, surface in self._parts:
+            handle.vertices = single(surface.at(moment))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from supple.app.viewer.from_snapshot import MomentBuilder
-from supple.results.drawing import body_color
 from supple.results.recording.actions.stitches import no_stitches
 from supple.results.recording.scene import RecordedObstacle
+from supple.results.view.colors import body_color
 from supple.results.view.fields import FIELDS
 from supple.results.view.layers.section import Cut, surface
 from supple.results.view.layers.springs import length_text

@@ -1,0 +1,74 @@
+"""Soft shadows of bodies on a floor, from light of the whole sky."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+_CELLS = 256
+# Of the dark rim of a contact and of the wide shadow around it, as shares of the radius of the scene: the height above
+# the floor at which it fades, and its blur; and how dark it becomes.
+_LAYERS = ((0.06, 0.02, 0.45), (0.6, 0.09, 0.4))
+
+
+class FloorShadow:
+    """A picture of the shadows on a floor.
+
+    Parameters
+    ----------
+    point, up : (3,) of the floor [m], and the unit vector out of it
+    center, radius : of the scene [m]; the shadows reach two and a half radii from it
+
+    Attributes
+    ----------
+    corners : (4, 3) where the picture lies on the floor [m]
+    """
+
+    def __init__(
+        self, point: NDArray[np.float64], up: NDArray[np.float64], center: NDArray[np.float64], radius: float
+    ) -> None:
+        across = np.eye(3)[int(np.argmin(np.abs(up)))]
+        first = np.cross(up, across) / np.linalg.norm(np.cross(up, across))
+        self._axes: NDArray[np.float64] = np.stack([first, np.cross(up, first)]).astype(np.float64)
+        self._up, self._radius, self._half = up, radius, 2.5 * radius
+        self._origin = center - float((center - point) @ up) * up
+        raised = self._origin + 5e-3 * radius * up  # two surfaces in the same plane flicker
+        signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        self.corners = raised + self._half * signs @ self._axes
+
+    def darkness(self, surfaces: list[tuple[NDArray[np.float64], NDArray[np.int32]]]) -> NDArray[np.float64]:
+        """(cells, cells) from 0 to 1, rows along the second side; of vertices (k, 3) [m] and triangles (t, 3)."""
+        cell = 2.0 * self._half / _CELLS
+        light = np.ones((_CELLS, _CELLS))
+        samples = np.concatenate([_samples(x, triangles, self._axes, cell) for x, triangles in surfaces])
+        place = np.floor((samples[:, :3] - self._origin) @ self._axes.T / cell + 0.5 * _CELLS).astype(int)
+        height = (samples[:, :3] - self._origin) @ self._up
+        inside = ((place >= 0) & (place < _CELLS)).all(axis=1) & (height > -0.1 * self._radius)
+        index, height, area = place[inside] @ [1, _CELLS], np.maximum(height[inside], 0.0), samples[inside, 3]
+        for fade, blur, darkest in _LAYERS:
+            weights = np.exp(-height / (fade * self._radius)) * area / cell**2
+            cover = np.bincount(index, weights, minlength=_CELLS**2).reshape(_CELLS, _CELLS)
+            blurred = gaussian_filter(1.0 - np.exp(-2.0 * cover), blur * self._radius / cell)
+            light *= 1.0 - darkest * np.minimum(blurred, 1.0)
+        return 1.0 - light
+
+
+def _samples(
+    x: NDArray[np.float64], triangles: NDArray[np.int32], axes: NDArray[np.float64], cell: float
+) -> NDArray[np.float64]:
+    """Points (s, 3) of triangles, at least one in each cell that they cover, and the area (s,) that each stands for."""
+    corners = x[triangles]
+    flat = corners @ axes.T
+    a, b = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    area = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    count = np.ceil(np.minimum(4.0 * area / cell**2, 4.0 * _CELLS**2)).astype(int) + 1
+    owner = np.repeat(np.arange(len(triangles)), count)
+    # Points of a lattice with irrational steps fill a triangle evenly, and stay where they are from frame to frame.
+    k = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    u, v = (0.5 + 0.7548776662 * k) % 1.0, (0.5 + 0.5698402910 * k) % 1.0
+    over = u + v > 1.0
+    u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
+    p = corners[owner]
+    points = p[:, 0] + u[:, None] * (p[:, 1] - p[:, 0]) + v[:, None] * (p[:, 2] - p[:, 0])
+    return np.column_stack([points, (area / count)[owner]])

@@ -1,0 +1,170 @@
+"""The surfaces of bodies and obstacles as all pictures show them: the page, films, and files of other programs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.results.view.colors import OBSTACLE_COLOR
+from supple.results.view.creases import split_at_creases
+from supple.results.view.model import Model, ModelBody, Moment
+
+# A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
+ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Surface(ABC):
+    """Triangles that move.
+
+    Attributes
+    ----------
+    name : of the body or obstacle
+    triangles : (t, 3) of its vertices, counter-clockwise from outside
+    color : (r, g, b) from 0 to 255
+    """
+
+    name: str
+    triangles: NDArray[np.int32]
+    color: tuple[int, int, int]
+
+    @abstractmethod
+    def at(self, moment: Moment) -> NDArray[np.float64]:
+        """Positions (k, 3) of the vertices [m]."""
+
+    @abstractmethod
+    def at_rest(self, model: Model) -> NDArray[np.float64]:
+        """Positions (k, 3) at rest, which decide where its creases are [m]."""
+
+    @abstractmethod
+    def _with_vertices(self, rows: NDArray[np.int64], triangles: NDArray[np.int32]) -> Self:
+        """The same surface with these of its vertices, and triangles of them."""
+
+    def creased(self, model: Model) -> Self:
+        """The same surface; vertices on creases are there once for each side, so that edges stay sharp."""
+        return self._with_vertices(*split_at_creases(self.at_rest(model), self.triangles))
+
+
+@dataclass(frozen=True, eq=False)
+class SoftSurface(Surface):
+    """The skin of a soft body, or the boundary of its tets.
+
+    Attributes
+    ----------
+    body : of the model
+    skin : whether the vertices are those of its skin
+    rows : (k,) the vertices of the skin, or of the body, that are drawn
+    """
+
+    body: ModelBody
+    skin: bool
+    rows: NDArray[np.int64]
+
+    def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values (k, 3) at the drawn vertices, of values (n, 3) at all vertices of the model."""
+        own = values[self.body.vertices]
+        return (self.body.skin.positions(own) if self.skin and self.body.skin is not None else own)[self.rows]
+
+    def at(self, moment: Moment) -> NDArray[np.float64]:
+        return self.of(moment.finite_positions)
+
+    def at_rest(self, model: Model) -> NDArray[np.float64]:
+        return self.of(model.rest_positions)
+
+    def _with_vertices(self, rows: NDArray[np.int64], triangles: NDArray[np.int32]) -> Self:
+        return replace(self, rows=self.rows[rows], triangles=triangles)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidSurface(Surface):
+    """The surface of a rigid body or an obstacle.
+
+    Attributes
+    ----------
+    vertices : (k, 3) in its own coordinates [m]
+    pose : (3, 4) rotation and translation of a moment
+    opacity : from 0 to 1
+    room : whether it is seen from within; its triangles face outwards, and a page draws only their backs
+    """
+
+    vertices: NDArray[np.float64]
+    pose: Callable[[Moment], NDArray[np.float64]]
+    opacity: float = 1.0
+    room: bool = False
+
+    def at(self, moment: Moment) -> NDArray[np.float64]:
+        pose = self.pose(moment)
+        return self.vertices @ pose[:, :3].T + pose[:, 3]
+
+    def at_rest(self, model: Model) -> NDArray[np.float64]:
+        return self.vertices
+
+    def _with_vertices(self, rows: NDArray[np.int64], triangles: NDArray[np.int32]) -> Self:
+        return replace(self, vertices=self.vertices[rows], triangles=triangles)
+
+
+def surfaces_of(model: Model) -> list[SoftSurface | RigidSurface]:
+    """Those of all bodies, then those of all obstacles."""
+    return [*(body_surface(model, body) for body in model.bodies), *obstacle_surfaces(model)]
+
+
+def body_surface(model: Model, body: ModelBody) -> SoftSurface | RigidSurface:
+    """The skin of a body, or its boundary where it has none."""
+    if body.skin is None:
+        return boundary_surface(body)
+    if not body.rigid:
+        rows = np.arange(len(body.skin.corners))
+        return SoftSurface(body.name, body.skin.triangles, body.color, body, True, rows)
+    # Its control points give the pose; the coordinates begin at the center of mass, their mean.
+    rest = model.rest_positions[body.vertices]
+    center = rest.mean(axis=0)
+    inverse = np.linalg.inv((rest[1:] - rest[0]).T)
+
+    def pose(moment: Moment) -> NDArray[np.float64]:
+        x = moment.finite_positions[body.vertices]
+        return np.column_stack([(x[1:] - x[0]).T @ inverse, x.mean(axis=0)])
+
+    return RigidSurface(body.name, body.skin.triangles, body.color, body.skin.positions(rest) - center, pose)
+
+
+def boundary_surface(body: ModelBody) -> SoftSurface:
+    """The boundary of a body's tets."""
+    used, rows = np.unique(body.triangles, return_inverse=True)
+    return SoftSurface(body.name, rows.reshape(-1, 3).astype(np.int32), body.color, body, False, used.astype(np.int64))
+
+
+def obstacle_surfaces(model: Model) -> list[RigidSurface]:
+    """Those of the obstacles; a half-space is drawn as a square about the bodies.
+
+    Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not a floor.
+    """
+    made, view = [], model.view
+    for number, recorded in enumerate(model.obstacles):
+        obstacle = recorded.obstacle
+        vertices, triangles = obstacle.drawn(view.center, 2.5 * view.radius)
+        is_wall = obstacle.plane is not None and float(obstacle.plane[1] @ view.up) < 0.5
+        opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if obstacle.is_room else 1.0
+        triangles = triangles.astype(np.int32)
+        if obstacle.is_room and _volume(vertices, triangles) < 0.0:
+            triangles = triangles[:, ::-1].copy()
+        made.append(
+            RigidSurface(
+                recorded.name, triangles, OBSTACLE_COLOR, vertices, _pose_of(number), opacity, obstacle.is_room
+            )
+        )
+    return made
+
+
+def _pose_of(obstacle: int) -> Callable[[Moment], NDArray[np.float64]]:
+    return lambda moment: moment.poses[obstacle]
+
+
+def _volume(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> float:
+    """Of what a closed surface encloses [m^3]; below zero where its triangles face inwards."""
+    a, b, c = (x[triangles[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
