@@ -37,8 +37,7 @@ from supple.materials.stretch_energies.stretches import (
 )
 from supple.numerics.mat3 import cross, load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
 from supple.numerics.svd3 import svd3 as decompose
-from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.kernel_copies import kernel_with
+from supple.runtime.kernel_cache import kernel_with, njit, prange
 
 volume_term = dispatch("volume_term", [energy.volume_term for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
 STABLE = STRETCH_ENERGIES.index(stable_neo_hookean.FUNCTIONS)

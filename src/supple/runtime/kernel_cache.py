@@ -53,7 +53,7 @@ _COMPILER = (
 logger = logging.getLogger(__name__)
 KERNELS: dict[str, Dispatcher] = {}  # all kernels that are kept on disk, by name
 
-__all__ = ["KERNELS", "KernelCache", "njit", "prange", "read_only"]
+__all__ = ["KERNELS", "KernelCache", "kernel_with", "njit", "prange", "read_only"]
 
 
 def njit(
@@ -127,6 +127,20 @@ def _form(function: FunctionType, form: str) -> FunctionType:
     )
     copy.__qualname__, copy.__module__ = f"{function.__qualname__}_{form}", function.__module__
     copy.__doc__ = function.__doc__
+    return copy
+
+
+def kernel_with(kernel: FunctionType, name: str, **names: Any) -> FunctionType:
+    """A copy of a kernel in which some global names have other values.
+
+    Parameters
+    ----------
+    name : of the copy, after the kernel's own. Numba's cache and the linker of cached kernels distinguish functions by
+        their names only.
+    """
+    copy = FunctionType(kernel.__code__, {**kernel.__globals__, **names}, kernel.__name__, kernel.__defaults__)
+    copy.__qualname__ = f"{kernel.__qualname__}.{name}"
+    copy.__module__ = kernel.__module__
     return copy
 
 

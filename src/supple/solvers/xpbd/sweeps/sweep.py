@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.kernel_copies import kernel_with
+from supple.runtime.kernel_cache import kernel_with, njit, prange
 from supple.solvers.xpbd.sweeps.compilation import FLAGS
 from supple.solvers.xpbd.sweeps.groups import WIDTH, Groups
 
