@@ -28,7 +28,7 @@ def pile():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"thickness": 0.0}, "thickness is 0.0"),
+        ({"thickness": 0.0}, "thickness is 0; it must be above zero"),
         ({"thickness": -1e-3}, "thickness"),
         ({"thickness": float("nan")}, "thickness"),
         ({"thickness": "thin"}, "'thin'"),
