@@ -70,6 +70,7 @@ def _word(end: float) -> str:
 
 
 POSITIVE, NON_NEGATIVE, ANY_NUMBER = Number(above=0.0), Number(least=0.0), Number()
+SHARE = Number(above=0.0, below=1.0)
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,9 @@ class Whole(Form):
         if self.most is not None and value > self.most:
             raise SceneError(f"{what} is {value!r}; give at most {self.most}")
         return int(value)
+
+
+COUNT = Whole(1, 100_000)
 
 
 @dataclass(frozen=True)
@@ -117,15 +121,34 @@ class Flag(Form):
 
 @dataclass(frozen=True)
 class Choice(Form):
-    """One of several words."""
+    """One of several words, or in Python an object of the class `instead`."""
 
     words: tuple[str, ...]
+    instead: type | None = None
 
-    def checked(self, value: Any, what: str) -> str:
-        if value not in self.words:
+    def checked(self, value: Any, what: str) -> Any:
+        if self.instead is not None and isinstance(value, self.instead):
+            return value
+        if not isinstance(value, str) or value not in self.words:
             *others, last = map(repr, self.words)
             raise SceneError(f"{what} is {value!r}; give {', '.join(others)} or {last}")
         return value
+
+
+@dataclass(frozen=True)
+class Or(Form):
+    """A value of a form, or one word."""
+
+    form: Form
+    word: str
+
+    def checked(self, value: Any, what: str) -> Any:
+        if isinstance(value, str) and value == self.word:
+            return value
+        try:
+            return self.form.checked(value, what)
+        except SceneError as error:
+            raise SceneError(f"{error}, or {self.word!r}") from None
 
 
 @dataclass(frozen=True)
@@ -206,14 +229,12 @@ class OneOf(Form):
     Attributes
     ----------
     classes : all of them; give : the remedy where the object is of another one
-    also : words that stand for themselves
     """
 
     classes: Sequence[type]
     give: str
-    also: tuple[str, ...] = ()
 
     def checked(self, value: Any, what: str) -> Any:
-        if value not in self.also and not isinstance(value, tuple(self.classes)):
+        if not isinstance(value, tuple(self.classes)):
             raise SceneError(f"{what} is {value!r}; give {self.give}")
         return value

@@ -17,18 +17,24 @@ from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hint
 
 import numpy as np
 
-from supple.errors import SceneError
+from supple.errors import SceneError, SuppleError
 from supple.kinds.descriptions import descriptions
 from supple.kinds.forms import Form, Name
 
 
 @dataclass(frozen=True)
 class Declared:
-    """One field of a kind: its form, its default (`MISSING` where it must be given), and its description."""
+    """One field of a kind.
+
+    Attributes
+    ----------
+    form : how it is checked; default : `MISSING` where it must be given; optional : whether it may be None
+    """
 
     form: Form
     default: Any
     description: str
+    optional: bool
 
 
 @cache
@@ -38,10 +44,12 @@ def declared(kind: type) -> Mapping[str, Declared]:
     for field in fields(kind):
         hint = hints[field.name]
         forms = [one for one in get_args(hint) if isinstance(one, Form)] if get_origin(hint) is Annotated else []
-        if forms:
+        if forms and field.init:
             default = field.default if field.default_factory is MISSING else field.default_factory()
-            default = MISSING if field.name in getattr(kind, "required", ()) else default
-            found[field.name] = Declared(forms[0], default, texts.get(field.name, ""))
+            required = field.name in getattr(kind, "required", ())
+            optional = not required and (default is None or type(None) in get_args(get_args(hint)[0]))
+            default = MISSING if required else default
+            found[field.name] = Declared(forms[0], default, texts.get(field.name, ""), optional)
     return found
 
 
@@ -52,25 +60,29 @@ class Kind:
     ----------
     kind : the value of `kind` in scene files; title : what it is called in messages, where that is another word
     required : fields that have a default only because those of a base class come before them
-    exactly_one : fields of which exactly one must be given
+    exactly_one : fields of which exactly one must be given; error : what is raised for a wrong value
     """
 
     kind: ClassVar[str]
     title: ClassVar[str] = ""
     required: ClassVar[tuple[str, ...]] = ()
     exactly_one: ClassVar[tuple[str, ...]] = ()
+    error: ClassVar[type[SuppleError]] = SceneError
 
     def __post_init__(self) -> None:
         all_declared = declared(type(self))
         for of_names in (True, False):
             for key, one in all_declared.items():
                 value = getattr(self, key)
-                if isinstance(one.form, Name) != of_names or (value is None and one.default is None):
+                if isinstance(one.form, Name) != of_names or (value is None and one.optional):
                     continue
                 if value is None and key in self.required:
                     raise SceneError(f"{self.label}: there is no {key}; give {key}=..., {one.description}")
                 what = (self.word if key == "name" else f"{self.word}: {key}") if of_names else f"{self.label}: {key}"
-                object.__setattr__(self, key, one.form.checked(value, what))
+                try:
+                    object.__setattr__(self, key, one.form.checked(value, what))
+                except SceneError as error:
+                    raise self.error(str(error)) from None
         if self.exactly_one:
             given = [key for key in self.exactly_one if getattr(self, key) is not None]
             if len(given) != 1:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Any
 
+from supple.errors import SolverError
+from supple.kinds.kind import Kind
 from supple.model.state import SolverDetails, State, StepReport
 from supple.model.system import System
 from supple.scene.scene import Scene
@@ -14,8 +16,15 @@ from supple.scene.scene import Scene
 _BYTES_PER_TET = 2000
 
 
-class Solver(ABC):
+class Solver(Kind, ABC):
     """An immutable description of a method and its parameters; what changes is in the State and the workspace."""
+
+    error = SolverError
+
+    @property
+    def label(self) -> str:
+        """The name of the solver in messages."""
+        return type(self).__name__
 
     def bytes_needed(self, scene: Scene) -> int:
         """Estimate of the memory that a simulation takes beyond that of the program itself [bytes].

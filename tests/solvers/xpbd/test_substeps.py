@@ -110,7 +110,7 @@ def test_a_state_without_memory_can_be_continued():
     [
         ({"substeps": "many"}, "substeps is 'many'; give a whole number of one or more, or 'auto'"),
         ({"max_substeps": 0}, "max_substeps is 0"),
-        ({"accuracy": 0.0}, "accuracy is 0.0; give a number above 0 and below 1"),
+        ({"accuracy": 0.0}, "accuracy is 0; it must be above zero and below 1"),
         ({"accuracy": True}, "accuracy is True"),
     ],
 )

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
 from supple.app.scene_file.entries import spelling as spelling  # registers how values are written
 from supple.app.scene_file.entries.bodies import BodyModel
 from supple.app.scene_file.entries.kinds import KindModel, entry_of
-from supple.app.scene_file.entries.solvers import SolverModel, XPBDModel
+from supple.app.scene_file.entries.solvers import SOLVERS, model_of_kind
 from supple.app.scene_file.fraction import number_or_fraction
 from supple.app.scene_file.model import Model, Vector
 from supple.kinds.kind import Kind
@@ -93,7 +93,7 @@ class _SceneFileModel(Model):
     supple: Literal[1] = Field(default=1, description="version of this format")
     bodies: list[BodyModel] = Field(min_length=1, max_length=10_000)
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
-    solver: SolverModel = Field(default_factory=lambda: XPBDModel(kind="xpbd"))
+    solver: KindModel
     dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s], or a fraction such as 1/60")
     steps: int = Field(default=300, ge=0, le=MAX_STEPS, description="number of frames")
     output: OutputModel = Field(default_factory=OutputModel)
@@ -109,8 +109,14 @@ else:
     _LISTS = {
         key: (list[entry_of(kinds)], Field(default=[], max_length=10_000)) for key, kinds in KINDS_OF_LISTS.items()
     }
+    _SOLVER = entry_of(SOLVERS), Field(default_factory=lambda: model_of_kind("xpbd"))
     SceneFileModel = create_model(
-        "SceneFileModel", __base__=_SceneFileModel, __doc__=_SceneFileModel.__doc__, __module__=__name__, **_LISTS
+        "SceneFileModel",
+        __base__=_SceneFileModel,
+        __doc__=_SceneFileModel.__doc__,
+        __module__=__name__,
+        solver=_SOLVER,
+        **_LISTS,
     )
 
 

@@ -140,7 +140,7 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
             parts[key] = built(model.entries(key), meshes)
     parts["joints"] = with_shared_inputs(parts["joints"])
     with at("solver"):
-        solver = model.solver.build()
+        solver = built(model.solver, meshes)
     with at():
         scene = Scene(list(bodies.values()), gravity=model.gravity, **parts)
         # The pairs are found here, where an error's place in the file is known; the scene caches them.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from supple.errors import SolverError
+from supple.kinds.forms import COUNT, POSITIVE, SHARE, Choice, Number, OneOf
 from supple.materials.flows.internal import checked
 from supple.materials.per_tet import NO_REGION
 from supple.model.actuator_readings import actuator_fields, start_of
@@ -37,7 +38,7 @@ from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.linear_solver import LinearSolver
 from supple.solvers.implicit.newton.trace import NewtonRow
-from supple.solvers.implicit.stepping.integrators import Integrator, Static, integrator_of
+from supple.solvers.implicit.stepping.integrators import INTEGRATORS, Integrator, Static, integrator_of
 from supple.solvers.implicit.stepping.reactions import reaction_forces, weld_forces
 from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors
 from supple.solvers.implicit.stepping.substep import StepSettings, Substep, take_substep
@@ -47,9 +48,6 @@ from supple.solvers.implicit.timings import PARTS
 from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)
-
-_LINEAR_SOLVERS = ("auto", "pcg", "direct")
-
 
 # Measured on cubes: 2900 bytes per tet, and 5800 more for one in patches; for a factorization 870 bytes times the
 # number of vertices to the power 4/3, as the factor of a solid body grows. The margin is for contact.
@@ -90,39 +88,20 @@ class Implicit(Solver):
     Source: Li, Jiang, Luo, "Physics-Based Simulation", chapters 2 to 4 and 23.
     """
 
-    integrator: str | Integrator = "backward_euler"
-    tolerance: float | None = None
-    force_tolerance: float = 1e-4
-    max_iterations: int = 120
-    linear_solver: str = "auto"
-    max_substeps: int = 64
-    path_tolerance: float = 0.05
-    volume_kept: float = KEEP
-    barrier_onset: float = 0.1
-    contact: IPCContact | None = field(default_factory=IPCContact)
+    kind: ClassVar[str] = "implicit"
 
-    def __post_init__(self) -> None:
-        integrator_of(self.integrator)
-        for key, limit, wanted in (
-            ("tolerance", np.inf, "a finite number above zero"),
-            ("force_tolerance", 1.0, "a share above 0 and below 1"),
-            ("path_tolerance", np.inf, "a finite number above zero"),
-            ("volume_kept", 1.0, "a share above 0 and below 1"),
-            ("barrier_onset", np.nextafter(1.0, 2.0), "a number above 0 and at most 1"),
-        ):
-            value: Any = getattr(self, key)
-            if value is None and key == "tolerance":
-                continue
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0.0 < value < limit:
-                raise SolverError(f"Implicit: {key} is {value!r}; give {wanted}")
-        for key in ("max_iterations", "max_substeps"):
-            value = getattr(self, key)
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-                raise SolverError(f"Implicit: {key} is {value!r}; give a whole number of one or more")
-        if self.linear_solver not in _LINEAR_SOLVERS:
-            raise SolverError(
-                f"Implicit: there is no linear_solver {self.linear_solver!r}; there are 'auto', 'pcg' and 'direct'"
-            )
+    integrator: Annotated[str | Integrator, Choice(tuple(INTEGRATORS), Integrator)] = "backward_euler"
+    tolerance: Annotated[float | None, POSITIVE] = None
+    force_tolerance: Annotated[float, SHARE] = 1e-4
+    max_iterations: Annotated[int, COUNT] = 120
+    linear_solver: Annotated[str, Choice(("auto", "pcg", "direct"))] = "auto"
+    max_substeps: Annotated[int, COUNT] = 64
+    path_tolerance: Annotated[float, POSITIVE] = 0.05
+    volume_kept: Annotated[float, SHARE] = KEEP
+    barrier_onset: Annotated[float, Number(above=0.0, most=1.0)] = 0.1
+    contact: Annotated[IPCContact | None, OneOf((IPCContact,), "IPCContact(...), or None to turn it off")] = field(
+        default_factory=IPCContact
+    )
 
     def bytes_needed(self, scene: Scene) -> int:
         """Estimate of the memory that a simulation takes beyond that of the program itself [bytes]."""

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from supple.errors import SolverError
 from supple.model.system import System
 from supple.solvers.xpbd.sweeps.ordering import Layout
@@ -27,17 +23,6 @@ def refuse_unsupported(system: System) -> None:
             f"XPBD: body {quadratic[0]!r} has quadratic tets; simulate it with Implicit, or give linear tets: "
             "mesh.to_order(1)"
         )
-
-
-def is_number(value: object) -> bool:
-    """Whether a value is a finite number."""
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def check_count(name: str, value: object, otherwise: str = "") -> None:
-    """Raise `SolverError` where a value is no whole number of one or more."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more{otherwise}")
 
 
 def lost_position_message(system: System, layout: Layout, vertex: int, time: float) -> str:

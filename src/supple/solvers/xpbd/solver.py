@@ -6,13 +6,14 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, ClassVar, Literal
 
 import numba
 import numpy as np
 from numba.core import config
 
 from supple.errors import SolverError
+from supple.kinds.forms import COUNT, POSITIVE, SHARE, Choice, Flag, OneOf, Or
 from supple.model.actuator_readings import actuator_fields, start_of
 from supple.model.energy_balance import no_works
 from supple.model.joints.at_state import refuse_moved_welds
@@ -42,7 +43,7 @@ from supple.solvers.xpbd.limits.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.limits.volume_guard import VolumeGuard
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.momentum import MomentumRestore
-from supple.solvers.xpbd.refusals import check_count, is_number, lost_position_message, refuse_unsupported
+from supple.solvers.xpbd.refusals import lost_position_message, refuse_unsupported
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection
 from supple.solvers.xpbd.sleep import Sleep
@@ -86,38 +87,26 @@ class XPBD(Solver):
     SolverError : where a value is of the wrong kind or out of range.
     """
 
-    substeps: int | Literal["auto"] = "auto"
-    momentum_restore: bool = True
-    contact: XPBDContact | None = field(default_factory=XPBDContact)
-    threads: int | None = None
-    accuracy: float = 0.02
-    max_substeps: int = 1000
-    start: Literal["refuse", "push_out"] = "refuse"
-    sleep_after: float | None = 0.5
+    kind: ClassVar[str] = "xpbd"
+
+    substeps: Annotated[int | Literal["auto"], Or(COUNT, "auto")] = "auto"
+    momentum_restore: Annotated[bool, Flag()] = True
+    contact: Annotated[XPBDContact | None, OneOf((XPBDContact,), "XPBDContact(...), or None to turn it off")] = field(
+        default_factory=XPBDContact
+    )
+    threads: Annotated[int | None, COUNT] = None
+    accuracy: Annotated[float, SHARE] = 0.02
+    max_substeps: Annotated[int, COUNT] = 1000
+    start: Annotated[Literal["refuse", "push_out"], Choice(("refuse", "push_out"))] = "refuse"
+    sleep_after: Annotated[float | None, POSITIVE] = 0.5
 
     def __post_init__(self) -> None:
-        if self.substeps != "auto":
-            check_count("substeps", self.substeps, ", or 'auto'")
-        check_count("max_substeps", self.max_substeps)
-        if self.start not in ("refuse", "push_out"):
-            raise SolverError(f"XPBD: start is {self.start!r}; give 'refuse' or 'push_out'")
-        if not isinstance(self.momentum_restore, bool):
-            raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
-        if self.contact is not None and not isinstance(self.contact, XPBDContact):
-            raise SolverError(f"XPBD: contact is {self.contact!r}; give XPBDContact(...), or None to turn it off")
-        if not is_number(self.accuracy) or not 0.0 < self.accuracy < 1.0:
-            raise SolverError(f"XPBD: accuracy is {self.accuracy!r}; give a number above 0 and below 1, such as 0.02")
-        if self.sleep_after is not None and not (is_number(self.sleep_after) and self.sleep_after > 0.0):
+        super().__post_init__()
+        if self.threads is not None and self.threads > _MOST_THREADS:
             raise SolverError(
-                f"XPBD: sleep_after is {self.sleep_after!r}; give a time above zero [s], or None to keep all awake"
+                f"XPBD: threads is {self.threads}; this process has {_MOST_THREADS}"
+                " (set NUMBA_NUM_THREADS before it starts for more)"
             )
-        if self.threads is not None:
-            check_count("threads", self.threads)
-            if self.threads > _MOST_THREADS:
-                raise SolverError(
-                    f"XPBD: threads is {self.threads}; this process has {_MOST_THREADS}"
-                    " (set NUMBA_NUM_THREADS before it starts for more)"
-                )
 
     def prepare(self, system: System) -> XPBDWorkspace:
         """Number the vertices, sort the constraints into chunks, and compute their constants.
@@ -136,10 +125,11 @@ class XPBD(Solver):
         extended[: len(system.masses), 3] = inner.inverse_masses
         sets = [*build_constraint_sets(inner, layout), *stitch_constraints(inner, extended[:, 3])]
         threads = self.threads or numba.get_num_threads()
-        collisions = Collisions(inner, self.contact)
+        work = sum(made.work for made in sets)
+        with numba_threads(self.threads or (None if work >= PARALLEL_FROM else 1)):
+            collisions = Collisions(inner, self.contact)
         rigid = RigidBodies(inner)
-        work = sum(made.work for made in sets) + RIGID_POINT * collisions.rigid_points
-        large = work >= PARALLEL_FROM
+        large = work + RIGID_POINT * collisions.rigid_points >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
         with numba_threads(self.threads or (None if large else 1)):
             assessment = Assessment(inner, self.contact, collisions.edge_length)

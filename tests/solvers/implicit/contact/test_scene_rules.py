@@ -25,10 +25,10 @@ def run(scene, dt, steps, solver=None, **start):
 @pytest.mark.parametrize(
     ("given", "complaint"),
     [
-        ({"dhat": 0.0}, "dhat is 0.0"),
+        ({"dhat": 0.0}, "dhat is 0; it must be above zero"),
         ({"dhat": "1"}, "dhat is '1'"),
         ({"dhat": float("nan")}, "dhat is nan"),
-        ({"stiffness": -1.0}, "stiffness is -1.0"),
+        ({"stiffness": -1.0}, "stiffness is -1; it must be above zero, or .adaptive."),
         ({"stiffness": "stiff"}, "stiffness is 'stiff'"),
         ({"friction_velocity": float("inf")}, "friction_velocity is inf"),
         ({"friction_velocity": True}, "friction_velocity is True"),

@@ -198,16 +198,16 @@ def test_a_body_that_has_recovered_is_guarded_from_then_on():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"integrator": "euler"}, "there is no integrator 'euler'"),
-        ({"tolerance": 0.0}, "tolerance is 0.0"),
+        ({"integrator": "euler"}, "integrator is 'euler'; give 'backward_euler'"),
+        ({"tolerance": 0.0}, "tolerance is 0; it must be above zero"),
         ({"tolerance": float("nan")}, "tolerance is nan"),
         ({"max_iterations": 0}, "max_iterations is 0"),
         ({"max_substeps": 1.5}, "max_substeps is 1.5"),
-        ({"linear_solver": "lu"}, "there is no linear_solver 'lu'"),
-        ({"force_tolerance": 1.0}, "force_tolerance is 1.0; give a share above 0 and below 1"),
-        ({"path_tolerance": 0}, "path_tolerance is 0; give a finite number above zero"),
-        ({"volume_kept": 0.0}, "volume_kept is 0.0; give a share above 0 and below 1"),
-        ({"barrier_onset": 1.1}, "barrier_onset is 1.1; give a number above 0 and at most 1"),
+        ({"linear_solver": "lu"}, "linear_solver is 'lu'; give 'auto', 'pcg' or 'direct'"),
+        ({"force_tolerance": 1.0}, "force_tolerance is 1; it must be above zero and below 1"),
+        ({"path_tolerance": 0}, "path_tolerance is 0; it must be above zero"),
+        ({"volume_kept": 0.0}, "volume_kept is 0; it must be above zero and below 1"),
+        ({"barrier_onset": 1.1}, "barrier_onset is 1.1; it must be above zero and at most 1"),
         ({"barrier_onset": "low"}, "barrier_onset is 'low'"),
     ],
 )

@@ -77,7 +77,8 @@ def model_of(kind: type[Kind], tagged: bool) -> type[KindModel]:
                 keys[key] = (spelled, Field(description=description))
                 continue
             default = None if len(own) > 1 else _default(one.default)
-            spelled = spelled | None if default is None else spelled
+            optional = default is None or one.optional
+            spelled = spelled | None if optional else spelled
             keys[key] = (spelled, Field(default=default, description=description))
         if len(own) > 1:
             choices.append(tuple(own))

@@ -126,8 +126,12 @@ def _(form: forms.ListOf) -> Any:
 
 @spelled.register
 def _(form: forms.OneOf) -> Any:
-    entry = entry_of(form.classes)
-    return entry | Literal[form.also] if form.also else entry
+    return entry_of(form.classes)
+
+
+@spelled.register
+def _(form: forms.Or) -> Any:
+    return spelled(form.form) | Literal[form.word]
 
 
 @spelled.register

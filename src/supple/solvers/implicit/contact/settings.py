@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from typing import Annotated, ClassVar
 
 from supple.errors import SolverError
+from supple.kinds.forms import COUNT, POSITIVE, Or
+from supple.kinds.kind import Kind
 
 
 @dataclass(frozen=True)
-class IPCContact:
+class IPCContact(Kind):
     """Incremental potential contact. All defaults scale with the scene.
 
     Parameters
@@ -33,29 +33,11 @@ class IPCContact:
     (2020), sections 3 to 5.
     """
 
-    dhat: float | None = None
-    stiffness: float | str = "adaptive"
-    friction_velocity: float | None = None
-    friction_iterations: int | None = None
+    kind: ClassVar[str] = "ipc_contact"
+    title: ClassVar[str] = "IPCContact"
+    error = SolverError
 
-    def __post_init__(self) -> None:
-        for key, unit in (("dhat", "m"), ("friction_velocity", "m/s")):
-            if getattr(self, key) is not None:
-                object.__setattr__(self, key, _positive(getattr(self, key), f"{key}", f"above zero [{unit}], or None"))
-        if self.stiffness != "adaptive":
-            object.__setattr__(
-                self, "stiffness", _positive(self.stiffness, "stiffness", 'above zero [Pa], or "adaptive"')
-            )
-        count = self.friction_iterations
-        whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
-        if count is not None and not (whole and count >= 1):
-            raise SolverError(
-                f"IPCContact: friction_iterations is {count!r}; give a whole number of one or more, or None"
-            )
-
-
-def _positive(value: Any, key: str, wanted: str) -> float:
-    number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-    if not number or not np.isfinite(value) or value <= 0.0:
-        raise SolverError(f"IPCContact: {key} is {value!r}; it must be finite and {wanted}")
-    return float(value)
+    dhat: Annotated[float | None, POSITIVE] = None
+    stiffness: Annotated[float | str, Or(POSITIVE, "adaptive")] = "adaptive"
+    friction_velocity: Annotated[float | None, POSITIVE] = None
+    friction_iterations: Annotated[int | None, COUNT] = None

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import numpy as np
+from typing import Annotated, ClassVar
 
 from supple.errors import SolverError
+from supple.kinds.forms import POSITIVE, Flag
+from supple.kinds.kind import Kind
 
 
 @dataclass(frozen=True)
-class XPBDContact:
+class XPBDContact(Kind):
     """Contact of surfaces in XPBD. Obstacles always act.
 
     Parameters
@@ -25,18 +26,10 @@ class XPBDContact:
     SolverError : where a value is of the wrong kind or out of range.
     """
 
-    thickness: float | None = None
-    body_collision: bool = True
-    self_collision: bool = True
+    kind: ClassVar[str] = "xpbd_contact"
+    title: ClassVar[str] = "XPBDContact"
+    error = SolverError
 
-    def __post_init__(self) -> None:
-        if self.thickness is not None:
-            number = isinstance(self.thickness, (int, float, np.number)) and not isinstance(self.thickness, bool)
-            if not number or not np.isfinite(self.thickness) or self.thickness <= 0.0:
-                raise SolverError(
-                    f"XPBDContact: thickness is {self.thickness!r}; it must be finite and above zero [m], or None"
-                )
-            object.__setattr__(self, "thickness", float(self.thickness))
-        for key in ("body_collision", "self_collision"):
-            if not isinstance(getattr(self, key), bool):
-                raise SolverError(f"XPBDContact: {key} is {getattr(self, key)!r}; give True or False")
+    thickness: Annotated[float | None, POSITIVE] = None
+    body_collision: Annotated[bool, Flag()] = True
+    self_collision: Annotated[bool, Flag()] = True
