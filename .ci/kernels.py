@@ -1,6 +1,6 @@
-"""The kernels of the standard scenes: `python .ci/kernels.py` (`make kernels`).
+"""The kernels of what users run first: `python .ci/kernels.py` (`make kernels`).
 
-Runs each scene in a process of its own, and writes the list of its kernels (`supple/runtime/kernels.json`). Then
+Runs each program in a process of its own, and writes the list of its kernels (`supple/runtime/kernels.json`). Then
 compiles them for a processor that most machines have, to `build/kernels`, from where `make dist` packs them. With
 `--list`, only the list is written.
 """
@@ -10,11 +10,15 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
+import shlex
 import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import chdir, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[1]
 KERNELS = ROOT / "build" / "kernels"
@@ -39,11 +43,31 @@ def environment(cache: Path) -> dict[str, str]:
     return {**os.environ, **chosen}
 
 
+def programs() -> dict[str, str]:
+    """What users run first: README's program with both solvers, the demos of `make demo`, and the tutorial."""
+    block = re.compile(r"^```(python|sh)\n(.*?)^```", re.S | re.M)
+    blocks = block.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+    snippet = next(code for kind, code in blocks if kind == "python")
+    implicit = snippet.replace("sp.XPBD()", "sp.Implicit()")
+    assert implicit != snippet
+    tutorial = block.findall((ROOT / "docs" / "learn" / "tutorial.md").read_text(encoding="utf-8"))
+    demos = {
+        name: _in_the_shell(f"supple demo {name} --output {name} --no-page --no-plot") for name in ("squash", "bears")
+    }
+    text = "\n".join(code if kind == "python" else _in_the_shell(code) for kind, code in tutorial)
+    return {"snippet": snippet, "implicit": implicit, **demos, "tutorial": text}
+
+
+def _in_the_shell(lines: str) -> str:
+    """Python code that runs lines of the shell."""
+    commands = [shlex.split(line, comments=True)[1:] for line in lines.splitlines()]
+    return "from supple.app.cli.app import main\n" + "\n".join(f"assert main({command}) == 0" for command in commands)
+
+
 def kernels_of(name: str) -> list[tuple[str, list]]:
-    """Run a standard scene in this process; the kernels that it used and their signatures."""
-    from supple.app.demos.standard_scenes import STANDARD_SCENES
-    from supple.runtime.kernel_cache import WATCHERS
+    """Run a program in this process; the kernels that it used and their signatures."""
     from supple.runtime.kernel_list import as_json
+    from supple.runtime.kernel_watchers import WATCHERS
 
     used = {}
 
@@ -55,13 +79,14 @@ def kernels_of(name: str) -> list[tuple[str, list]]:
                 print(f"{kernel}: {error}", file=sys.stderr)
 
     WATCHERS.append(note)
-    STANDARD_SCENES[name]()
+    code = programs()[name]
+    with TemporaryDirectory() as folder, chdir(folder), redirect_stdout(sys.stderr):
+        exec(compile(code, name, "exec"), {"__name__": name})
     return list(used.values())
 
 
 def kernels_of_all(environment: dict[str, str]) -> dict[str, list]:
-    """The kernels of each standard scene, from processes that run in an environment."""
-    from supple.app.demos.standard_scenes import STANDARD_SCENES
+    """The kernels of each program, from processes that run in an environment."""
 
     def kernels(name: str) -> list:
         command = [sys.executable, __file__, name]
@@ -69,11 +94,11 @@ def kernels_of_all(environment: dict[str, str]) -> dict[str, list]:
         return json.loads(done.stdout.splitlines()[-1])
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return dict(zip(STANDARD_SCENES, pool.map(kernels, STANDARD_SCENES), strict=True))
+        return dict(zip(programs(), pool.map(kernels, programs()), strict=True))
 
 
 def pack() -> None:
-    """Compile the kernels of the list, and what the scenes need besides them, for `target`."""
+    """Compile the kernels of the list, and what the programs need besides them, for `target`."""
     from llvmlite.binding import get_process_triple
 
     from supple.runtime.kernel_folder import TARGET

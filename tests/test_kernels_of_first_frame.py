@@ -20,7 +20,7 @@ for kernel in gc.get_objects():
         for _ in kernel.signatures:
             print(f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}")
 """
-MOST = 50
+MOST = 40
 
 
 def test_kernels_of_the_first_frame_of_a_small_scene():

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from supple.errors import MeshingError
-from supple.mesh.meshing.child_process import A_DAY, PREFIX
+from supple.mesh.io.in_child import PREFIX
+from supple.mesh.meshing.child_process import A_DAY
 from supple.mesh.meshing.tetrahedralize import tetrahedralize
 from supple.mesh.primitives.surfaces import sphere_surface
 from supple.mesh.surface import SurfaceMesh

@@ -11,7 +11,7 @@ import pytest
 
 from supple.runtime import parallel_kernel
 from supple.runtime.kernel_cache import ROWS, njit, prange
-from supple.runtime.threads import numba_threads
+from supple.runtime.threads import numba_threads, one_thread
 
 
 @njit(parallel=True)
@@ -52,12 +52,14 @@ def test_which_form_is_called(monkeypatch):
     squares(large, large)
     with numba_threads(1):
         squares(large, large)
+    with one_thread():  # the form stays, so that it is not compiled again
+        squares(large, large)
     with parallel_kernel._threads.lock:  # another Python thread is in a parallel kernel
         squares(large, large)
     squares(2, (large[1:], (large, 1.0)))
     squares(large[1:], (large[1:], 1.0))  # too few rows
     usual = "parallel" if numba.get_num_threads() > 1 else "serial"
-    assert called == [usual, "serial", "serial", usual, "serial"]
+    assert called == [usual, "serial", "parallel", "serial", usual, "serial"]
 
 
 def test_the_lock_is_released_after_an_error(monkeypatch):

@@ -7,7 +7,7 @@ from supple.numerics.bernstein import determinant_coefficients, positive_element
 from supple.numerics.quadratic_noninverting_step import noninverting_step
 from supple.numerics.quadratic_shape_functions import NODE_COORDINATES, reference_gradients
 from supple.results.check.geometry import quadratic_tets as of_check
-from supple.runtime.threads import one_thread
+from supple.runtime.threads import numba_threads
 
 KEEP = 0.2
 NODES = np.arange(10, dtype=np.int32)[None]
@@ -31,7 +31,7 @@ def elements(count, noise, seed=0):
 
 
 def step(x, p, keep=KEEP, whole=False):
-    with one_thread(True):
+    with numba_threads(1):
         return noninverting_step(*map(np.ascontiguousarray, (x, p)), NODES, GUARDED, np.array([whole]), keep)[0]
 
 

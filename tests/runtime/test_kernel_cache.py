@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numba
 import numpy as np
@@ -17,11 +18,12 @@ from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
 import supple
-from supple.runtime import kernel_folder
+from supple.materials.isotropic import KernelOfKinds
+from supple.runtime import inner_function, kernel_cache, kernel_folder
 from supple.runtime.kernel_cache import KernelCache, njit
 from supple.runtime.kernel_folder import TARGET, note_use, read, write
 from supple.runtime.parallel_kernel import ParallelKernel
-from supple.runtime.reached_code import reached_code
+from supple.runtime.reached_code import code_of_module, reached_code
 
 SOURCES = Path(supple.__file__).parent
 # Prints the result of a kernel of svd3.py, and how often the cache had it.
@@ -191,7 +193,8 @@ def test_every_cached_kernel_of_the_package_uses_this_cache():
         if module.name.endswith("__main__"):
             continue
         for value in vars(importlib.import_module(module.name)).values():
-            for kernel in value if isinstance(value, tuple) else (value,):
+            kernels_of = value.of.values() if isinstance(value, KernelOfKinds) else (value,)
+            for kernel in value if isinstance(value, tuple) else kernels_of:
                 for form in kernel.forms if isinstance(kernel, ParallelKernel) else (kernel,):
                     if isinstance(form, Dispatcher) and not isinstance(form._cache, NullCache):
                         assert isinstance(form._cache, KernelCache), form
@@ -229,6 +232,27 @@ def test_what_the_digest_depends_on():
     assert reached_code(kernel_with(fastmath={"nsz", "arcp"})) == reached_code(kernel_with(fastmath={"arcp", "nsz"}))
 
 
+def test_the_name_of_an_entry_depends_on_the_options_of_the_kernel_and_on_how_it_is_compiled():
+    outer = kernel_with()
+    plain, other = njit(cache=True)(outer)._cache, njit(cache=True, error_model="python")(outer)._cache
+    target = ("triple", "processor", "")
+    assert plain._entry((), target) == njit(cache=True)(outer)._cache._entry((), target)
+    assert plain._entry((), target) != other._entry((), target)
+    assert plain._entry((), target) != plain._entry((), ("triple", "processor", "+avx"))
+    source = Path(inner_function.__file__).read_text(encoding="utf-8")
+
+    def digest(text):
+        module = ModuleType("pipeline")
+        exec(compile(text, "pipeline.py", "exec"), vars(module))
+        return code_of_module(module)
+
+    assert digest(source) == digest(f"# A comment.\n\n{source}")
+    changed = source.replace("gc.disable()", "gc.enable()")
+    assert changed != source
+    assert digest(changed) != digest(source)
+    assert digest("class A:\n    B = 1") != digest("class A:\n    B = 2")
+
+
 def test_names_of_a_module_and_constants_count(monkeypatch):
     from supple.numerics import mat3
     from supple.solvers.xpbd import integration
@@ -252,6 +276,17 @@ def doubled(x):
 @njit(cache=True)
 def doubled_twice(x):
     return doubled(doubled(x))
+
+
+def test_the_log_says_that_kernels_are_compiled_and_not_that_they_are_loaded(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(kernel_folder, "kernel_folder", lambda: tmp_path)
+    caplog.set_level("INFO", "supple")
+    kernel_cache._announce.cache_clear()
+    for announced in (True, False):  # the second kernel is loaded
+        assert njit(cache=True)(doubled_twice.py_func)(1.5) == 6.0
+        assert [record.message.startswith("compiling kernels") for record in caplog.records] == [True] * announced
+        caplog.clear()
+        kernel_cache._announce.cache_clear()
 
 
 def test_a_function_that_kernels_call_can_be_called_from_python_too():

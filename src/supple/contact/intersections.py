@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.contact_mesh import ContactMesh
 from supple.numerics.geometry.triangle_crossings import crossing_triangles
+from supple.runtime.kernel_cache import ROWS
+from supple.runtime.threads import threads_for
 
 
 def intersects(mesh: ContactMesh, points: NDArray[np.float64]) -> bool:
@@ -16,4 +18,5 @@ def intersects(mesh: ContactMesh, points: NDArray[np.float64]) -> bool:
     """
     owner = mesh.owner[mesh.triangles[:, 0]]
     ignored = None if mesh.stitched is None else mesh.stitched.crossing
-    return len(crossing_triangles(points, mesh.triangles, owner, mesh.collide, 1, ignored)[0]) > 0
+    with threads_for(len(mesh.triangles), ROWS):
+        return len(crossing_triangles(points, mesh.triangles, owner, mesh.collide, 1, ignored)[0]) > 0

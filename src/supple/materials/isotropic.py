@@ -19,43 +19,58 @@ Sources: Stomakhin et al., "Energetically Consistent Invertible Elasticity" (201
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from types import FunctionType
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.kinds import STRETCH_ENERGIES
-from supple.materials.per_tet import BY_LAW, TetMaterial
+from supple.materials.per_tet import BY_LAW, UNKNOWN, TetMaterial
 from supple.materials.stretch_energies import stable_neo_hookean
 from supple.materials.stretch_energies.stretches import (
-    UNKNOWN_ONE,
-    UNKNOWN_SIX,
+    NOTHING_KNOWN,
     UNKNOWN_THREE,
     dispatch,
     shape_and_volume,
 )
 from supple.numerics.mat3 import cross, load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
 from supple.numerics.svd3 import svd3 as decompose
-from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import kernel_with, njit, prange
 
-density = dispatch("density", [energy.density for energy in STRETCH_ENERGIES], UNKNOWN_ONE)
-gradient = dispatch("gradient", [energy.gradient for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
-curvature = dispatch("curvature", [energy.curvature for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
-quotients = dispatch("quotients", [energy.quotients for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
 volume_term = dispatch("volume_term", [energy.volume_term for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
 STABLE = STRETCH_ENERGIES.index(stable_neo_hookean.FUNCTIONS)
-_OF_STRETCHES = np.array([energy.density_of_stretches for energy in STRETCH_ENERGIES])
+
+if TYPE_CHECKING:  # `functions_of` gives these names to each copy of the functions below
+    KIND, OF_STRETCHES = 0, False
+
+    def density(F, s, mu, lam): ...
+
+    def gradient(s, mu, lam): ...
+
+    def curvature(s, mu, lam): ...
+
+    def quotients(s, mu, lam): ...
+
+    def energy_density(F, mu, lam): ...
+
+    def stress(U, s, V, mu, lam): ...
+
+    def principal_hessian(s, mu, lam, project): ...
 
 
-@njit(error_model="numpy")
-def energy_density(F, kind, mu, lam):
+def _energy_density(F, mu, lam):
     """psi of one F."""
-    s = decompose(F)[1] if _OF_STRETCHES[kind] else (0.0, 0.0, 0.0)
-    return density(kind, F, s, mu, lam)
+    s = (0.0, 0.0, 0.0)
+    if OF_STRETCHES:
+        s = decompose(F)[1]
+    return density(F, s, mu, lam)
 
 
-@njit(error_model="numpy")
-def stress(U, s, V, kind, mu, lam):
+def _stress(U, s, V, mu, lam):
     """P = U diag(psi_i) V^T, nine numbers, for F = U diag(s) V^T."""
-    p = gradient(kind, s, mu, lam)
+    p = gradient(s, mu, lam)
     Up = (
         U[0] * p[0],
         U[1] * p[1],
@@ -90,15 +105,6 @@ def stable_piola(F, mu, lam):
 
 
 @njit(error_model="numpy")
-def first_piola(F, kind, mu, lam):
-    """P of one F, nine numbers."""
-    if kind == STABLE:
-        return stable_piola(F, mu, lam)
-    U, s, V = decompose(F)
-    return stress(U, s, V, kind, mu, lam)
-
-
-@njit(error_model="numpy")
 def nearest_semidefinite(A):
     """A symmetric 3x3 matrix (a00, a11, a22, a12, a02, a01) with its negative eigenvalues set to zero."""
     a00, a11, a22, a12, a02, a01 = A
@@ -120,8 +126,7 @@ def nearest_semidefinite(A):
     )
 
 
-@njit(error_model="numpy")
-def principal_hessian(s, kind, mu, lam, project):
+def _principal_hessian(s, mu, lam, project):
     """The Hessian in the frame of U and V.
 
     Returns
@@ -129,8 +134,8 @@ def principal_hessian(s, kind, mu, lam, project):
     A : psi_ij as (a00, a11, a22, a12, a02, a01)
     alpha, beta : (three numbers each, for the pairs 12, 02, 01)
     """
-    A = curvature(kind, s, mu, lam)
-    q = quotients(kind, s, mu, lam)
+    A = curvature(s, mu, lam)
+    q = quotients(s, mu, lam)
     if project:
         A = nearest_semidefinite(A)
         q = (max(q[0], 0.0), max(q[1], 0.0), max(q[2], 0.0), max(q[3], 0.0), max(q[4], 0.0), max(q[5], 0.0))
@@ -158,27 +163,87 @@ def hessian_block(U, A, alpha, beta, g, h):
     return mat_mul_transposed(mat_mul(U, K), U)
 
 
-@njit(cache=True, error_model="numpy")
+def functions_of(kind: int) -> dict[str, Any]:
+    """The functions of one kind of energy, or of `UNKNOWN` with NaN as all values, by the names that kernels use."""
+    energy = STRETCH_ENERGIES[kind] if kind != UNKNOWN else NOTHING_KNOWN
+    names: dict[str, Any] = {name: getattr(energy, name) for name in ("density", "gradient", "curvature", "quotients")}
+    names |= {"KIND": kind, "OF_STRETCHES": energy.density_of_stretches}
+    for function in (_energy_density, _stress, _principal_hessian):
+        name = function.__name__[1:]
+        names[name] = njit(kernel_with(function, f"of_kind_{kind}", **names))
+    return names
+
+
+_FUNCTIONS = {kind: functions_of(kind) for kind in (UNKNOWN, *range(len(STRETCH_ENERGIES)))}
+
+
+class KernelOfKinds:
+    """A kernel over tets or patches that is compiled for each kind of energy by itself, where a scene has it.
+
+    Parameters
+    ----------
+    kernel : with an argument `kind` (m,); it computes those of which `is_kind(kind[e], KIND)`, with the functions of
+        `functions_of` by their names
+    options : as of `njit`
+    """
+
+    def __init__(self, kernel: FunctionType, **options: Any) -> None:
+        self._place = kernel.__code__.co_varnames.index("kind")
+        self.of = {
+            kind: njit(cache=True, **options)(kernel_with(kernel, f"of_kind_{kind}", **names))
+            for kind, names in _FUNCTIONS.items()
+        }
+
+    def __call__(self, *arguments: Any) -> None:
+        kind = arguments[self._place]
+        if not len(kind):
+            return
+        low, high = int(kind.min()), int(kind.max())
+        for each in [low] if low == high else np.unique(kind).tolist():
+            if each >= 0 or each == low:
+                self.of[max(each, UNKNOWN)](*arguments)
+
+
+def kernel_of_kinds(**options: Any) -> Callable[[FunctionType], KernelOfKinds]:
+    """Decorate a function to make a `KernelOfKinds` of it."""
+    return lambda kernel: KernelOfKinds(kernel, **options)
+
+
+@njit
+def is_kind(given, kind):
+    """Whether a kind is this one; all below zero are `UNKNOWN`."""
+    return given == kind or (given < 0 and kind < 0)
+
+
+@kernel_of_kinds()
 def _rest_moduli(kind, mu, lam, rest_mu, rest_lam):
     for e in range(len(kind)):
-        # psi_ii = lam_L + 2 mu_L, psi_ij = lam_L at s = (1, 1, 1)
-        A = curvature(kind[e], (1.0, 1.0, 1.0), mu[e], lam[e])
-        rest_mu[e] = 0.5 * (A[0] - A[3])
-        rest_lam[e] = A[3]
+        if is_kind(kind[e], KIND):
+            # psi_ii = lam_L + 2 mu_L, psi_ij = lam_L at s = (1, 1, 1)
+            A = curvature((1.0, 1.0, 1.0), mu[e], lam[e])
+            rest_mu[e] = 0.5 * (A[0] - A[3])
+            rest_lam[e] = A[3]
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@kernel_of_kinds(parallel=True)
 def densities(F, kind, mu, lam, out):
     """Energy densities (m,) of F (m, 3, 3), into `out`."""
     for e in prange(len(F)):
-        out[e] = energy_density(load_mat(F, e), kind[e], mu[e], lam[e])
+        if is_kind(kind[e], KIND):
+            out[e] = energy_density(load_mat(F, e), mu[e], lam[e])
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@kernel_of_kinds(parallel=True)
 def piolas(F, kind, mu, lam, out):
     """Stresses (m, 3, 3) of F (m, 3, 3), into `out`."""
     for e in prange(len(F)):
-        store_mat(first_piola(load_mat(F, e), kind[e], mu[e], lam[e]), out, e)
+        if is_kind(kind[e], KIND):
+            if KIND == STABLE:
+                P = stable_piola(load_mat(F, e), mu[e], lam[e])
+            else:
+                U, s, V = decompose(load_mat(F, e))
+                P = stress(U, s, V, mu[e], lam[e])
+            store_mat(P, out, e)
 
 
 @njit(error_model="numpy")
@@ -194,13 +259,14 @@ def store_hessian(U, A, alpha, beta, V, out, e):
                     out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel_of_kinds()
 def hessians(F, kind, mu, lam, project, out):
     """Hessians (m, 9, 9) of F (m, 3, 3), into `out`."""
     for e in range(len(F)):
-        U, s, V = decompose(load_mat(F, e))
-        A, alpha, beta = principal_hessian(s, kind[e], mu[e], lam[e], project)
-        store_hessian(U, A, alpha, beta, V, out, e)
+        if is_kind(kind[e], KIND):
+            U, s, V = decompose(load_mat(F, e))
+            A, alpha, beta = principal_hessian(s, mu[e], lam[e], project)
+            store_hessian(U, A, alpha, beta, V, out, e)
 
 
 def rest_lame_parameters(material: TetMaterial) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

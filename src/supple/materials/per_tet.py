@@ -16,6 +16,7 @@ from supple.errors import SceneError
 
 NOT_ELASTIC = -1
 BY_LAW = -2
+UNKNOWN = -1  # to kernels both are
 NO_REGION = -1
 
 

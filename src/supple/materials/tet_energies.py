@@ -6,20 +6,25 @@ contracted with the shape gradients, block by block (formulas per F: `isotropic.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from supple.materials.isotropic import (
-    STABLE,
-    density,
-    energy_density,
-    hessian_block,
-    principal_hessian,
-    stable_piola,
-    stress,
-)
+from supple.materials.isotropic import STABLE, hessian_block, is_kind, kernel_of_kinds, stable_piola
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.svd3 import svd3 as decompose
 from supple.runtime.kernel_cache import njit, prange
+
+if TYPE_CHECKING:  # of each kind, see `isotropic.functions_of`
+    KIND = 0
+
+    def density(F, s, mu, lam): ...
+
+    def energy_density(F, mu, lam): ...
+
+    def principal_hessian(s, mu, lam, project): ...
+
+    def stress(U, s, V, mu, lam): ...
 
 
 @njit(error_model="numpy")
@@ -122,7 +127,7 @@ def put_hessian(U, A, alpha, beta, V, B, volume, out, e):
     _put_pair(out, e, 3, 3, H33)
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@kernel_of_kinds(parallel=True)
 def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
     """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets from at most one
     decomposition of each F, which takes most of the time.
@@ -134,21 +139,23 @@ def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, ene
     project : see `element_hessians`
     """
     for e in prange(len(tets)):
+        if not is_kind(kind[e], KIND):
+            continue
         F = deformation_gradient(x, tets, Dm_inv, e)
         B = load_mat(Dm_inv, e)
-        if kind[e] == STABLE and not second:
-            energies[e] = volumes[e] * density(STABLE, F, (0.0, 0.0, 0.0), mu[e], lam[e])
+        if KIND == STABLE and not second:
+            energies[e] = volumes[e] * density(F, (0.0, 0.0, 0.0), mu[e], lam[e])
             put_gradient(stable_piola(F, mu[e], lam[e]), B, volumes[e], gradients, e)
             continue
         U, s, V = decompose(F)
-        energies[e] = volumes[e] * density(kind[e], F, s, mu[e], lam[e])
-        put_gradient(stress(U, s, V, kind[e], mu[e], lam[e]), B, volumes[e], gradients, e)
+        energies[e] = volumes[e] * density(F, s, mu[e], lam[e])
+        put_gradient(stress(U, s, V, mu[e], lam[e]), B, volumes[e], gradients, e)
         if second:
-            A, alpha, beta = principal_hessian(s, kind[e], mu[e], lam[e], project)
+            A, alpha, beta = principal_hessian(s, mu[e], lam[e], project)
             put_hessian(U, A, alpha, beta, V, B, volumes[e], hessians, e)
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@kernel_of_kinds(parallel=True)
 def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
     """Elastic energy of every tet [J], zero at rest, into out (m,).
 
@@ -158,8 +165,8 @@ def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
     kind, mu, lam : (m,) of `TetMaterial`. All C-contiguous; float64, but int32 for tets and kind.
     """
     for e in prange(len(tets)):
-        F = deformation_gradient(x, tets, Dm_inv, e)
-        out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
+        if is_kind(kind[e], KIND):
+            out[e] = volumes[e] * energy_density(deformation_gradient(x, tets, Dm_inv, e), mu[e], lam[e])
 
 
 def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:

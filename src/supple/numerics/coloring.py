@@ -121,7 +121,8 @@ def independent_groups(constraints, starts, n_vertices, width, window):
                     pending[kept] = c
                     kept += 1
             waiting = kept
-            members[group, count:] = members[group, 0]
+            for q in range(count, width):
+                members[group, q] = members[group, 0]
             counts[group] = count
             group += 1
         pointers[run + 1] = group

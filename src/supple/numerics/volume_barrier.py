@@ -10,7 +10,7 @@ import math
 from supple.runtime.kernel_cache import njit
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def barrier_derivatives(J, onset):
     """b and its first and second derivative by J."""
     y = J / onset

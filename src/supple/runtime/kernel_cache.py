@@ -8,10 +8,11 @@ moved file or an edited comment compiles nothing, and a changed function compile
 from __future__ import annotations
 
 import hashlib
+import logging
 import pickle
 import sys
 from contextlib import suppress
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -28,12 +29,12 @@ from numba.core.serialize import dumps
 from numba.np.numpy_support import numpy_version
 from numpy.typing import NDArray
 
-from supple.runtime import kernel_folder
+from supple.runtime import inner_function, kernel_folder
 from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly
 from supple.runtime.kernel_watchers import WATCHERS
 from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
-from supple.runtime.reached_code import reached_code
+from supple.runtime.reached_code import code_of_module, reached_code
 
 # Below this many rows, a loop ends before a second thread has started.
 ROWS = 2_000
@@ -46,11 +47,13 @@ _COMPILER = (
     sys.implementation.cache_tag,
     sys.abiflags if hasattr(sys, "abiflags") else "",
     [getattr(config, name, None) for name in _SETTINGS],
+    code_of_module(inner_function),
 )
 
+logger = logging.getLogger(__name__)
 KERNELS: dict[str, Dispatcher] = {}  # all kernels that are kept on disk, by name
 
-__all__ = ["KERNELS", "KernelCache", "njit", "prange", "read_only"]
+__all__ = ["KERNELS", "KernelCache", "kernel_with", "njit", "prange", "read_only"]
 
 
 def njit(
@@ -71,7 +74,8 @@ def njit(
     cache : whether the machine code is kept on disk, see `KernelCache`.
     parallel : whether loops over `prange` may use several threads. The kernel is then a `ParallelKernel`, as is every
         kernel that calls one.
-    rows : the least number of rows of an array among the arguments for several threads, where it is `parallel`.
+    rows : the least number of rows of an array among the arguments for several threads, where it is `parallel`; zero
+        where the caller decides, by `threads_for` or `ThreadTuner`.
     options : as of `numba.njit`; `nogil=False` for a kernel with parts in Python.
     """
     if function is None:
@@ -93,13 +97,13 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
 
 def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> Any:
     # Nothing calls a kernel from C; without that wrapper, compilation takes some 6 % less time.
-    options = {"nogil": True, "no_cfunc_wrapper": True, **options}
+    options = {"nogil": True, "no_cfunc_wrapper": True, "error_model": "numpy", **options}
     compiled: Any = numba.njit(**options, pipeline_class=KernelCompiler)(function)
     if not isinstance(compiled, Dispatcher):  # NUMBA_DISABLE_JIT is set
         return compiled
     compare_quickly(compiled)
     if cache:
-        compiled._cache = kept = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
+        compiled._cache = kept = KernelCache(compiled)  # pyright: ignore[reportAttributeAccessIssue]
         KERNELS[kept.name] = compiled
         return compiled
     return InnerFunction(function, {}, compiled.targetoptions)
@@ -126,14 +130,28 @@ def _form(function: FunctionType, form: str) -> FunctionType:
     return copy
 
 
+def kernel_with(kernel: FunctionType, name: str, **names: Any) -> FunctionType:
+    """A copy of a kernel in which some global names have other values.
+
+    Parameters
+    ----------
+    name : of the copy, after the kernel's own. Numba's cache and the linker of cached kernels distinguish functions by
+        their names only.
+    """
+    copy = FunctionType(kernel.__code__, {**kernel.__globals__, **names}, kernel.__name__, kernel.__defaults__)
+    copy.__qualname__ = f"{kernel.__qualname__}.{name}"
+    copy.__module__ = kernel.__module__
+    return copy
+
+
 class KernelCache(_Cache):
     """The compiled forms of one kernel on disk, see `supple.runtime.kernel_folder`.
 
     Of several processes that need the kernel at once, as those of a study do, one compiles it and the others wait.
     """
 
-    def __init__(self, function: FunctionType) -> None:
-        self._function = function
+    def __init__(self, kernel: Dispatcher) -> None:
+        self._kernel = kernel
         self._locks: dict[Path, FileLock] = {}
 
     @property
@@ -151,7 +169,7 @@ class KernelCache(_Cache):
 
     @property
     def name(self) -> str:
-        return f"{self._function.__module__}:{self._function.__qualname__}"
+        return f"{self._kernel.py_func.__module__}:{self._kernel.py_func.__qualname__}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
@@ -189,6 +207,9 @@ class KernelCache(_Cache):
         self._tell("compiled", sig)
 
     def _tell(self, stage: str, sig: Any) -> None:
+        if stage == "compiling":
+            _announce()
+            logger.debug("compiling %s", self.name)
         for watcher in WATCHERS:
             watcher(stage, self.name, sig)
 
@@ -205,7 +226,12 @@ class KernelCache(_Cache):
     @cached_property
     def _code(self) -> bytes:
         # A kernel may call what is defined below it, so that the digest waits for the first call.
-        return reached_code(self._function)
+        return reached_code(self._kernel)
+
+
+@cache  # once per process
+def _announce() -> None:
+    logger.info("compiling kernels, once on this machine; `supple warm` does so beforehand")
 
 
 def _rebuilt(content: bytes | None, target_context: Any) -> Any:

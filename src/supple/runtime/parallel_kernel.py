@@ -8,12 +8,11 @@ from functools import update_wrapper
 from types import FunctionType
 from typing import Any
 
-import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 from numba.np.ufunc.parallel import threading_layer
 
-from supple.runtime.threads import is_alone
+from supple.runtime.threads import has_several
 
 
 class ParallelKernel:
@@ -21,7 +20,8 @@ class ParallelKernel:
 
     The parallel form is not used
 
-    - where one thread is allowed: a call into the threads costs some microseconds even then;
+    - where one thread is allowed from outside, by `numba_threads` or NUMBA_NUM_THREADS: a call into the threads costs
+      some microseconds even then. Within `one_thread` it is used, on one thread;
     - where no argument has as many rows as pay for that. A small scene compiles no parallel form;
     - while another Python thread uses it: the layer `workqueue` of Numba ends the process that does so;
     - after a fork of a process that used GNU OpenMP: the layer `omp` ends the process.
@@ -39,8 +39,8 @@ class ParallelKernel:
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        alone = is_alone() or not _has_rows(arguments, self.rows) or not _threads.allowed()
-        if alone or not _threads.lock.acquire(blocking=False):
+        several = _has_rows(arguments, self.rows) and has_several() and not _threads.lost
+        if not several or not _threads.lock.acquire(blocking=False):
             return self.serial(*arguments)
         try:
             return self.parallel(*arguments)
@@ -60,6 +60,8 @@ class ParallelKernel:
 
 def _has_rows(arguments: tuple[Any, ...], least: int) -> bool:
     """Whether an array among some arguments, or in a tuple of them, has as many rows."""
+    if least == 0:
+        return True
     for value in arguments:
         if isinstance(value, np.ndarray):
             if value.ndim and len(value) >= least:
@@ -70,22 +72,19 @@ def _has_rows(arguments: tuple[Any, ...], least: int) -> bool:
 
 
 class _Threads:
-    """Whether Numba's threads may be used by the present call."""
+    """Whether Numba's threads can be used by the present call."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
-        self._lost = False
-
-    def allowed(self) -> bool:
-        return not self._lost and numba.get_num_threads() > 1
+        self.lost = False
 
     def after_fork(self) -> None:
         """The parent's threads do not exist in the child, and its lock may have been held by one of them."""
         self.lock = threading.Lock()
         try:
-            self._lost = threading_layer() == "omp"
+            self.lost = threading_layer() == "omp"
         except ValueError:  # the parent had not used any
-            self._lost = False
+            self.lost = False
 
 
 _threads = _Threads()

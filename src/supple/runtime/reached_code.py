@@ -19,7 +19,7 @@ from numba.core.dispatcher import Dispatcher
 _NUMBERS_AND_ARRAYS = (int, float, complex, str, bytes, np.generic, np.ndarray)
 
 
-def reached_code(kernel: FunctionType) -> bytes:
+def reached_code(kernel: FunctionType | Dispatcher) -> bytes:
     """A digest of the bytecode, constants and compiler options of a kernel and of all compiled functions it reaches.
 
     The code is that in memory, not that of the files: a file that is edited after its import cannot be mistaken for
@@ -45,6 +45,21 @@ def reached_code(kernel: FunctionType) -> bytes:
             pending += value.__defaults__ or ()
             pending += _used_values(value)
     return digest.digest()
+
+
+def code_of_module(module: ModuleType) -> bytes:
+    """A digest of what a module defines: the code of its functions and classes, and their constants."""
+    found: list[str] = []
+    pending = list(vars(module).items())
+    while pending:
+        name, value = pending.pop()
+        if isinstance(value, type) and value.__module__ == module.__name__:
+            pending += ((f"{name}.{member}", inner) for member, inner in vars(value).items())
+        elif isinstance(value, FunctionType) and value.__module__ == module.__name__:
+            found.append(f"{name} {_text(value.__code__, value.__doc__)}")
+        elif "." in name and isinstance(value, (*_NUMBERS_AND_ARRAYS, tuple)) and "__" not in name:
+            found.append(f"{name} {value!r}")
+    return hashlib.sha256("\n".join(sorted(found)).encode()).digest()
 
 
 @cache

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from statistics import median
 from time import perf_counter
 
 from supple.runtime.interruption import interruption_point
-from supple.runtime.threads import numba_threads
+from supple.runtime.threads import numba_threads, one_thread
 
 # After how many tasks the slower mode is measured again. The interval is doubled each time that the mode
 # is still slower, up to a multiple of the shortest interval.
@@ -71,8 +72,17 @@ class ThreadTuner:
         else:
             self._interval = min(2 * self._interval, LARGEST_MULTIPLE * self._shortest)
 
-    def tasks(self, count: int, threads: int) -> Iterator[tuple[int, bool]]:
-        """The numbers of so many tasks, and whether each runs on several threads; their times are noted.
+    def threads(self, parallel: bool, threads: int | None = None) -> AbstractContextManager[None]:
+        """Run parallel kernels on so many threads (None: as many as there are), or on one.
+
+        Where there is a choice, they have their parallel form on one thread too, so that none is compiled twice.
+        """
+        if parallel:
+            return numba_threads(threads)
+        return one_thread() if self.choice else numba_threads(1)
+
+    def tasks(self, count: int, threads: int) -> Iterator[int]:
+        """The numbers of so many tasks, each on several threads or on one; their times are noted.
 
         A task takes 1 or `threads` threads for all of its kernels: where another process is busy, each kernel that
         waits for a second thread takes many times longer. It can be interrupted before each task.
@@ -80,8 +90,8 @@ class ThreadTuner:
         for k in range(count):
             interruption_point()
             parallel, started = self.choose(), perf_counter()
-            with numba_threads(threads if parallel else 1):
-                yield k, parallel
+            with self.threads(parallel, threads):
+                yield k
             self.note(parallel, perf_counter() - started)
 
     def _time(self, mode: bool) -> float:

@@ -20,9 +20,9 @@ def threads_for(work: int, least: int) -> AbstractContextManager[None]:
     return numba_threads(1 if work < least else None)
 
 
-def one_thread(alone: bool) -> AbstractContextManager[None]:
-    """Run Numba's parallel kernels on one thread if `alone`."""
-    return numba_threads(1 if alone else None)
+def one_thread() -> AbstractContextManager[None]:
+    """Run Numba's parallel kernels on one thread in the form for several, see `ParallelKernel`."""
+    return _UNCHANGED if is_alone() else _Threads(1, several=True)
 
 
 def numba_threads(count: int | None) -> AbstractContextManager[None]:
@@ -31,16 +31,21 @@ def numba_threads(count: int | None) -> AbstractContextManager[None]:
     Where one thread is set already it costs less than a microsecond: Numba's own question for the number takes a lock
     of processes, and longer than a small kernel.
     """
-    return _UNCHANGED if count is None or (count == 1 and _present.alone) else _Threads(count)
+    return _UNCHANGED if count is None or (count == 1 and is_alone()) else _Threads(count, count > 1)
 
 
 def is_alone() -> bool:
-    """Whether the calling thread has set its number of threads to one by the functions above."""
-    return _present.alone
+    """Whether the calling thread has set its number of threads to one by `threads_for` or `numba_threads`."""
+    return _present.several is False
+
+
+def has_several() -> bool:
+    """Whether the calling thread may use parallel forms."""
+    return numba.get_num_threads() > 1 if _present.several is None else _present.several
 
 
 class _Present(threading.local):
-    alone = False
+    several: bool | None = None  # None where nothing was set
 
 
 _present = _Present()
@@ -48,17 +53,17 @@ _UNCHANGED = nullcontext()
 
 
 class _Threads(AbstractContextManager[None]):
-    def __init__(self, count: int) -> None:
-        self.count, self.before, self.alone_before = count, 0, False
+    def __init__(self, count: int, several: bool) -> None:
+        self.count, self.several = count, several
 
     def __enter__(self) -> None:
-        self.before, self.alone_before = numba.get_num_threads(), _present.alone
+        self.before, self.several_before = numba.get_num_threads(), _present.several
         if self.count != self.before:
             numba.set_num_threads(self.count)
-        _present.alone = self.count == 1
+        _present.several = self.several
 
     def __exit__(self, *error: object) -> None:
-        _present.alone = self.alone_before
+        _present.several = self.several_before
         if self.count != self.before:
             numba.set_num_threads(self.before)
 

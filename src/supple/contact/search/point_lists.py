@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.distances import point_triangle_square
 from supple.contact.search.boxes import boxes_of_pieces
-from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner, sort_pairs
+from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner
 from supple.contact.search.room import Room
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import (
@@ -28,10 +28,10 @@ from supple.numerics.geometry.box_tree import (
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _boxes_of_triangles(points, triangles, radii, out):
     """Write the box of each triangle, enlarged by the largest motion of a corner, to out (t, 6)."""
-    for t in prange(len(triangles)):
+    for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         moves = max(radii[a, 1], radii[b, 1], radii[c, 1])
         for j in range(3):
@@ -93,7 +93,7 @@ def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, s
     return count
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True, rows=0, error_model="numpy")
 def _list_pairs(shapes, groups, radii, rules, partners, boxes, far_tree, near_tree, room, counts, out):
     """Write the pairs of each run of groups to its room of `out`, and their number to `counts`.
 
@@ -120,12 +120,12 @@ def _list_pairs(shapes, groups, radii, rules, partners, boxes, far_tree, near_tr
         count = 0
         for g in range(r, len(starts) - 1, RUNS):
             group = order[starts[g] : starts[g + 1]]
-            tree = (far_nodes, far_labels, far_order)
-            pieces = ((other_starts, others), boxes)
-            count = _near_group(group, its_shapes, far, its_rules, False, tree, pieces, found, count, scratch)
-            tree = (near_nodes, near_labels, near_order)
-            pieces = ((own_starts, own), boxes)
-            count = _near_group(group, its_shapes, near, its_rules, True, tree, pieces, found, count, scratch)
+            # One call for both: what is inlined twice is compiled twice.
+            for same in (False, True):
+                tree = (near_nodes, near_labels, near_order) if same else (far_nodes, far_labels, far_order)
+                pieces = ((own_starts, own), boxes) if same else ((other_starts, others), boxes)
+                radii_of = near if same else far
+                count = _near_group(group, its_shapes, radii_of, its_rules, same, tree, pieces, found, count, scratch)
         counts[r] = count
 
 
@@ -199,7 +199,7 @@ class PairFinder:
             _list_pairs(shapes, self._groups, radii, rules, *lists, room.start, room.counts, room.pairs)
             if not room.is_too_small():
                 break
-        return sort_pairs(room.pairs, room.start, room.counts, len(points))
+        return room.sorted(len(points))
 
     def _sorted(self, shapes: tuple, radii: tuple) -> tuple[list[BoxTree], NDArray[np.float64]]:
         """The trees of triangles for pairs of different pieces and of one piece, and the boxes (t, 6) of the first."""

@@ -32,8 +32,12 @@ def common_motions(points, motions, pieces, all_share, each, common):
         drifts[k] + turns[k] (X - centers[k]); drifts[-1] is the mean motion of all points
     """
     drifts, centers, turns = common
-    drifts[:], centers[:] = 0.0, 0.0
     counts = np.zeros(len(drifts))
+    for k in range(len(drifts)):
+        for j in range(3):
+            drifts[k, j] = 0.0
+            if k < len(centers):
+                centers[k, j] = 0.0
     for i in range(0, len(motions), each):
         k = pieces[i]
         counts[k] += 1.0
@@ -112,8 +116,7 @@ def search_radii(points, motions, moved, excursions, pieces, common, scales, far
         near[i, 0], near[i, 1], near[i, 2] = b + path, b + path, b
 
 
-@njit(cache=True)
-def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, each, common, excursions):
+def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, each, common, excursions) -> bool:
     """Whether some point has moved farther than `search_radii` allowed, absolutely or relative to its piece.
 
     Parameters
@@ -123,6 +126,17 @@ def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, each, 
     common : scratch memory, see `common_motions`
     excursions : (n,) increased to the motion of each point within this substep, where that is larger [m]
     """
+    # What moves less than its radii allow does so relative to anything that is at rest, too.
+    if not _any_beyond(x, x_prev, x_gathered, far, near, excursions):
+        return False
+    moved = x - x_gathered
+    # No distance depends on which motions are taken for common.
+    common_motions(x_gathered, moved, pieces, all_share, each, common)
+    return _any_beyond_relative(x_gathered, moved, far, near, pieces, common)
+
+
+@njit(cache=True)
+def _any_beyond(x, x_prev, x_gathered, far, near, excursions):
     far_enough = False
     for i in range(len(x)):
         square = total = 0.0
@@ -133,13 +147,12 @@ def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, each, 
             excursions[i] = math.sqrt(square)
         if not (total <= far[i, 2] ** 2 and total <= near[i, 2] ** 2):
             far_enough = True
-    # What moves less than its radii allow does so relative to anything that is at rest, too.
-    if not far_enough:
-        return False
-    moved = x - x_gathered
-    # No distance depends on which motions are taken for common.
-    common_motions(x_gathered, moved, pieces, all_share, each, common)
-    for i in range(len(x)):
+    return far_enough
+
+
+@njit(cache=True)
+def _any_beyond_relative(x_gathered, moved, far, near, pieces, common):
+    for i in range(len(moved)):
         absolute, relative = _relative_squares(x_gathered, moved, i, pieces[i], common)
         # The negated form is also true for positions that are not finite.
         if not (absolute <= far[i, 2] ** 2 and relative <= near[i, 2] ** 2):

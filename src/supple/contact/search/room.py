@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from supple.contact.search.pair_kernels import RUNS
+from supple.contact.search.pair_kernels import RUNS, sort_pairs
 
 
 class Room:
@@ -20,6 +21,11 @@ class Room:
         self.start = np.zeros(RUNS + 1, dtype=np.int64)
         self.counts = np.zeros(RUNS, dtype=np.int64)
         self.pairs = np.zeros((0, 2), dtype=np.int32)
+
+    def sorted(self, size: int) -> NDArray[np.int32]:
+        """The pairs of all runs (k, 2) in ascending order; the first are below `size`."""
+        found = self.counts.any()
+        return sort_pairs(self.pairs, self.start, self.counts, size) if found else np.zeros((0, 2), dtype=np.int32)
 
     def is_too_small(self) -> bool:
         """Whether some run found more than fits; then there is room for that, and more, for the next attempt."""

@@ -14,7 +14,6 @@ from supple.contact.search.pair_kernels import (
     find_edges,
     find_points,
     partner_lists,
-    sort_pairs,
     swept_boxes,
 )
 from supple.contact.search.room import Room
@@ -79,8 +78,8 @@ class SurfaceTrees:
                 if not room.is_too_small():
                     break
         return Candidates(
-            sort_pairs(of_points.pairs, of_points.start, of_points.counts, len(mesh.points)),
-            sort_pairs(of_edges.pairs, of_edges.start, of_edges.counts, len(mesh.edges)),
+            of_points.sorted(len(mesh.points)),
+            of_edges.sorted(len(mesh.edges)),
         )
 
     def _sorted(self, begin: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[BoxTree, BoxTree]:

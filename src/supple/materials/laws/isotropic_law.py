@@ -77,7 +77,7 @@ def decompositions(F, U, s, V):
 
 @njit(error_model="numpy")
 def principal_hessian_of(x, project):
-    """`supple.materials.isotropic.principal_hessian` of the 16 values x of a tet."""
+    """`principal_hessian` of `supple.materials.isotropic` of the 16 values x of a tet."""
     A = (x[4], x[5], x[6], x[7], x[8], x[9])
     q = (x[10], x[11], x[12], x[13], x[14], x[15])
     if project:

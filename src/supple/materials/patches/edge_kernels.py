@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
-from supple.materials.isotropic import density, energy_density, principal_hessian, stress
+from typing import TYPE_CHECKING
+
+from supple.materials.isotropic import is_kind, kernel_of_kinds
 from supple.materials.laws.isotropic_law import principal_hessian_of
 from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
 from supple.numerics.svd3 import svd3 as decompose
 from supple.runtime.kernel_cache import njit, prange
+
+if TYPE_CHECKING:  # of each kind, see `isotropic.functions_of`
+    KIND = 0
+
+    def density(F, s, mu, lam): ...
+
+    def energy_density(F, mu, lam): ...
+
+    def principal_hessian(s, mu, lam, project): ...
+
+    def stress(U, s, V, mu, lam): ...
+
 
 # Numbers of a patch's frame: U (9), psi_ij (6), alpha (3) and beta (3) times its volume, see `isotropic`.
 FRAME = 21
@@ -35,26 +49,29 @@ def _mean_gradient(x, start, vertices, gradients, k):
     return (f0, f1, f2, f3, f4, f5, f6, f7, f8)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@kernel_of_kinds(parallel=True)
 def edge_energies(x, start, vertices, gradients, volumes, kind, mu, lam, out):
     """Energy of every patch [J] into out (k,)."""
     for k in prange(len(volumes)):
-        F = _mean_gradient(x, start, vertices, gradients, k)
-        out[k] = volumes[k] * energy_density(F, kind[k], mu[k], lam[k])
+        if is_kind(kind[k], KIND):
+            F = _mean_gradient(x, start, vertices, gradients, k)
+            out[k] = volumes[k] * energy_density(F, mu[k], lam[k])
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@kernel_of_kinds(parallel=True)
 def edge_models(
     x, start, vertices, gradients, volumes, kind, mu, lam, second, project, energies, forces, frames, turned
 ):
     """Energies (k,), gradients by the slots (s, 3) and, with `second`, what `pair_blocks` needs: the frames (k, 21) of
     the patches and the slots' gradients V^T g (s, 3)."""
     for k in prange(len(volumes)):
+        if not is_kind(kind[k], KIND):
+            continue
         F = _mean_gradient(x, start, vertices, gradients, k)
         U, s, V = decompose(F)
         v = volumes[k]
-        energies[k] = v * density(kind[k], F, s, mu[k], lam[k])
-        P = stress(U, s, V, kind[k], mu[k], lam[k])
+        energies[k] = v * density(F, s, mu[k], lam[k])
+        P = stress(U, s, V, mu[k], lam[k])
         for t in range(start[k], start[k + 1]):
             g, h, i = gradients[t, 0], gradients[t, 1], gradients[t, 2]
             forces[t, 0] = v * (P[0] * g + P[1] * h + P[2] * i)
@@ -65,7 +82,7 @@ def edge_models(
                 turned[t, 1] = V[1] * g + V[4] * h + V[7] * i
                 turned[t, 2] = V[2] * g + V[5] * h + V[8] * i
         if second:
-            A, alpha, beta = principal_hessian(s, kind[k], mu[k], lam[k], project)
+            A, alpha, beta = principal_hessian(s, mu[k], lam[k], project)
             for c in range(9):
                 frames[k, c] = U[c]
             for c in range(6):

@@ -144,6 +144,22 @@ def _first_or_rest(name: str, own_kind: int, first: Any, rest: Any) -> Any:
     return njit(error_model="numpy")(choose)
 
 
-UNKNOWN_ONE = float(np.nan)
 UNKNOWN_THREE = (np.nan, np.nan, np.nan)
-UNKNOWN_SIX = (np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
+
+
+@njit
+def _unknown_density(F, s, mu, lam):
+    return np.nan
+
+
+@njit
+def _unknown_three(s, mu, lam):
+    return (np.nan, np.nan, np.nan)
+
+
+@njit
+def _unknown_six(s, mu, lam):
+    return (np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
+
+
+NOTHING_KNOWN = StretchFunctions(_unknown_density, _unknown_three, _unknown_six, _unknown_six)

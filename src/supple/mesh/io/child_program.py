@@ -32,6 +32,8 @@ def main(library: str, path: Path, memory: int, seconds: float, parent: int) -> 
         answer = {"error": error.reason, "ours": True}
     except MemoryError:
         answer = {"error": f"it needs more than {memory >> 20} MiB"}
+    except OSError as error:  # of its own files: what it reads is there
+        answer = {"disk": error.strerror or str(error)}
     except (Exception, SystemExit) as error:  # of any kind: the library trusts its file
         answer = {"error": " ".join(f"{type(error).__name__}: {error}".split())}
     path.with_name("answer.json").write_text(json.dumps(answer), "utf-8")

@@ -17,6 +17,8 @@ from supple.mesh.io.cells import CellSoup, FormatError, MeshFile
 # What a library needs of memory: itself, and numbers of Python's for each byte of a text [bytes].
 _LEAST_MEMORY, _MEMORY_OF_A_BYTE = 2**31, 64
 _SECONDS, _SECONDS_OF_A_BYTE = 60.0, 1e-5
+# Of the folder of its files. What a killed process leaves of them is deleted as that of meshers is.
+PREFIX = "supple-mesh-"
 
 
 def read_in_child(data: bytes, library: str, suffix: str) -> MeshFile:
@@ -26,7 +28,15 @@ def read_in_child(data: bytes, library: str, suffix: str) -> MeshFile:
     ------
     FormatError : its own one; or one that says how the library failed, or that it needed too much memory or time.
     """
-    with tempfile.TemporaryDirectory(prefix="supple-read-", ignore_cleanup_errors=True) as name:
+    try:
+        return _read(data, library, suffix)
+    except OSError as error:
+        reason = error.strerror or error
+        raise FormatError(f"{library} cannot work in {tempfile.gettempdir()}: {reason}; make room there") from None
+
+
+def _read(data: bytes, library: str, suffix: str) -> MeshFile:
+    with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:
         folder = Path(name)
         (folder / f"file{suffix}").write_bytes(data)
         memory = _LEAST_MEMORY + _MEMORY_OF_A_BYTE * len(data)
@@ -48,10 +58,10 @@ def read_in_child(data: bytes, library: str, suffix: str) -> MeshFile:
             )
         except subprocess.TimeoutExpired:
             raise FormatError(f"{library} did not read it within {seconds:.0f} s: it is damaged") from None
-        except OSError as error:
-            raise FormatError(f"{library} cannot be started: {error}") from None
         answer_file = folder / "answer.json"
         answer = json.loads(answer_file.read_text("utf-8")) if answer_file.exists() else {}
+        if "disk" in answer:
+            raise OSError(0, answer["disk"])
         if done.returncode != 0 or "sets" not in answer:
             reason = answer.get("error", "its process ended")
             if not answer.get("ours"):

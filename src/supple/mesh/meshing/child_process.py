@@ -22,14 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshingError
+from supple.mesh.io.in_child import PREFIX
 from supple.mesh.meshing import mesher_worker
 from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)
 
-# Of the folder of a mesher's files; one that is older than a day belongs to a process that was killed [s].
-PREFIX, A_DAY = "supple-mesh-", 86_400.0
+# A folder of a mesher's files that is older than a day belongs to a process that was killed [s].
+A_DAY = 86_400.0
 # A crash while more than this fraction of the allowed address space is used counts as lack of memory.
 STARVED = 0.8
 # How TetGen, C++, NumPy and the loader of shared libraries report it, in lower case.

@@ -101,14 +101,20 @@ def overlapping(tree: BoxTree, boxes: NDArray[np.float64]) -> tuple[NDArray[np.i
 
 def _places_of_labels(boxes: NDArray[np.float64], labels: NDArray[np.int32]) -> NDArray[np.int64]:
     """The place of each label (p,) in the order of the Morton codes of the boxes of all that has it."""
-    together = np.empty((labels.max(initial=-1) + 1, 6))
-    _boxes_of_labels(boxes, labels, together)
+    together = boxes_of_labels(boxes, labels, labels.max(initial=-1) + 1)
     return np.argsort(np.argsort(morton_codes(together), kind="stable"))
 
 
-@njit(cache=True)
-def _boxes_of_labels(boxes, labels, out):
+def boxes_of_labels(boxes: NDArray[np.float64], labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
+    """(count, 6) the box of all boxes (m, 6) that have a label (m,); from infinity to minus infinity where none has."""
+    out = np.empty((count, 6))
     out[:, :3], out[:, 3:] = np.inf, -np.inf
+    _extend_boxes(boxes, labels, out)
+    return out
+
+
+@njit(cache=True)
+def _extend_boxes(boxes, labels, out):
     for i in range(len(boxes)):
         k = labels[i]
         for j in range(3):
@@ -193,7 +199,7 @@ def next_leaf(nodes, labels, box, label, same, stack, top):
     return -1, 0
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def morton_codes(boxes):
     """(m,) 63 bits: those of the three coordinates of each center in turn."""
     low = np.empty(3)
@@ -207,7 +213,7 @@ def morton_codes(boxes):
         size = max(size, b - a)
     scale = 2097151.0 / size if 0.0 < size < np.inf else 0.0
     codes = np.empty(len(boxes), dtype=np.int64)
-    for i in prange(len(boxes)):
+    for i in range(len(boxes)):
         code = np.int64(0)
         for j in range(3):
             v = np.int64((boxes[i, j] + boxes[i, 3 + j] - low[j]) * scale)
@@ -232,14 +238,14 @@ def _join(nodes, i):
     return size
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _refit(boxes, order, nodes):
     """Compute all nodes; returns the sum of the sides of those that are not leaves."""
     leaves = len(nodes) // 2
     subtrees = min(leaves, _SUBTREES)
     each = leaves // subtrees
     sizes = np.zeros(subtrees)
-    for s in prange(subtrees):
+    for s in range(subtrees):
         for k in range(s * each, (s + 1) * each):
             if k < len(order):
                 for j in range(6):
@@ -294,30 +300,36 @@ def _overlapping(nodes, labels, order, boxes, start, found):
             start[q + 1] = count
 
 
-@njit(cache=True)
-def near_boxes(boxes, together):
-    """For each of a few boxes (p, 6) the others that overlap it, of those that are `together` (p, p): starts, found."""
-    count = len(boxes)
-    # Side by side in memory: most pairs are apart along the first axis.
-    low, high = boxes[:, 0].copy(), boxes[:, 3].copy()
-    starts = np.zeros(count + 1, dtype=np.int64)
-    pairs = np.empty((64, 2), dtype=np.int64)
-    total = 0
-    for k in range(count):
-        for other in range(k + 1, count):
-            if low[other] > high[k] or high[other] < low[k] or not overlap(boxes, other, boxes[k]):
-                continue
-            if total + 2 > len(pairs):
-                pairs = np.concatenate((pairs, np.empty_like(pairs)))
-            for a, b in ((k, other), (other, k)):
-                if together[a, b]:
-                    pairs[total, 0], pairs[total, 1] = a, b
-                    starts[a + 1] += 1
-                    total += 1
-    starts = np.cumsum(starts)
-    fill, found = starts.copy(), np.empty(total, dtype=np.int64)
-    for i in range(total):
-        k = pairs[i, 0]
-        found[fill[k]] = pairs[i, 1]
-        fill[k] += 1
+def near_boxes(boxes: NDArray[np.float64], together: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For each of a few boxes (p, 6) the others that overlap it, of those that are `together` (p, p): starts, found.
+
+    The box of nothing has its lowest corner above its highest one.
+    """
+    starts = np.zeros(len(boxes) + 1, dtype=np.int64)
+    found = starts[:0]
+    if np.count_nonzero(boxes[:, 0] <= boxes[:, 3]) > 1:
+        # Side by side in memory: most pairs are apart along the first axis.
+        arrays = boxes, boxes[:, 0].copy(), boxes[:, 3].copy(), together, starts
+        _near_boxes(*arrays, found)
+        np.cumsum(starts, out=starts)
+        found = np.empty(starts[-1], dtype=np.int64)
+        if len(found):
+            _near_boxes(*arrays, found)
     return starts, found
+
+
+@njit(cache=True)
+def _near_boxes(boxes, low, high, together, starts, found):
+    """Count what is near box k in starts[k + 1]; where `found` has room for that, write it instead."""
+    count = len(boxes)
+    for k in range(count):
+        total = 0
+        for other in range(count):
+            if low[other] > high[k] or high[other] < low[k] or other == k or not together[k, other]:
+                continue
+            if overlap(boxes, other, boxes[k]):
+                if len(found) > 0:
+                    found[starts[k] + total] = other
+                total += 1
+        if len(found) == 0:
+            starts[k + 1] = total

@@ -124,7 +124,7 @@ def incidences(elements: NDArray[np.int32], rows: int) -> tuple[NDArray[np.int32
     return start.astype(np.int32), incidence.astype(np.int32)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
     """Write the blocks of row i from the diagonal on, and their transposes."""
     for q in range(row_start[i], row_start[i + 1]):

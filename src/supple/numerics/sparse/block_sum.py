@@ -99,7 +99,7 @@ class JointPattern:
             )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _partners(rows, columns, row_of, n):
     """For every row the rows that couplings join it to: starts (n + 1,) and numbers, which may repeat."""
     start = np.zeros(n + 1, dtype=np.int32)
@@ -209,7 +209,7 @@ def _places(row_start, columns, coupled_rows, coupled_columns, row_of):
     return start, entries
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _add_row(i, row_start, columns, mirror, coupling_start, couplings, blocks, data):
     for q in range(row_start[i], row_start[i + 1]):
         j = columns[q]

@@ -12,7 +12,7 @@ import numpy as np
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _update_group(k, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted):
     g = 12 * groups[k]
     total = np.zeros(12)
@@ -28,23 +28,14 @@ def _update_group(k, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted
         restricted[g + m] = total[m]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _update_all(alpha, groups, start, fields, p, Ap, w, x, r, y, restricted):
+@njit(parallel=True, error_model="numpy")
+def update(alpha, groups, start, fields, p, Ap, w, x, r, y, restricted):
+    """x += alpha p, r -= alpha Ap, y -= alpha w, restricted <- Z^T r."""
     for k in prange(len(groups)):
         _update_group(k, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
 
 
-@njit(cache=True, error_model="numpy")
-def update(alone, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted):
-    """x += alpha p, r -= alpha Ap, y -= alpha w, restricted <- Z^T r."""
-    if alone:
-        for k in range(len(groups)):
-            _update_group(k, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
-    else:
-        _update_all(alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
-
-
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _backward_group(k, groups, start, row_start, columns, blocks, inverse, fields, coefficients, r, y, s, t, Ut, sums):
     n = len(r)
     g = 12 * groups[k]
@@ -72,35 +63,17 @@ def _backward_group(k, groups, start, row_start, columns, blocks, inverse, field
     sums[k] = total
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _backward_color(
-    first, last, groups, start, row_start, columns, blocks, inverse, fields, coefficients, r, y, s, t, Ut, sums
-):
-    for k in prange(first, last):
-        _backward_group(
-            k, groups, start, row_start, columns, blocks, inverse, fields, coefficients, r, y, s, t, Ut, sums
-        )
-
-
-@njit(cache=True, error_model="numpy")
-def backward(
-    alone, colors, groups, start, row_start, columns, blocks, inverse, fields, coefficients, r, y, s, t, Ut, sums
-):
+@njit(parallel=True, error_model="numpy")
+def backward(colors, groups, start, row_start, columns, blocks, inverse, fields, coefficients, r, y, s, t, Ut, sums):
     """s <- S^-1 r with y = (D + L)^-1 r, t <- s + Z coefficients, Ut <- U t, and each group's share of r . s."""
-    if alone:
-        for k in range(len(groups) - 1, -1, -1):
+    for c in range(len(colors) - 2, -1, -1):
+        for k in prange(colors[c], colors[c + 1]):
             _backward_group(
                 k, groups, start, row_start, columns, blocks, inverse, fields, coefficients, r, y, s, t, Ut, sums
             )
-    else:
-        for c in range(len(colors) - 2, -1, -1):
-            _backward_color(
-                colors[c], colors[c + 1], groups, start, row_start, columns, blocks, inverse, fields, coefficients, r,
-                y, s, t, Ut, sums
-            )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _forward_group(k, beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap, w, sums):
     total = 0.0
     for i in range(start[k], start[k + 1]):
@@ -130,21 +103,9 @@ def _forward_group(k, beta, start, row_start, columns, blocks, diagonal, inverse
     sums[k] = total
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _forward_color(first, last, beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap, w, sums):
-    for k in prange(first, last):
-        _forward_group(k, beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
-
-
-@njit(cache=True, error_model="numpy")
-def forward(alone, colors, beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap, w, sums):
+@njit(parallel=True, error_model="numpy")
+def forward(colors, beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap, w, sums):
     """p <- t + beta p and Up <- Ut + beta Up; Ap, w <- (D + L)^-1 A p, and each group's share of p . Ap."""
-    if alone:
-        for k in range(len(start) - 1):
+    for c in range(len(colors) - 1):
+        for k in prange(colors[c], colors[c + 1]):
             _forward_group(k, beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
-    else:
-        for c in range(len(colors) - 1):
-            _forward_color(
-                colors[c], colors[c + 1], beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap,
-                w, sums
-            )  # fmt: skip

@@ -19,7 +19,7 @@ from supple.numerics.sparse.gauss_seidel import backward, forward, update
 from supple.numerics.sparse.preconditioner import TwoLevel
 from supple.numerics.sparse.skyline_cholesky import solve
 from supple.runtime.kernel_cache import njit
-from supple.runtime.threads import is_alone, threads_for
+from supple.runtime.threads import threads_for
 
 # Short passes in each iteration: fewer blocks than this are worked on by one thread.
 _SERIAL_BLOCKS = 50_000
@@ -67,7 +67,6 @@ def conjugate_gradients(
     solution = np.zeros_like(x)
     with threads_for(preconditioner.pattern.blocks, _SERIAL_BLOCKS):
         iterations, converged, indefinite, first = _solve(
-            is_alone(),
             (order.groups, order.group_start, order.color_start),
             (order.lower.start, order.lower.columns, order.lower.blocks),
             (order.upper.start, order.upper.columns, order.upper.blocks),
@@ -86,7 +85,7 @@ def conjugate_gradients(
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _inner(a, b):
     total = 0.0
     for i in range(len(a)):
@@ -94,14 +93,14 @@ def _inner(a, b):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _add(factor, a, out):
     for i in range(len(a)):
         for k in range(3):
             out[i, k] += factor * a[i, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _inverse(a):
     """Of a small positive definite matrix, by elimination."""
     n = len(a)
@@ -120,7 +119,7 @@ def _inverse(a):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _coarse_solution(restricted, coarse, first, coefficients):
     for k in range(len(restricted)):
         coefficients[k] = restricted[k]
@@ -129,7 +128,6 @@ def _coarse_solution(restricted, coarse, first, coefficients):
 
 @njit(cache=True, error_model="numpy")
 def _solve(
-    alone,
     order,
     lower,
     upper,
@@ -156,25 +154,25 @@ def _solve(
     S = np.eye(len(low))
     for m in range(len(low)):
         # With p = 0 the sweep forward takes its right side from Ut: Ap becomes g and w becomes (D + L)^-1 g.
-        forward(alone, colors, 0.0, start, *lower, diagonal, inverse, t, low[m], p, Up, Ap, W[m], sums)
+        forward(colors, 0.0, start, *lower, diagonal, inverse, t, low[m], p, Up, Ap, W[m], sums)
         copy_elements(low[m], r)
-        update(alone, 0.0, groups, start, fields, p, Ap, w, x, r, y, restricted)
+        update(0.0, groups, start, fields, p, Ap, w, x, r, y, restricted)
         _coarse_solution(restricted, coarse, first, coefficients)
-        backward(alone, colors, groups, start, *upper, inverse, fields, coefficients, r, W[m], s, Y[m], UY[m], sums)
+        backward(colors, groups, start, *upper, inverse, fields, coefficients, r, W[m], s, Y[m], UY[m], sums)
         for n in range(len(low)):
             S[n, m] += _inner(low[n], Y[m])
     S_inverse = _inverse(S)
     weights = np.zeros(len(low))
     # The same for the right side: this update makes r of it.
-    forward(alone, colors, 0.0, start, *lower, diagonal, inverse, t, rhs, p, Up, Ap, w, sums)
+    forward(colors, 0.0, start, *lower, diagonal, inverse, t, rhs, p, Up, Ap, w, sums)
     r[:] = 0.0
     alpha = -1.0
     first_norm = 0.0
     old = 0.0
     for iteration in range(max_iterations + 1):
-        update(alone, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
+        update(alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
         _coarse_solution(restricted, coarse, first, coefficients)
-        backward(alone, colors, groups, start, *upper, inverse, fields, coefficients, r, y, s, t, Ut, sums)
+        backward(colors, groups, start, *upper, inverse, fields, coefficients, r, y, s, t, Ut, sums)
         rz = 0.0
         for g in range(len(groups)):
             rz += sums[g]
@@ -198,7 +196,7 @@ def _solve(
             break
         beta = rz / old if iteration > 0 else 0.0
         old = rz
-        forward(alone, colors, beta, start, *lower, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
+        forward(colors, beta, start, *lower, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
         curvature = 0.0
         for g in range(len(groups)):
             curvature += sums[g]

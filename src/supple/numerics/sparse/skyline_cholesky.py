@@ -15,7 +15,7 @@ SIZE = 12
 _DEPENDENT = 1e-11
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _factor_diagonal(block, diagonal):
     """Cholesky factor of a 12x12 block in place, its diagonal inverted; dependent directions get the inverse 0."""
     for c in range(SIZE):
@@ -32,7 +32,7 @@ def _factor_diagonal(block, diagonal):
             block[c, r] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _solve_right(block, factor):
     """block <- block L^-T for a factored diagonal block L."""
     for r in range(SIZE):
@@ -43,7 +43,7 @@ def _solve_right(block, factor):
             block[r, c] = value * factor[c, c]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _subtract_product(target, left, right_transposed):
     for r in range(SIZE):
         for k in range(SIZE):

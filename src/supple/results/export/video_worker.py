@@ -32,6 +32,7 @@ _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4
 _BODY: Any = {"ambient": 0.28, "diffuse": 0.8, "specular": 0.25, "specular_power": 30}
 _OBSTACLE: Any = {"ambient": 0.7, "diffuse": 0.55, "specular": 0.0}
 _SHADOW = (30, 34, 48)
+_MARGIN = 1.12  # of the distance of the camera: room beside the bodies
 _SAMPLED = 24  # moments from which the ends of a color scale are found
 
 
@@ -41,7 +42,7 @@ class Studio:
     def __init__(self, model: Model, moments: list[Moment], film: Film) -> None:
         import pyvista
 
-        self._film, self._view = film, model.view
+        self._film, self._view, self._distance = film, model.view, 0.0
         self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
         plotter.set_background(_BACKGROUND, top=_HORIZON)  # pyright: ignore[reportArgumentType]
         plotter.enable_anti_aliasing("msaa", multi_samples=4)
@@ -55,7 +56,7 @@ class Studio:
             look: dict[str, Any] = {"color": [c / 255.0 for c in surface.color]}
             if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = np.zeros(mesh.n_points)
-                look = _scale(self._field, ends)
+                look = _scale(self._field, ends, film.size[0])
             room = getattr(surface, "room", False)
             opacity = 1.0 if room else getattr(surface, "opacity", 1.0)
             actor = plotter.add_mesh(
@@ -123,33 +124,35 @@ class Studio:
         return np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
 
     def _aim(self, points: NDArray[np.float64], share: float) -> None:
-        view, film = self._view, self._film
+        """Place the camera so that the whole motion, or the bodies at points (k, 3), fill the picture."""
+        view, film, u = self._view, self._film, self._view.up
         away = eye_of(film.view, view) - view.center
         away /= np.linalg.norm(away)
-        center, radius = view.center, view.radius
-        if film.camera == "follow":
-            center = 0.5 * (points.min(axis=0) + points.max(axis=0))
-            radius = self._followed(points, center)
-        elif film.camera == "orbit":
-            angle, u = 2.0 * np.pi * share, view.up
+        if film.camera == "orbit":
+            angle = 2.0 * np.pi * share
             away = np.cos(angle) * away + np.sin(angle) * np.cross(u, away) + (1 - np.cos(angle)) * (u @ away) * u
-        half = np.radians(0.5 * _ANGLE)
-        narrow = min(half, float(np.arctan(np.tan(half) * film.size[0] / film.size[1])))
+        low, high = view.low, view.high
+        if film.camera == "follow":
+            low, high = points.min(axis=0), points.max(axis=0)
+        center = 0.5 * (low + high)
+        right = np.cross(u, away) / np.linalg.norm(np.cross(u, away))
+        axes = np.stack([right, np.cross(away, right), away])
+        corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1) - center[:, None]), axis=-1).reshape(-1, 3)
+        across, above, along = (corners @ axes.T).T
+        slope = np.tan(np.radians(0.5 * _ANGLE))
+        needed = np.maximum(np.abs(across) * film.size[1] / film.size[0], np.abs(above)) / slope + along
+        # The largest until now, so that the picture does not breathe.
+        self._distance = max(self._distance, _MARGIN * float(needed.max()), view.radius * 1e-3)
         camera = self._plotter.camera
-        camera.position = tuple(center + 1.05 * radius / np.sin(narrow) * away)
-        camera.focal_point, camera.up, camera.view_angle = tuple(center), tuple(view.up), _ANGLE
+        camera.position, camera.focal_point = tuple(center + self._distance * away), tuple(center)
+        camera.up, camera.view_angle = tuple(u), _ANGLE
         self._plotter.reset_camera_clipping_range()
 
-    def _followed(self, points: NDArray[np.float64], center: NDArray[np.float64]) -> float:
-        """The largest radius until now, so that the picture does not breathe."""
-        self._reach = max(getattr(self, "_reach", 0.0), 1.3 * float(np.linalg.norm(points - center, axis=1).max()))
-        return self._reach
 
-
-def _scale(field: Field, ends: tuple[float, float]) -> dict[str, Any]:
-    """Colors by a field, and their legend."""
+def _scale(field: Field, ends: tuple[float, float], width: int) -> dict[str, Any]:
+    """Colors by a field, and their legend in a picture of this width [pixels]."""
     title = f"{field.name} [{field.unit}]" if field.unit else field.name
-    bar = {"title": title, "color": "#30343a", "vertical": True, "fmt": "%.3g", "title_font_size": 18}
+    bar = {"title": title, "color": "#30343a", "vertical": True, "fmt": "%.3g", "title_font_size": max(9, width // 72)}
     bar |= {"position_x": 0.86, "position_y": 0.2, "width": 0.06, "height": 0.6}
     colors = "coolwarm" if field.center is not None else "viridis"
     return {"scalars": "field", "cmap": colors, "clim": ends, "scalar_bar_args": bar}

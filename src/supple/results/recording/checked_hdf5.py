@@ -66,12 +66,6 @@ class CheckedFile:
         """The error for a file of another kind."""
         return OutputError(f"{self.path}: is no recording of Supple: {what}; give a .vtkhdf that Supple wrote")
 
-    def __contains__(self, path: str) -> bool:
-        try:
-            return path in self._file
-        except (RuntimeError, KeyError, ValueError):
-            return False
-
     def attribute(self, path: str, name: str) -> Any:
         """An attribute, or None where it does not exist."""
         try:

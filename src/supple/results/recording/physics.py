@@ -69,7 +69,7 @@ class RecordedPhysics:
     internal : number of rows of internal variables of a frame
     active : growths and muscles; each frame has their values, see `SolverDetails`
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
-    forces, soft_targets, scripted_pins, stitches : numbers of them in the scene
+    forces, soft_targets, scripted_pins : numbers of them in the scene
     held_joints, motors : numbers of the joints with the world or an obstacle, and of motors of joints
     """
 
@@ -85,7 +85,6 @@ class RecordedPhysics:
     forces: int
     soft_targets: int
     scripted_pins: int
-    stitches: int
     held_joints: int
     motors: int
 
@@ -183,7 +182,6 @@ def recorded_physics(system: System) -> RecordedPhysics:
         forces=len(system.loads) + sum(each.coordinate.is_anchored for each in system.actuators),
         soft_targets=len(system.soft_targets),
         scripted_pins=sum(part.pin.motion is not None for part in system.pins),
-        stitches=len(system.stitching),
         held_joints=sum(joint.second not in names for joint in system.scene.joints),
         motors=sum(isinstance(joint, AxisJoint) and joint.motor is not None for joint in system.scene.joints),
     )

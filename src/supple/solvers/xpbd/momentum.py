@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
+from supple.numerics.mat3 import cross, subtract
 from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import serial_and_parallel
 
 BLOCK = 2048
 # Of each block: sum m x_n (3), sum m x (3), sum m d (3), sum m x_n x d (3), sum m x x_n^T (9), with d = x - x*.
@@ -68,7 +68,6 @@ class MomentumRestore:
         previous: NDArray[np.float64],
         velocities: NDArray[np.float64],
         h: float,
-        parallel: bool,
     ) -> None:
         """End the internal part of a substep: v = (x - x_n) / h, and both momenta of every free component restored.
 
@@ -81,13 +80,12 @@ class MomentumRestore:
         previous : (n, 3) positions at the beginning of the substep [m].
         velocities : (n, 3) in: used to predict the positions of the substep; out: at its end [m/s].
         h : length of the substep [s].
-        parallel : whether blocks of vertices run on several threads.
         """
         work = self.members, self.blocks, self.totals, self.free, self._sums, self._motion
-        _restore[parallel](points, previous, velocities, h, self.masses, *work)
+        _restore(points, previous, velocities, h, self.masses, *work)
 
 
-@njit(cache=True)
+@njit
 def _sum_block(points, previous, velocities, h, masses, members, low, high, out):
     cx = cy = cz = 0.0
     sx = sy = sz = 0.0
@@ -135,52 +133,47 @@ def _sum_block(points, previous, velocities, h, masses, members, low, high, out)
     out[18], out[19], out[20] = a20, a21, a22
 
 
-@njit(cache=True)
-def _cross(a, b):
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-@njit(cache=True)
+@njit
 def _rigid_corrections(blocks, totals, sums, motion):
     """The translation, rotation vector and center of rotation of every component, from the sums of its blocks."""
+    for k in range(len(motion)):
+        for i in range(9):
+            motion[k, i] = 0.0
+    R = np.empty((3, 3))
+    total = np.empty(_SUMS)
     b = 0
     while b < len(blocks):
         component = blocks[b, 0]
         M = totals[component]
-        total = np.zeros(_SUMS)
+        for k in range(_SUMS):
+            total[k] = 0.0
         while b < len(blocks) and blocks[b, 0] == component:
             for k in range(_SUMS):
                 total[k] += sums[b, k]
             b += 1
-        c = total[0:3] / M
-        s = total[3:6] / M
-        P = total[6:9]
-        L = total[9:12] - _cross(c, P)
+        c = (total[0] / M, total[1] / M, total[2] / M)
+        P = (total[6], total[7], total[8])
+        L = subtract((total[9], total[10], total[11]), cross(c, P))
         # sum m r r0^T, and from it A.
-        R = total[12:21].copy().reshape(3, 3)
-        for i in range(3):
-            for j in range(3):
-                R[i, j] -= M * s[i] * c[j]
-        trace = R[0, 0] + R[1, 1] + R[2, 2]
-        A = -R
-        for i in range(3):
-            A[i, i] += trace
-        # The columns of the adjugate are cross products of the rows.
-        c0, c1, c2 = _cross(A[1], A[2]), _cross(A[2], A[0]), _cross(A[0], A[1])
-        det = A[0, 0] * c0[0] + A[0, 1] * c0[1] + A[0, 2] * c0[2]
         for i in range(3):
             motion[component, i] = P[i] / M
-            motion[component, 6 + i] = s[i]
+            motion[component, 6 + i] = total[3 + i] / M
+            for j in range(3):
+                R[i, j] = total[12 + 3 * i + j] - M * motion[component, 6 + i] * c[j]
+        trace = R[0, 0] + R[1, 1] + R[2, 2]
+        x = (trace - R[0, 0], -R[0, 1], -R[0, 2])
+        y = (-R[1, 0], trace - R[1, 1], -R[1, 2])
+        z = (-R[2, 0], -R[2, 1], trace - R[2, 2])
+        # The columns of the adjugate are cross products of the rows.
+        c0, c1, c2 = cross(y, z), cross(z, x), cross(x, y)
+        det = x[0] * c0[0] + x[1] * c0[1] + x[2] * c0[2]
         # Where all vertices are in a line, or the body turned over within the substep, no rotation is defined.
         if abs(det) > 1e-12 * abs(trace) ** 3:
             for i in range(3):
                 motion[component, 3 + i] = (c0[i] * L[0] + c1[i] * L[1] + c2[i] * L[2]) / det
-        else:
-            for i in range(3):
-                motion[component, 3 + i] = 0.0
 
 
-@njit(cache=True)
+@njit
 def _move_block(points, velocities, h, members, low, high, motion):
     for k in range(low, high):
         i = members[k]
@@ -196,7 +189,7 @@ def _move_block(points, velocities, h, members, low, high, motion):
         velocities[i, 2] -= dz / h
 
 
-@serial_and_parallel
+@njit(cache=True, parallel=True, rows=0)
 def _restore(points, previous, velocities, h, masses, members, blocks, totals, free, sums, motion):
     for b in prange(len(blocks)):
         _sum_block(points, previous, velocities, h, masses, members, blocks[b, 1], blocks[b, 2], sums[b])

@@ -125,10 +125,11 @@ class XPBD(Solver):
         extended[: len(system.masses), 3] = inner.inverse_masses
         sets = [*build_constraint_sets(inner, layout), *stitch_constraints(inner, extended[:, 3])]
         threads = self.threads or numba.get_num_threads()
-        collisions = Collisions(inner, self.contact)
+        work = sum(made.work for made in sets)
+        with numba_threads(self.threads or (None if work >= PARALLEL_FROM else 1)):
+            collisions = Collisions(inner, self.contact)
         rigid = RigidBodies(inner)
-        work = sum(made.work for made in sets) + RIGID_POINT * collisions.rigid_points
-        large = work >= PARALLEL_FROM
+        large = work + RIGID_POINT * collisions.rigid_points >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
         with numba_threads(self.threads or (None if large else 1)):
             assessment = Assessment(inner, self.contact, collisions.edge_length)

@@ -15,7 +15,7 @@ from supple.materials.elastic_tets.active import Growth
 from supple.model.state import State
 from supple.model.system import System
 from supple.runtime.thread_tuning import ThreadTuner
-from supple.runtime.threads import numba_threads, one_thread
+from supple.runtime.threads import numba_threads
 from supple.solvers.xpbd.assessment.assessment import Assessment
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
 from supple.solvers.xpbd.assessment.moment import Moment
@@ -120,7 +120,7 @@ class XPBDWorkspace:
         """A frame's block. What is outside of substeps runs in the mode that was faster in them so far."""
         with numba_threads(self.threads):
             self.most_threads = numba.get_num_threads()
-            with one_thread(not self.pace.parallel):
+            with self.pace.threads(self.pace.parallel):
                 yield
 
     def grow(self, time: float) -> float:
@@ -129,13 +129,13 @@ class XPBDWorkspace:
         if laws.growth is None or laws.growth.equals(self.growth):
             return 0.0
         elastic = self.assessment.balance.elastic
-        before = float(elastic.of(self.points, False).sum())
+        before = float(elastic.of(self.points).sum())
         self.growth = laws.growth
         shapes = laws.stress_free.Dm_inv, laws.stress_free.volumes
         for each in (*self.sets, self.assessment.balance.elastic, self.works.at_pins):
             if isinstance(each, (StableNeoHookeanConstraints, ElasticEnergy)):
                 each.grow(*shapes)
-        return float(elastic.of(self.points, False).sum()) - before
+        return float(elastic.of(self.points).sum()) - before
 
     def begin_frame(self, time: float, h: float) -> None:
         """Begin a frame at `time` [s], in substeps of h [s]."""

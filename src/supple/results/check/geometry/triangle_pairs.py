@@ -113,7 +113,7 @@ def _folded(x, s, t):
     return sign != 0 and area_sign(x, a, b, t[m], i, j) == sign
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def triangles_meet(x, s, t):
     """Whether two triangles, three rows of x each, have more in common than the corners and sides that they share."""
     shared = 0

@@ -142,12 +142,12 @@ class Damping(Potential):
         return volumes, self.viscosity.mu, self.viscosity.lam, self.rate.factor, self.rate.reference
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _symmetric_part(M):
     return (M[0], M[4], M[8], 0.5 * (M[5] + M[7]), 0.5 * (M[2] + M[6]), 0.5 * (M[1] + M[3]))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _stress(F, reference, e, factor, mu, lam):
     """The viscous second Piola-Kirchhoff stress of tet e, and its strain rate times that, halved and divided by c."""
     E = green_strain(F)
@@ -164,7 +164,7 @@ def _stress(F, reference, e, factor, mu, lam):
     return S, 0.5 * power / factor
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _full(S):
     return (S[0], S[5], S[4], S[5], S[1], S[3], S[4], S[3], S[2])
 

@@ -91,7 +91,7 @@ def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset:
     return InversionBarrier(elasticity, np.where(wanted, kappa * elasticity.system.rest_volumes, 0.0), onset)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _volume_ratio(x, tets, Dm_inv, e):
     """J of tet e."""
     return det(edge_matrix(x, tets, e)) * det(load_mat(Dm_inv, e))
@@ -139,7 +139,7 @@ def _hessians(x, tets, Dm_inv, stiffness, onset, project, out):
                         out[e, 3 * p + i, 3 * q + j] += stiffness[e] * value
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _cofactors(F):
     """d J / d F, nine numbers."""
     a, b, c = cross(F[3:6], F[6:]), cross(F[6:], F[:3]), cross(F[:3], F[3:6])

@@ -17,7 +17,6 @@ from supple.numerics.sparse.couplings import Couplings
 from supple.numerics.sparse.pcg import CGResult, conjugate_gradients
 from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
 from supple.runtime.thread_tuning import ThreadTuner
-from supple.runtime.threads import one_thread
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.newton.direct_solver import solve_directly
 from supple.solvers.implicit.newton.reduction import Reduction
@@ -106,7 +105,7 @@ class LinearSolver:
         """Assemble the matrix of a new Hessian, and update the preconditioner."""
         began = perf_counter()
         self.parallel = self.pace.choose()
-        with one_thread(not self.parallel):
+        with self.pace.threads(self.parallel):
             diagonal = hessian.vertices[self.order.vertices]
             reduction = self.reduction
             if couplings := (hessian.beyond_elements if reduction is None else reduction.couplings(hessian)):
@@ -157,7 +156,7 @@ class LinearSolver:
             solved, or was found to be indefinite
         """
         began = perf_counter()
-        with one_thread(not self.parallel):
+        with self.pace.threads(self.parallel):
             p, report = self._solve(force, tolerance, convex)
         if p is not None and self.reduction is not None:
             self.reduction.welding.follow(p)

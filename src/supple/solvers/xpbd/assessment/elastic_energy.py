@@ -11,7 +11,6 @@ from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import serial_and_parallel
 
 BLOCK = 1024
 
@@ -73,13 +72,14 @@ class ElasticEnergy:
         shapes = Dm_inv[self._rows].reshape(-1, 9)
         self._data = np.hstack([shapes, self._moduli * volumes[self._rows, None]])
 
-    def of(self, points: NDArray[np.float64], parallel: bool, h: float = math.inf) -> NDArray[np.float64]:
+    def of(self, points: NDArray[np.float64], h: float = math.inf) -> NDArray[np.float64]:
         """Energy of each body (b,) at points (n, 3 or more columns) [J], zero at rest.
 
         With what hard constraints can give out in substeps of `h` [s], where that is finite.
         """
-        _energies_of_tets[parallel](points, self._tets, self._data, 1.0 / h**2, self._of_tets)
-        _energies_of_edges(points, self._edges, self._springs, 1.0 / h**2, self._of_edges)
+        _energies_of_tets(points, self._tets, self._data, 1.0 / h**2, self._of_tets)
+        if len(self._edges):
+            _energies_of_edges(points, self._edges, self._springs, 1.0 / h**2, self._of_edges)
         return _sums(self._of_tets, self._tet_starts) + _sums(self._of_edges, self._edge_starts)
 
 
@@ -102,7 +102,7 @@ def _sums(values: NDArray[np.float64], starts: NDArray[np.intp]) -> NDArray[np.f
     return np.array([values[low:high].sum() for low, high in zip(starts, ends, strict=True)])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _energies_of_block(points, tets, data, hard, out, low, high):
     for t in range(low, high):
         a, b, d, e = tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3]
@@ -132,7 +132,7 @@ def _energies_of_block(points, tets, data, hard, out, low, high):
         out[t] = B[9] * (0.5 * (squares - 3.0) - (J - 1.0)) + 0.5 * (B[10] + hard * B[11]) * (J - 1.0) * (J - 1.0)
 
 
-@serial_and_parallel
+@njit(cache=True, parallel=True, rows=0)
 def _energies_of_tets(points, tets, data, hard, out):
     for block in prange((len(tets) + BLOCK - 1) // BLOCK):
         low = block * BLOCK

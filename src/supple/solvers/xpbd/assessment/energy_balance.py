@@ -83,7 +83,7 @@ class EnergyBalance:
         """The most that violated hard constraints can give out [J]."""
         if not self.elastic.has_hard:
             return 0.0
-        soft, both = (self.elastic.of(moment.points, False, h).sum() for h in (math.inf, self._h))
+        soft, both = (self.elastic.of(moment.points, h).sum() for h in (math.inf, self._h))
         return float(both - soft)
 
     def _measure(self, moment: Moment) -> tuple[NDArray[np.float64], float]:
@@ -91,7 +91,7 @@ class EnergyBalance:
         points, velocities = moment.points, moment.velocities
         squares = self._masses * np.einsum("ij,ij->i", velocities, velocities)
         starts = [part.vertices.start for part in self.system.bodies]
-        bodies = self.elastic.of(points, False) + 0.5 * np.add.reduceat(squares, starts)
+        bodies = self.elastic.of(points) + 0.5 * np.add.reduceat(squares, starts)
         total = float(bodies.sum()) - float((self._masses @ points[:, :3]) @ self.system.gravity)
         if len(self.system.stitching):
             total += stitch_energy(self.system.stitching, np.ascontiguousarray(moment.extended[:, :3]))

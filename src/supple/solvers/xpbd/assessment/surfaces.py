@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.obstacle_poses import ObstaclePoses
 from supple.model.system import System
-from supple.numerics.geometry.box_tree import boxes_of_triangles, near_boxes, overlap
+from supple.numerics.geometry.box_tree import boxes_of_labels, boxes_of_triangles, near_boxes, overlap
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.runtime.kernel_cache import njit
 from supple.scene.contact_pairs import pair_table
@@ -114,9 +114,12 @@ class SurfaceCheck:
         points = np.concatenate(
             [self.system.points.positions(x), np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]]
         )
-        chosen = np.zeros(len(self._triangles), dtype=np.bool_)
-        boxes = np.empty((len(self._names), 6))
-        _note_near(boxes_of_triangles(points, self._triangles), self._owner, collide, boxes, chosen)
+        chosen = collide.diagonal()[self._owner]
+        own = boxes_of_triangles(points, self._triangles)
+        boxes = boxes_of_labels(own, self._owner, len(self._names))
+        starts, near = near_boxes(boxes, collide)
+        if len(near):
+            _note_near(own, self._owner, boxes, starts, near, chosen)
         if not chosen.any():
             return []
         picked = np.flatnonzero(chosen)
@@ -146,21 +149,13 @@ class SurfaceCheck:
 
 
 @njit(cache=True)
-def _note_near(own, owner, collide, boxes, chosen):
-    """Choose the triangles (t,) that reach into the box of another thing that they collide with, or of their own.
+def _note_near(own, owner, boxes, starts, near, chosen):
+    """Choose also the triangles (t,) that reach into the box of another thing that they collide with.
 
-    own : (t, 6) boxes of the triangles; boxes : (p, 6) of all things, scratch memory
+    own : (t, 6) boxes of the triangles; boxes : (p, 6) of all things; starts, near : see `near_boxes`
     """
-    boxes[:, :3] = np.inf
-    boxes[:, 3:] = -np.inf
-    for t in range(len(owner)):
-        for j in range(3):
-            boxes[owner[t], j] = min(boxes[owner[t], j], own[t, j])
-            boxes[owner[t], 3 + j] = max(boxes[owner[t], 3 + j], own[t, 3 + j])
-    starts, near = near_boxes(boxes, collide)
     for t in range(len(owner)):
         k = owner[t]
-        chosen[t] = collide[k, k]
         for i in range(starts[k], starts[k + 1]):
             if chosen[t]:
                 break

@@ -114,7 +114,7 @@ class Works:
         before[self._held] += moved
         after[self._held] -= moved
         places = before, at.begun, at.points, after
-        E = [float(energy.of(x, False, at.h).sum()) for x in places]
+        E = [float(energy.of(x, at.h).sum()) for x in places]
         if self._pins_are_stitched:
             E = [e + self._in_stitches(x, anchors) for e, x in zip(E, places, strict=True)]
         weight = self.system.masses[self._held, None] * self.system.gravity

@@ -120,9 +120,9 @@ class _Constraints:
         self.sweep = Sweep(project, vertices[rows], constants, make_groups(layout, vertices[rows]))
         self.count = self.work = len(rows)
 
-    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
+    def project(self, points: NDArray[np.float64], h: float) -> None:
         """See `ConstraintSet.project`."""
-        self.sweep.run(points, h, parallel)
+        self.sweep.run(points, h)
 
 
 class EdgeConstraints(_Constraints):

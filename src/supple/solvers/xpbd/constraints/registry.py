@@ -32,14 +32,13 @@ class ConstraintSet(Protocol):
     work: int  # cost of a sweep, in edges or volumes
     sweep: Sweep  # over all of them
 
-    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
+    def project(self, points: NDArray[np.float64], h: float) -> None:
         """Project every constraint once, in place.
 
         Parameters
         ----------
         points : (n, 4) positions [m] and inverse masses [1/kg], in the solver's numbering.
         h : length of the substep [s].
-        parallel : whether independent chunks run on several threads.
         """
         ...
 

@@ -63,11 +63,11 @@ class BlocksOfTwo:
         material = np.column_stack([mu * V, lam * V, 1.0 + mu / lam, self._longest])
         return np.hstack([gradients.reshape(-1, 9), material, curvatures, w])
 
-    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
+    def project(self, points: NDArray[np.float64], h: float) -> None:
         """See `ConstraintSet.project`."""
         if h != self._warned_for:
             self._warn_if_shortened(h)
-        self.sweep.run(points, h, parallel)
+        self.sweep.run(points, h)
 
     def _warn_if_shortened(self, h: float) -> None:
         self._warned_for = h

@@ -59,9 +59,9 @@ class StitchSpringConstraints:
         self.sweep = Sweep(_project_springs, ends, constants, groups)
         self.count = self.work = len(ends)
 
-    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
+    def project(self, points: NDArray[np.float64], h: float) -> None:
         """See `ConstraintSet.project`."""
-        self.sweep.run(points, h, parallel)
+        self.sweep.run(points, h)
 
 
 def stitch_constraints(

@@ -157,9 +157,7 @@ class Collisions:
         if self.obstacles:
             self.obstacles.end_substep()
 
-    def project(
-        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float, parallel: bool = False
-    ) -> int:
+    def project(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
         """Resolve all contacts of one substep, in place. Returns their number. May be repeated within the substep.
 
         An overlap that existed when the substep began is removed from `x` and from `x_prev` alike, so that it causes no
@@ -170,13 +168,12 @@ class Collisions:
         x : (n, 3) positions at the end of the substep, after all other constraints [m]
         x_prev : (n, 3) positions at its beginning [m]
         time : end of the substep [s]; h : its length [s].
-        parallel : whether contacts are searched on several threads.
         """
         self.contacts, self._dipped = 0, False
         self.moved = bool(self.obstacles)
         limit, self._removed = self._removed, 0.0
         if self.surfaces is not None:
-            self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
+            self._count(self.surfaces.project(x, x_prev, (time - h, time), limit))
             self.moved |= self.surfaces.moved
         between = self.contacts
         self._project_obstacles(x, x_prev, time, h, limit)

@@ -111,7 +111,7 @@ class ContactRows:
 
     def keep(self) -> None:
         """End a substep: the next one begins with a share of the forces."""
-        self.loads = keep_shares(self.forces, self.shares)
+        self.loads = len(self.keys) > 0 and keep_shares(self.forces, self.shares)
 
     def loaded(self) -> LoadedRows:
         """Copies of all rows that hold a force."""
@@ -134,21 +134,9 @@ def _among(few: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.bool_]
     return keys[np.minimum(np.searchsorted(keys, few), len(keys) - 1)] == few
 
 
-@njit(cache=True)
-def loaded_rows(forces):
+def loaded_rows(forces: NDArray[np.float64]) -> NDArray[np.int64]:
     """The rows that hold a force (k, 3), ascending."""
-    out = np.empty(len(forces), dtype=np.int64)
-    count = 0
-    for e in range(len(forces)):
-        out[count] = e
-        count += forces[e, 0] != 0.0 or forces[e, 1] != 0.0 or forces[e, 2] != 0.0
-    return out[:count].copy()
-
-
-@njit(cache=True)
-def deactivate(active):
-    """Begin a search for contacts: no row takes part."""
-    active[:] = False
+    return np.flatnonzero(forces.any(axis=1))
 
 
 @njit(cache=True)

@@ -114,7 +114,10 @@ class MovedPoints:
         ----------
         x, x_prev : (n, 3) vertices then; places, before : of the points, out
         """
-        _begin(x, x_prev, self._described, places, before, self._bodies, self._known, self.movers, self._total)
+        self.take(x, places)
+        self.take(x_prev, before)
+        if len(self._total):
+            _begin(x, x_prev, before, self._bodies, self._known, self.movers, self._total)
         self._known = True
 
     def settle(self, places: NDArray[np.float64], before: NDArray[np.float64], predicted: NDArray[np.float64]) -> None:
@@ -206,13 +209,8 @@ def settle(places, before, predicted, movers, total):
 
 
 @njit(cache=True)
-def _begin(x, x_prev, points, places, before, bodies, known, movers, total):
-    start, vertices, weights = points
+def _begin(x, x_prev, before, bodies, known, movers, total):
     control = bodies[0]
-    take_points(x, start, vertices, weights, places)
-    take_points(x_prev, start, vertices, weights, before)
-    if len(control) == 0:
-        return
     total[:] = 0.0
     movers.twists[:] = 0.0
     if not known:

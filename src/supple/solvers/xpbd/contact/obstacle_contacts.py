@@ -226,7 +226,7 @@ class ObstacleContacts:
     def end_substep(self) -> None:
         """Keep the share of the loads with which the next substep begins."""
         count = self._starts[-1]
-        self._any_load = keep_shares(self._loads[:count], self._shares[:count])
+        self._any_load = count > 0 and keep_shares(self._loads[:count], self._shares[:count])
 
     def project(
         self,
@@ -240,6 +240,8 @@ class ObstacleContacts:
 
         Returns the number of contacts, and the smallest gap [m]. For `limit` and `scales` see `_project_shapes`.
         """
+        if self._starts[-1] == 0:
+            return 0, math.inf
         frames = tuple(self.shapes.placed(self.poses, time) for time in reversed(times))
         candidates = (self._starts, self._vertices, self._loads, self._shares, self._places)
         described = (candidates, self._arrays, self._rules, *frames)

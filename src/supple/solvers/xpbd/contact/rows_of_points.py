@@ -19,7 +19,7 @@ def take_points(x, start, vertices, weights, out):
             out[i, 0], out[i, 1], out[i, 2] = a, b, c
 
 
-@njit(cache=True)
+@njit
 def give_rows(points, start, vertices, x):
     """Copy those of the points back that are vertices of x (n, 3)."""
     for i in range(len(start) - 1):

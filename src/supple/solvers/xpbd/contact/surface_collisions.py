@@ -13,7 +13,8 @@ from supple.contact.search.point_inside import depths_inside
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.model.system import System
-from supple.solvers.xpbd.contact.contact_rows import ContactRows, LoadedRows, choose_rows, deactivate, push_rows
+from supple.runtime.threads import threads_for
+from supple.solvers.xpbd.contact.contact_rows import ContactRows, LoadedRows, choose_rows, push_rows
 from supple.solvers.xpbd.contact.detection.edge_contacts import (
     find_edge_contacts,
     find_edge_passages,
@@ -128,7 +129,7 @@ class SurfaceCollisions:
         self._recall(memory, still[s.point_piece])
         if not still.all():
             if not self._lists.hold(self._depth.max(axis=0)):
-                self._list(motions, False)
+                self._list(motions)
             self._lists.number(self._rows)
             self._lists.excursions[:] = 0.0
 
@@ -153,7 +154,6 @@ class SurfaceCollisions:
         x_prev: NDArray[np.float64],
         times: tuple[float, float],
         limit: float,
-        parallel: bool,
     ) -> tuple[int, float]:
         """Keep surfaces apart over the substep `times` = (beginning, end) [s]; returns what `solve_rows` does."""
         s, h = self.surfaces, times[1] - times[0]
@@ -163,19 +163,19 @@ class SurfaceCollisions:
         self._begun[len(s.rows) :] = self._before[len(s.rows) :]
         self._predicted[len(s.rows) :] = self._x[len(s.rows) :]
         if self._lists.left(self._x, self._before):
-            self._list((self._x - self._before) * (self._dt / h), parallel)
+            self._list((self._x - self._before) * (self._dt / h))
             self._lists.number(self._rows)
         contacts, smallest = 0, np.inf
         self.parted, self.moved = True, False
         self._look_near()
-        deactivate(self._rows.active)
+        self._rows.active[:] = False
         self._chosen = [chosen[:0] for chosen in self._chosen]
         if not self._lists.near and not self._rows.loads:
             return 0, np.inf
         # Obstacles come last because they cannot be moved.
         for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
             if part[0] < part[1] and len(self._rows.keys):
-                gap = self._find(kind, part, h, parallel)
+                gap = self._find(kind, part, h)
                 pushes, least = self._solve(kind, h, limit)
                 for k in range(MOST_PASSAGES):
                     if not self._find_passages(kind, part, h):
@@ -215,6 +215,8 @@ class SurfaceCollisions:
         self._look_again()
         shapes, lists = (self._x, self._begun), self._lists
         passed = np.zeros_like(self._apart)
+        if not self._lists.near:
+            return passed
         note_point_passages(*shapes, lists.near.points, self._pieces, self._apart, self._stitched, passed)
         edges = (lists.pairs, lists.near.edges, lists.edges.arrays[0], self._edge_rules)
         note_edge_passages(*shapes, *edges, passed)
@@ -238,7 +240,8 @@ class SurfaceCollisions:
 
     def end_substep(self) -> None:
         """Keep the share of the forces with which the next substep begins."""
-        note_shares(self._before, self._predicted, self._points, self._rows.described, self._h)
+        if len(self._rows.keys):
+            note_shares(self._before, self._predicted, self._points, self._rows.described, self._h)
         self._rows.keep()
 
     def _look_near(self) -> None:
@@ -287,19 +290,19 @@ class SurfaceCollisions:
             self._choose(kind, h)
         return passed > 0
 
-    def _find(self, kind: int, part: tuple[int, int], h: float, parallel: bool) -> float:
+    def _find(self, kind: int, part: tuple[int, int], h: float) -> float:
         """Find the contacts with the triangles of one part, of bodies (0) or of obstacles (1); the smallest gap [m]."""
         rows, lists = self._rows, self._lists
         bodies, near = len(self.surfaces.rows), self._least_gap
         described = rows.described
         smallest = np.inf
-        deactivate(rows.active)
+        rows.active[:] = False
         n_active = lists.near.lists[0]
         if n_active:
             shapes = (self._pieces, (self._depth[kind], self._entered, lists.complete))
-            several = parallel and n_active >= PARALLEL_FROM
             places, which = (self._x, self._before, lists.near.lists), (near, part, self._stitched)
-            find_contacts[several](*places, *shapes, *which, described, self._smallest)
+            with threads_for(n_active, PARALLEL_FROM):
+                find_contacts(*places, *shapes, *which, described, self._smallest)
             smallest = self._smallest[:n_active].min()
         if len(lists.edges.keys):
             which = (near, bodies, kind)
@@ -347,12 +350,15 @@ class SurfaceCollisions:
         if known < len(self._x):
             self._find_overlaps()
 
-    def _list(self, motions: NDArray[np.float64], parallel: bool) -> None:
-        self._lists.renew(self._x, self._before, motions, self._depth.max(axis=0), parallel)
+    def _list(self, motions: NDArray[np.float64]) -> None:
+        self._lists.renew(self._x, self._before, motions, self._depth.max(axis=0))
 
     def _find_overlaps(self) -> None:
         """Set how deep each point is inside other pieces, from positions alone."""
         s = self.surfaces
+        self._depth[:] = 0.0
+        if not (s.allowed & ~np.eye(len(s.allowed), dtype=np.bool_)).any():
+            return
         boxes = np.empty((len(s.closed), 3)), np.empty((len(s.closed), 3))
         boxes_of_pieces(self._x, s.point_piece, np.zeros((len(self._x), 1)), *boxes)
         for kind, part in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):

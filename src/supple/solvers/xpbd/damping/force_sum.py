@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import FLAGS, SerialAndParallel, kernel_with, serial_and_parallel
+from supple.runtime.kernel_cache import kernel_with, njit, prange
+from supple.solvers.xpbd.sweeps.compilation import FLAGS
 from supple.solvers.xpbd.sweeps.groups import WIDTH, Groups
 
 
@@ -42,15 +42,15 @@ class ForceSum:
         self.members = groups.members
         self.rates, self.powers = np.zeros(len(self._counts)), np.zeros(len(self._counts))
         self._active = np.ones(len(self._counts), dtype=np.bool_)
-        self._kernels = _sum_of(laws[0], elements.shape[1])
-        self._power_kernels = _powers_of(laws[1], elements.shape[1])
+        self._kernel = _sum_of(laws[0], elements.shape[1])
+        self._power_kernel = _powers_of(laws[1], elements.shape[1])
 
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:
         """Sum only the groups with a vertex that can move, of inverse masses (n,) [1/kg]."""
         self._active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
         self.rates[:] = 0.0
 
-    def add(self, motion: NDArray[np.float64], h: float, out: NDArray[np.float64], parallel: bool) -> None:
+    def add(self, motion: NDArray[np.float64], h: float, out: NDArray[np.float64]) -> None:
         """Add the forces to `out`.
 
         Parameters
@@ -59,26 +59,28 @@ class ForceSum:
             matrix [kg/s]; h : length of the substep [s]
         """
         elements = (self._corners, self._counts, self._active, self._data, self._pointers)
-        self._kernels[parallel](motion, *elements, h, out, self.rates)
+        self._kernel(motion, *elements, h, out, self.rates)
 
-    def find_powers(self, motion: NDArray[np.float64], h: float, weights: NDArray[np.float64], parallel: bool) -> None:
+    def find_powers(self, motion: NDArray[np.float64], h: float, weights: NDArray[np.float64]) -> None:
         """Set `powers`, with which the forces resist the velocities, times weights (g,); less work than the forces."""
         elements = (self._corners, self._counts, np.where(self._active, weights, 0.0), self._data, self._pointers)
-        self._power_kernels[parallel](motion, *elements, h, self.powers)
+        self._power_kernel(motion, *elements, h, self.powers)
 
 
 @cache
-def _sum_of(forces: Any, corners: int) -> SerialAndParallel:
+def _sum_of(forces: Any, corners: int) -> Any:
     chunk = kernel_with(_sum_chunk, forces.py_func.__qualname__, forces=forces, CORNERS=corners)
     compiled = njit(fastmath=FLAGS, error_model="numpy")(chunk)
-    return serial_and_parallel(kernel_with(_sum, forces.py_func.__qualname__, _sum_chunk=compiled))
+    return njit(cache=True, parallel=True, rows=0)(kernel_with(_sum, forces.py_func.__qualname__, _sum_chunk=compiled))
 
 
 @cache
-def _powers_of(powers: Any, corners: int) -> SerialAndParallel:
+def _powers_of(powers: Any, corners: int) -> Any:
     chunk = kernel_with(_power_chunk, powers.py_func.__qualname__, powers=powers, CORNERS=corners)
     compiled = njit(fastmath=FLAGS, error_model="numpy")(chunk)
-    return serial_and_parallel(kernel_with(_powers, powers.py_func.__qualname__, _power_chunk=compiled))
+    return njit(cache=True, parallel=True, rows=0)(
+        kernel_with(_powers, powers.py_func.__qualname__, _power_chunk=compiled)
+    )
 
 
 if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sum_chunk` and `_power_chunk`

@@ -165,7 +165,6 @@ class Damping:
         anchor_velocities: NDArray[np.float64],
         substeps: int,
         h: float,
-        parallel: bool,
     ) -> None:
         """Find the viscous forces of a cycle of `substeps` substeps of h [s].
 
@@ -181,17 +180,17 @@ class Damping:
         shape = groups.start, groups.rows, groups.fields, self._frames
         ratio = min(1.0, H / self._interval) if self._interval > 0.0 else 0.0
         cycle.extrapolate(*shape, motion, self._forces, self._local_forces, self._local_velocities, ratio)
-        self._apply(h, parallel)
+        self._apply(h)
         fast = self._fast_bodies(H)
         if fast.any():
             cycle.forget(groups.start, groups.rows, groups.blocks, fast, velocities, self._forces, motion)
-            self._apply(h, parallel)
+            self._apply(h)
         cycle.restrict(*shape, H, self._forces, self._viscous, self._coarse)
         coarse.solve(self._coarse)
         motion[self._held, 3:] = 0.0
         where = groups.blocks, H, self._masses
         cycle.correct(*shape, *where, k, self._forces, self._viscous, self._coarse, motion, self._products)
-        found = self._products, self._powers(h, parallel)
+        found = self._products, self._powers(h)
         cycle.step(
             groups.start, groups.rows, groups.blocks, H, LONGEST_STEP, self._masses, motion, *found, self._forces
         )
@@ -223,16 +222,16 @@ class Damping:
             fast[bodies[made.rates > (LARGEST_STRAIN / H) ** 2]] = True
         return fast
 
-    def _apply(self, h: float, parallel: bool) -> None:
+    def _apply(self, h: float) -> None:
         self._viscous[:] = 0.0
         for made in self._sums:
-            made.add(self._motion, h, self._viscous, parallel)
+            made.add(self._motion, h, self._viscous)
 
-    def _powers(self, h: float, parallel: bool) -> NDArray[np.float64]:
+    def _powers(self, h: float) -> NDArray[np.float64]:
         """(b,) forces times velocities in `_motion` of each body, from the part of its groups whose turn it is [W]."""
         total = np.zeros(len(self._groups.blocks) - 1)
         for made, bodies, weights in zip(self._sums, self._bodies, self._weights, strict=True):
-            made.find_powers(self._motion, h, weights[self._cycle % PARTS], parallel)
+            made.find_powers(self._motion, h, weights[self._cycle % PARTS])
             total += np.bincount(bodies, made.powers, len(total))
         return total
 

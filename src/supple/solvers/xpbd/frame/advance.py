@@ -43,7 +43,7 @@ def advance(
         crossing = [each.numbers for each in overlaps if each.pairs]
         ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing, sleep.asleep)
         ws.collisions.forces.keep_standing((sleep.contacts, sleep.loads), sleep.asleep)
-    ws.guard.measure(ws.points, False)
+    ws.guard.measure(ws.points)
     ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
     ws.guard.accept()
     ws.begin_frame(state.time, h)
@@ -51,30 +51,30 @@ def advance(
     damping, lengths = damping_in(ws, h), cycles(substeps)
     if damping is not None:
         damping.begin_step(memory.viscous, state.velocities)
-    for k, parallel in ws.pace.tasks(0 if sleep.asleep.all() else substeps, ws.most_threads):
+    for k in ws.pace.tasks(0 if sleep.asleep.all() else substeps, ws.most_threads):
         end = state.time + (k + 1) * h
         if damping is not None and k in lengths:
             moving = ws.anchors.velocities(end - h, h)
-            damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h, parallel)
+            damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h)
         grow(ws, end)
-        begin_substep(ws, targets[k], end, h, parallel)
+        begin_substep(ws, targets[k], end, h)
         at = ws.substep(end, h)
         ws.loads.add_forces(at)
         push(ws, damping, h)
         if k == substeps - 1:
             ws.delivered.begin(ws.extended)
         for constraints in ws.sets:
-            constraints.project(ws.extended, h, parallel)
+            constraints.project(ws.extended, h)
         ws.actuators.project_within(at)
-        restore(ws, h, parallel)
+        restore(ws, h)
         ws.loads.pull_to_targets(at)
         ws.loads.pull_springs(at)
         ws.actuators.project_between(at)
         move_rigid(ws, end, h)
-        if collides and not collide(ws, end, h, parallel):
+        if collides and not collide(ws, end, h):
             break
         hold_in_contact(ws, end, h)
-        held_back += keep_volumes(ws, end, h, parallel)
+        held_back += keep_volumes(ws, end, h)
         if collides:
             ws.collisions.end_substep()
         if len(ws.joints):

@@ -45,7 +45,7 @@ def end_frame(
     """
     h = dt / used.count
     to_world(ws.points, ws.origins, ws.world)
-    ws.guard.measure(ws.points, False)
+    ws.guard.measure(ws.points)
     ws.works.end_frame(ws.velocities, ws.actuators.works())
     held, works = held_back / used.count, ws.works.by_name
     softening = ws.assessment.softening

@@ -47,11 +47,11 @@ def hold_in_contact(ws: XPBDWorkspace, time: float, h: float) -> None:
             return
 
 
-def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
+def collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
     """Project the contacts of a substep, in the world. Returns False, without effect, where a position is lost."""
     if not _to_world(ws):
         return False
-    ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
+    ws.collisions.project(ws.world, ws.world_previous, time, h)
     _apply(ws, time, h)
     return True
 
@@ -80,28 +80,28 @@ def _to_world(ws: XPBDWorkspace) -> bool:
     return to_world(ws.points, ws.origins, ws.world)
 
 
-def keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
+def keep_volumes(ws: XPBDWorkspace, time: float, h: float) -> bool:
     """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
     searched = True  # whether the contacts that were projected last had been searched anew
     for k in range(MOST_PROJECTIONS):
-        low = ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0)
+        low = ws.guard.measure(ws.points, ENOUGH if k else 1.0)
         if not low and searched and ws.collisions.parted:
             ws.guard.accept()
             return False
         if low:
             ws.guard.project(ws.points)
-            restore(ws, h, parallel)
+            restore(ws, h)
         searched = not low or k % SEARCH_EACH == 0
         if ws.collisions:
-            found = collide(ws, time, h, parallel) if searched else collide_again(ws, time, h)
+            found = collide(ws, time, h) if searched else collide_again(ws, time, h)
             if not found:
                 return True
-    return _shorten(ws, time, h, parallel)
+    return _shorten(ws, time, h)
 
 
-def _shorten(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
+def _shorten(ws: XPBDWorkspace, time: float, h: float) -> bool:
     """Shorten the motion of what has still turned over or passed through something. Returns whether there was any."""
-    ws.guard.measure(ws.points, parallel)
+    ws.guard.measure(ws.points)
     failures = ws.guard.failures()
     arrays = (ws.points, ws.velocities, ws.previous, ws.begun, ws.origins, h, ws.guard.bounds, time)
     failed = bool(failures.any())
@@ -119,7 +119,7 @@ def _shorten(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
         groups, stopped = joined, share == 0.0
         ws.fallback.apply(*arrays, [sorted(group) for group in groups], share)
         ws.rigid.settle(ws.points, ws.velocities)
-    ws.guard.measure(ws.points, parallel)
+    ws.guard.measure(ws.points)
     ws.guard.accept()
     return failed
 
@@ -130,10 +130,10 @@ def _passed(ws: XPBDWorkspace) -> NDArray[np.int64]:
     return ws.collisions.passed(ws.world, ws.fallback.labels)
 
 
-def restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
+def restore(ws: XPBDWorkspace, h: float) -> None:
     """The velocities of changed positions, with the momentum of the velocities before; rigid bodies are rigid."""
     if ws.momentum is not None:
-        ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
+        ws.momentum.apply(ws.points, ws.previous, ws.velocities, h)
     ws.rigid.gather(ws.points, ws.velocities, h)
     ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
     if ws.momentum is None:

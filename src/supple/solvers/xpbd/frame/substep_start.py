@@ -40,10 +40,10 @@ def grow(ws: XPBDWorkspace, end: float) -> None:
         add_works(ws.works.by_name, {"growth": work})
 
 
-def begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
+def begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float) -> None:
     """Predict positions, with pinned vertices at `targets` (k, 3)."""
     ws.time = end
-    predict[parallel](ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
+    predict(ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
     ws.begun[:] = ws.previous
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import serial_and_parallel
 
 # Above ONSET a tet may lose half of its volume in one substep; below, it may not lose any more.
 ONSET, KEEP = 0.25, 0.5
@@ -51,9 +50,9 @@ class VolumeGuard:
         self.J, self.bounds = np.zeros(m), np.full(m, -np.inf)
         self.guarded = np.zeros(m, dtype=np.bool_)
 
-    def measure(self, points: NDArray[np.float64], parallel: bool, share: float = 1.0) -> bool:
+    def measure(self, points: NDArray[np.float64], share: float = 1.0) -> bool:
         """Compute J at `points` (n, 4); returns whether a tet is below this share of its bound."""
-        return _measure[parallel](points, self.tets, self.scale, self.bounds, share, self.J) > 0
+        return _measure(points, self.tets, self.scale, self.bounds, share, self.J) > 0
 
     def project(self, points: NDArray[np.float64]) -> None:
         """Project every tet below its bound, once forward and once backward over all tets, in place."""
@@ -80,7 +79,7 @@ def _edges(points, a, b, d, e):
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _measure_block(points, tets, scale, bounds, share, out, low, high):
     below = 0
     for t in range(low, high):
@@ -92,7 +91,7 @@ def _measure_block(points, tets, scale, bounds, share, out, low, high):
     return below
 
 
-@serial_and_parallel
+@njit(cache=True, parallel=True, rows=0)
 def _measure(points, tets, scale, bounds, share, out):
     below = 0
     for block in prange((len(tets) + BLOCK - 1) // BLOCK):

@@ -46,7 +46,7 @@ def center_of(x, control, b):
     return (cx, cy, cz)
 
 
-@njit(cache=True)
+@njit
 def inertia_of(x, control, b):
     """Center (3,) of the control points of body b, and sum r_k.r_k 1 - r_k r_k^T as six numbers: xx yy zz xy yz zx."""
     center = center_of(x, control, b)
@@ -90,7 +90,7 @@ def solve_symmetric(S, v):
     return solve((S[0], S[3], S[5]), (S[3], S[1], S[4]), (S[5], S[4], S[2]), v)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def half_turn(S, L):
     """The unit quaternion (w, q) with 2 w S q + 2 q x (S q) = L; see the module."""
     spin = solve_symmetric(S, L)

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import FLAGS, SerialAndParallel, kernel_with, serial_and_parallel
+from supple.runtime.kernel_cache import kernel_with, njit, prange
+from supple.solvers.xpbd.sweeps.compilation import FLAGS
 from supple.solvers.xpbd.sweeps.groups import WIDTH, Groups
 
 
@@ -43,7 +43,7 @@ class Sweep:
         self._data = groups.lanes(constants)
         self._counts, self._pointers = groups.counts, groups.pointers
         self._active = np.ones(len(self._counts), dtype=np.bool_)
-        self._kernels = _sweep_of(project, constraints.shape[1])
+        self._kernel = _sweep_of(project, constraints.shape[1])
 
     @property
     def groups(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
@@ -58,16 +58,16 @@ class Sweep:
         """Replace the constants (m, c)."""
         self._data = self._groups.lanes(constants)
 
-    def run(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
+    def run(self, points: NDArray[np.float64], h: float) -> None:
         """Project every constraint once: see `ConstraintSet.project`."""
-        self._kernels[parallel](points, self._corners, self._counts, self._active, self._data, self._pointers, h)
+        self._kernel(points, self._corners, self._counts, self._active, self._data, self._pointers, h)
 
 
 @cache
-def _sweep_of(project: Any, corners: int) -> SerialAndParallel:
+def _sweep_of(project: Any, corners: int) -> Any:
     name = project.py_func.__qualname__
     chunk = njit(fastmath=FLAGS, error_model="numpy")(kernel_with(_sweep_chunk, name, project=project, CORNERS=corners))
-    return serial_and_parallel(kernel_with(_sweep, name, _sweep_chunk=chunk))
+    return njit(cache=True, parallel=True, rows=0)(kernel_with(_sweep, name, _sweep_chunk=chunk))
 
 
 if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sweep_chunk`

@@ -6,16 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.distances import edge_edge_square
-from supple.contact.search.pair_kernels import RUNS, sort_pairs
+from supple.contact.search.pair_kernels import RUNS
 from supple.contact.search.room import Room
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, near_boxes, next_leaf, overlap
+from supple.numerics.geometry.box_tree import (
+    STACK,
+    BoxTree,
+    after_leaf,
+    boxes_of_labels,
+    near_boxes,
+    next_leaf,
+    overlap,
+)
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 from supple.solvers.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
 from supple.solvers.xpbd.contact.detection.surface_edges import SurfaceEdges
-from supple.solvers.xpbd.sweeps.compilation import serial_and_parallel
 
 
 @njit(cache=True)
@@ -53,11 +60,12 @@ def _share_an_end(ends, e, f):
 def folded_edges(x, ends, lengths, pieces, together, near, surfaces):
     """The edges (e,) that have an end where the surface may cross itself; see `SQUEEZED`.
 
-    Only edges of pieces that may touch themselves; for the other arguments see `boxes_of_edges`.
+    Only edges of pieces that may touch themselves.
 
     Parameters
     ----------
-    lengths : (e,) of the edges at rest [m]
+    x : (n, 3) points; ends : (e, 2); lengths : (e,) of the edges at rest [m]; pieces : (e,)
+    together : (p, p) whether two pieces may touch, either way
     near : starts (n + 1,) and triangles: those near each point, see `PairFinder`
     surfaces : point_piece (n,), triangles (t, 3), triangle_piece (t,)
     """
@@ -82,35 +90,25 @@ def folded_edges(x, ends, lengths, pieces, together, near, surfaces):
 
 
 @njit(cache=True)
-def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
-    """Write the boxes of edges, with their margins. Returns which of them meet the box of another piece they may touch.
-
-    Parameters
-    ----------
-    x : (n, 3) points; ends : (e, 2); margin : (e,) [m]; pieces : (e,)
-    together : (p, p) whether two pieces may touch, either way
-    boxes : (e, 6) out; piece_boxes : (p, 6) out, low and high corners [m]
-    """
-    piece_boxes[:, :3] = np.inf
-    piece_boxes[:, 3:] = -np.inf
+def _boxes_of_edges(x, ends, margin, boxes):
+    """Write the boxes of edges (e, 2) of points (n, 3), with their margins (e,), to boxes (e, 6) [m]."""
     for e in range(len(ends)):
-        k = pieces[e]
         for j in range(3):
             a, b = x[ends[e, 0], j], x[ends[e, 1], j]
             boxes[e, j], boxes[e, 3 + j] = min(a, b) - margin[e], max(a, b) + margin[e]
-            piece_boxes[k, j] = min(piece_boxes[k, j], boxes[e, j])
-            piece_boxes[k, 3 + j] = max(piece_boxes[k, 3 + j], boxes[e, 3 + j])
-    starts, near = near_boxes(piece_boxes, together)
-    meets = np.zeros(len(ends), dtype=np.bool_)
-    for e in range(len(ends)):
+
+
+@njit(cache=True)
+def _meet_pieces(boxes, pieces, piece_boxes, starts, near, meets):
+    """Note which boxes of edges meet the box of another piece; starts, near : see `near_boxes`."""
+    for e in range(len(boxes)):
         for i in range(starts[pieces[e]], starts[pieces[e] + 1]):
             if overlap(piece_boxes, near[i], boxes[e]):
                 meets[e] = True
                 break
-    return meets
 
 
-@serial_and_parallel
+@njit(cache=True, parallel=True, rows=0)
 def pairs_within_margins(
     x,
     margin,
@@ -135,7 +133,8 @@ def pairs_within_margins(
 
     Parameters
     ----------
-    x, margin, boxes, pieces, together, ends : see `boxes_of_edges`; own_margin : (e,) for pairs of one piece [m]
+    x, pieces, together, ends : see `folded_edges`; margin, boxes : see `_boxes_of_edges`
+    own_margin : (e,) for pairs of one piece [m]
     folded : (e,) those that are also compared with edges of their own piece
     near : (k,) the edges of the tree; nodes, labels, order : of the tree over their boxes, labelled with pieces
     triangles : (e, 2) beside each edge, -1 for none; starts (t + 1,), points : those stitched to each triangle
@@ -192,7 +191,7 @@ class EdgePairs:
         rest: NDArray[np.float64],
         stitched: tuple[NDArray[np.int64], NDArray[np.int32]],
     ) -> None:
-        e, p = len(edges.ends), len(surfaces.closed)
+        e = len(edges.ends)
         self.edges = edges
         self.arrays = (edges.ends, edges.opposite)
         self.keys = np.zeros(0, dtype=np.int64)
@@ -201,7 +200,7 @@ class EdgePairs:
         self._together = surfaces.allowed | surfaces.allowed.T
         self._stitched = stitched
         self._lengths = np.linalg.norm(rest[edges.ends[:, 0]] - rest[edges.ends[:, 1]], axis=1)
-        self._boxes, self._piece_boxes = np.zeros((e, 6)), np.zeros((p, 6))
+        self._boxes = np.zeros((e, 6))
         self._room = Room()
         self._first = self._second = np.zeros(0, dtype=np.int32)
 
@@ -212,23 +211,23 @@ class EdgePairs:
         """List pairs of pieces (p, p) that may touch in one direction only."""
         self._together[:] = allowed | allowed.T
 
-    def renew(
-        self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], near: tuple, parallel: bool
-    ) -> None:
+    def renew(self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], near: tuple) -> None:
         """List the pairs that may touch before a point has moved too far.
 
         Parameters
         ----------
         x : (n, 3) [m]; motions : two (n,), how far each point may move, absolutely and relative to its piece [m]
         gaps : (n,) the largest gap that each point keeps [m]; near : see `folded_edges`
-        parallel : whether several threads search
         """
         a, b = self.edges.ends.T
         margin, own = (np.maximum(each[a], each[b]) + 0.5 * gaps[a] for each in motions)
         # A point may move more relative to a piece that turns than absolutely.
-        meets = boxes_of_edges(
-            x, self.edges.ends, np.maximum(margin, own), self._pieces, self._together, self._boxes, self._piece_boxes
-        )
+        _boxes_of_edges(x, self.edges.ends, np.maximum(margin, own), self._boxes)
+        piece_boxes = boxes_of_labels(self._boxes, self._pieces, len(self._together))
+        starts, others = near_boxes(piece_boxes, self._together)
+        meets = np.zeros(len(self._boxes), dtype=np.bool_)
+        if len(others):
+            _meet_pieces(self._boxes, self._pieces, piece_boxes, starts, others, meets)
         rest = (self._lengths, self._pieces, self._together)
         folded = folded_edges(x, self.edges.ends, *rest, near, self._surfaces)
         taking_part = np.flatnonzero((meets | folded) & np.isfinite(self._boxes).all(axis=1))
@@ -239,14 +238,14 @@ class EdgePairs:
             rules = (self._pieces, self._together, self.edges.ends, self.edges.triangles, *self._stitched)
             room = self._room
             while True:
-                pairs_within_margins[parallel](
+                pairs_within_margins(
                     x, margin, own, self._boxes, folded, *nodes, *rules, room.start, room.counts, room.pairs
                 )
                 if not room.is_too_small():
                     break
-            pairs = sort_pairs(room.pairs, room.start, room.counts, len(self.edges.ends))
+            pairs = room.sorted(len(self.edges.ends))
         self._first, self._second = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
-        self.keys = keys_of_edges(self._first, self._second)
+        self.keys = keys_of_edges(self._first, self._second) if len(pairs) else np.zeros(0, dtype=np.int64)
 
     def numbered(self, rows: NDArray[np.int64]) -> tuple:
         """The argument `pairs` of `find_edge_contacts`, for these rows."""

@@ -136,8 +136,8 @@ def measure(x, lists, triangles, of_points, pairs, ends, of_edges):
 
 
 @njit(cache=True, error_model="numpy")
-def points_of(n, lists, triangles, pairs, ends):
-    """The points that take part in any pair, ascending; n is the number of all."""
+def taking_part(n, lists, triangles, pairs, ends):
+    """(n,) the points that take part in any pair."""
     taking = np.zeros(n, dtype=np.bool_)
     n_active, points, _, _, _, listed = lists
     for index in range(n_active):
@@ -149,7 +149,7 @@ def points_of(n, lists, triangles, pairs, ends):
     for i in range(len(first)):
         for e in (first[i], second[i]):
             taking[ends[e, 0]] = taking[ends[e, 1]] = True
-    return np.flatnonzero(taking)
+    return taking
 
 
 class NearPairs:
@@ -187,7 +187,10 @@ class NearPairs:
         self._distances = np.zeros(len(lists[-1])), np.zeros(len(pairs[0]))
         self._most = -1.0
         self.points, self.edges, self.lists = self.points[:0], self.edges[:0], (0,)
-        self._points = points_of(len(self._ways), lists, self._triangles, pairs, self._ends)
+        any_pair = len(lists[-1]) or len(pairs[0])
+        self._points = self._points[:0]
+        if any_pair:
+            self._points = np.flatnonzero(taking_part(len(self._ways), lists, self._triangles, pairs, self._ends))
 
     def look(
         self,
@@ -221,4 +224,4 @@ class NearPairs:
 
     def left(self, x: NDArray[np.float64], distance: float) -> bool:
         """Whether a point of any pair, at x (n, 3), is farther than a distance [m] from its way."""
-        return left_ways(self._points, self._begin, self._end, x, distance)
+        return len(self._points) > 0 and left_ways(self._points, self._begin, self._end, x, distance)

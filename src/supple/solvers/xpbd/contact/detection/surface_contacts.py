@@ -19,7 +19,6 @@ from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine, square_from_box
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.sweeps.compilation import serial_and_parallel
 
 # Squared distances with a relative difference below this are equal: the point is nearest to a common edge or corner.
 TIE = 1e-9
@@ -202,7 +201,7 @@ def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, s
     return smallest
 
 
-@serial_and_parallel
+@njit(cache=True, parallel=True, rows=0)
 def find_contacts(x, x_prev, lists, surfaces, memory, near, part, stitched, rows, smallest):
     """Find which points touch triangles now, and fill in their rows.
 

@@ -94,14 +94,12 @@ class SurfaceLists:
         before: NDArray[np.float64],
         motions: NDArray[np.float64],
         depth: NDArray[np.float64],
-        parallel: bool,
     ) -> None:
         """List what may touch while no point moves farther than in a frame of these motions (n, 3) [m].
 
         Parameters
         ----------
         x, before : (n, 3) now, and at the beginning of the substep [m]; depth : (n,) inside other pieces [m]
-        parallel : whether several threads search
         """
         pieces = self._shapes[0]
         common_motions(x, motions, pieces, self._all_share, 1, self._common)
@@ -119,7 +117,7 @@ class SurfaceLists:
         self._at[:], self._listed[:] = x, self.allowed
         self._runs.renew()
         near = (self._finder.starts, self._finder.triangles)
-        self.edges.renew(x, (self._far[:, 1], self._own[:, 1]), self._gap, near, parallel)
+        self.edges.renew(x, (self._far[:, 1], self._own[:, 1]), self._gap, near)
 
     def number(self, rows: ContactRows) -> None:
         """Give the listed pairs their rows."""
