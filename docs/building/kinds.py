@@ -37,7 +37,7 @@ def kinds_page() -> str:
         for kind in kinds:
             title = f"`kind: {kind.kind}` (`{kind.__name__}`)" if len(kinds) > 1 else f"`{kind.__name__}`"
             rows = [row for field in declared(kind).items() for row in _rows(*field)]
-            table = "\n".join(["| key | default | |", "|---|---|---|", *rows])
+            table = "\n".join(["| key | default | meaning |", "|---|---|---|", *rows])
             parts.append(f"### {title}\n\n{first_paragraph(kind)}\n\n{table}\n")
     return "\n".join(parts)
 
