@@ -127,7 +127,7 @@ def main(quick: bool = False) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/theory/xpbd.md."""
+    """Measure, and write the figures of docs/validation/benchmarks.md."""
     publish("automatic_substeps", main())
 
 

@@ -31,11 +31,10 @@ SHOWN = {
     "tolerances": Shown("theory/implicit.md", table_text),
     "quadratic_tets": Shown("theory/locking.md", table_text),
     "rigid_heap": Shown("theory/rigid_bodies.md", table_text),
-    "automatic_substeps": Shown("theory/xpbd.md", table_text),
     **dict.fromkeys(
         (
             *("startup", "projections", "hanging_beam", "work_precision", "implicit_scaling"),
-            *("contact_scenes", "small_scenes", "bear_pile", "candidate_search"),
+            *("contact_scenes", "small_scenes", "bear_pile", "candidate_search", "automatic_substeps"),
         ),
         Shown("validation/benchmarks.md", table_text),
     ),
