@@ -91,17 +91,7 @@ class _Range(Factor):
 
 
 class Uniform(_Range):
-    """Numbers from `low` to `high`, equally likely everywhere.
-
-    Parameters
-    ----------
-    low, high : ends of the range, in the unit of the factor.
-    count : number of levels in a grid, evenly spaced, with both ends. Random designs do not need it.
-
-    Raises
-    ------
-    StudyError : where the range is empty or not finite, or `count` is not a whole number above zero.
-    """
+    """See `uniform`."""
 
     def quantiles(self, u: NDArray[np.float64]) -> list[float]:
         # Not low + u (high - low), which can miss `high` by round-off at u = 1.
@@ -112,17 +102,7 @@ class Uniform(_Range):
 
 
 class LogUniform(_Range):
-    """Numbers from `low` to `high`, whose logarithms are equally likely everywhere.
-
-    Parameters
-    ----------
-    low, high : ends of the range, in the unit of the factor; above zero.
-    count : number of levels in a grid, in constant ratios, with both ends. Random designs do not need it.
-
-    Raises
-    ------
-    StudyError : as for `Uniform`, and where `low` is not above zero.
-    """
+    """See `loguniform`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -137,7 +117,34 @@ class LogUniform(_Range):
         return self.low, math.sqrt(self.low) * math.sqrt(self.high), self.high
 
 
-uniform, loguniform = Uniform, LogUniform
+def uniform(low: float, high: float, count: int | None = None) -> Uniform:
+    """Numbers from `low` to `high`, equally likely everywhere.
+
+    Parameters
+    ----------
+    low, high : ends of the range, in the unit of the factor.
+    count : number of levels in a grid, evenly spaced, with both ends. Random designs do not need it.
+
+    Raises
+    ------
+    StudyError : where the range is empty or not finite, or `count` is not a whole number above zero.
+    """
+    return Uniform(low, high, count)
+
+
+def loguniform(low: float, high: float, count: int | None = None) -> LogUniform:
+    """Numbers from `low` to `high`, whose logarithms are equally likely everywhere.
+
+    Parameters
+    ----------
+    low, high : ends of the range, in the unit of the factor; above zero.
+    count : number of levels in a grid, in constant ratios, with both ends. Random designs do not need it.
+
+    Raises
+    ------
+    StudyError : as for `uniform`, and where `low` is not above zero.
+    """
+    return LogUniform(low, high, count)
 
 
 def as_factor(name: str, given: Any) -> Factor:
