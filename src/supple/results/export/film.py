@@ -27,7 +27,7 @@ class Film:
     camera : "fit" shows the whole motion, "follow" moves with the bodies, "orbit" turns once around them
     view : from where: "corner", "front", "side", "top" or "back"
     color : "body", or a field of the tets: "J", "von_mises" or "energy"
-    shadows : whether bodies cast soft shadows on floors
+    shadows : whether bodies and obstacles cast soft shadows on floors
     time : of a picture [s]; None: the end
 
     Raises

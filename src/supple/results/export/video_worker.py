@@ -65,7 +65,9 @@ class Studio:
             )  # fmt: skip
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
-        self._bodies = self._meshes[: len(model.bodies)]
+        solid = [one.obstacle.plane is None and not one.obstacle.is_room for one in model.obstacles]
+        self._casts_shadow = [True] * len(model.bodies) + solid
+        self._bodies = len(model.bodies)
         floor = self._floor(model, pyvista) if film.shadows else None
         self._shadow: FloorShadow | None
         self._floor_actor: Any
@@ -115,11 +117,16 @@ class Studio:
             mesh.GetPointData().SetActiveNormals("Normals")
             if nodal is not None and "field" in mesh.point_data and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = surface.of(nodal)[:, 0]
-        bodies = points[: len(self._bodies)]
         if self._shadow is not None:
-            dark = self._shadow.darkness([(x, s.triangles) for x, (_, s) in zip(bodies, self._bodies, strict=True)])
+            dark = self._shadow.darkness(
+                [
+                    (x, surface.triangles)
+                    for x, (_, surface), casts in zip(points, self._meshes, self._casts_shadow, strict=True)
+                    if casts
+                ]
+            )
             self._floor_actor.texture = _texture(dark)
-        self._aim(np.concatenate(bodies), share)
+        self._aim(np.concatenate(points[: self._bodies]), share)
         self._plotter.render()
         return np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
 

@@ -51,7 +51,7 @@ def export(
     color
         body (without it), or a field with a legend: J, von_mises or energy.
     shadows
-        Whether bodies cast soft shadows on floors: yes without it.
+        Whether bodies and obstacles cast soft shadows on floors: yes without it.
     time
         Of a picture (png), in seconds: the end without it.
     """
