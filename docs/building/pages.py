@@ -18,6 +18,7 @@ from mkdocs.structure.files import File, Files
 sys.path.append(str(Path(__file__).parent))  # mkdocs loads this file alone
 
 from api import api_pages
+from kinds import kinds_page
 
 ROOT = Path(__file__).parents[2]
 # Pages that are files of the repository's root.
@@ -32,7 +33,11 @@ OF_ROOT = {
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages."""
-    made = {"learn/examples.md": examples(), "learn/gallery.md": gallery()} | api_pages()
+    made = {
+        "learn/examples.md": examples(),
+        "learn/gallery.md": gallery(),
+        "reference/scene_keys.md": kinds_page(),
+    } | api_pages()
     made |= {page: root_page(path) for page, path in OF_ROOT.items()}
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))

@@ -90,7 +90,7 @@ def test_a_strip_twists_with_the_helix_of_its_fibres(tmp_path):
 
 
 def test_bad_parameters_are_one_clear_line():
-    with pytest.raises(SceneError, match=r"HolzapfelGasserOgden: kappa is 0.5; give a dispersion from 0 to 1/3"):
+    with pytest.raises(SceneError, match=r"HolzapfelGasserOgden: kappa is 0.5; it must be from 0 to 0.333333"):
         tissue([[1, 0, 0]], 0.5)
     with pytest.raises(SceneError, match=r"HolzapfelGasserOgden: directions has shape \(3,\); give \(families, 3\)"):
         tissue([1, 0, 0])

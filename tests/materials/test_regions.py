@@ -25,7 +25,7 @@ def test_each_tet_has_its_own_material():
     np.testing.assert_array_equal(tet.density, [900.0, 2000.0, 2000.0, 900.0])
     np.testing.assert_array_equal(tet.damping, [0.01, 0.0, 0.0, 0.01])
     np.testing.assert_array_equal(
-        tet.kind, [StableNeoHookean.kind(), *[NeoHookean.kind()] * 2, StableNeoHookean.kind()]
+        tet.kind, [StableNeoHookean.energy_kind(), *[NeoHookean.energy_kind()] * 2, StableNeoHookean.energy_kind()]
     )
     assert (tet.mu[0], tet.lam[0]) == SOFT.lame_parameters()
     assert (tet.mu[1], tet.lam[1]) == HARD.lame_parameters()

@@ -179,7 +179,7 @@ def test_a_body_in_equilibrium_is_recorded_with_its_laws(integration, tmp_path):
     ("make", "message"),
     [
         (lambda: sp.MooneyRivlin(c10=1e5, c01=-2e5, bulk=1e6), r"the shear modulus at rest, 2 \(c10 \+ c01\), is -2"),
-        (lambda: sp.MooneyRivlin(c10=1e5, bulk=0.0), "MooneyRivlin: bulk is 0; it must be finite and above zero"),
+        (lambda: sp.MooneyRivlin(c10=1e5, bulk=0.0), "MooneyRivlin: bulk is 0; it must be above zero"),
         (lambda: sp.Yeoh(c10=np.nan, bulk=1e6), "Yeoh: c10 is nan; it must be finite"),
         (lambda: sp.Ogden(mu=[1e5], alpha=[2, 3], bulk=1e6), "Ogden: 1 mu and 2 alpha"),
         (lambda: sp.Ogden(mu=[1e5], alpha=[0.0], bulk=1e6), "Ogden: an alpha is 0"),

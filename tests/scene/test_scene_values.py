@@ -133,7 +133,7 @@ BAD_KEYFRAMES = [
     ({"times": [0, 1], "displacements": [[0, 0, 0]]}, r"displacements has shape \(1, 3\)"),
     ({"times": [0], "displacements": [[0, 0]]}, r"displacements has shape \(1, 2\)"),
     ({"times": [0], "displacements": [[0, 0, np.inf]]}, "displacements holds a value that is not finite"),
-    ({"times": [0], "displacements": "up"}, "displacements is not an array of numbers"),
+    ({"times": [0], "displacements": "up"}, "displacements is .up.; give a list of numbers"),
     ({"times": [0, 1], "angles": [0]}, r"angles has shape \(1,\)"),
     ({"times": [0], "angles": [1], "axis": (0, 0, 0)}, "axis has no length"),
     ({"times": [0]}, "give displacements, angles, or both"),

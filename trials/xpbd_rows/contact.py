@@ -206,7 +206,7 @@ class RowContact:
     def _restore(self) -> None:
         ws = self.ws
         if ws.momentum is not None:
-            ws.momentum.apply(ws.points, ws.previous, ws.velocities, self._h, False)
+            ws.momentum.apply(ws.points, ws.previous, ws.velocities, self._h)
 
     def _carried(self) -> NDArray[np.float64]:
         """x_n, with what goes where it is told at its end."""

@@ -77,7 +77,7 @@ class RowsXPBD(XPBD):
             end = state.time + (k + 1) * h
             if damping is not None and k in lengths:
                 moving = ws.anchors.velocities(end - h, h)
-                damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h, False)
+                damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h)
             grow(ws, end)
             substep(ws, ws.rows, damping, targets[k], end, h)
             if first_lost(ws.points, ws.velocities) >= 0:

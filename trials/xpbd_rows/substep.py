@@ -17,18 +17,18 @@ def substep(ws: XPBDWorkspace, contact: RowContact, damping: Damping | None, tar
     """
     x_n, x, v = ws.previous, ws.points, ws.velocities
     contact.begin(time, h)  # lists, and the impulses kept of the substep before
-    predict[False](x, x_n, v, ws.system.gravity, h)
+    predict(x, x_n, v, ws.system.gravity, h)
     if len(targets):
         hold(x, ws.system.pinned_vertices, targets, ws.origins)
     ws.anchors.place(ws.extended, ws.origins, time)
     if damping is not None:
         damping.push(x, h)
     for constraints in ws.sets:
-        constraints.project(ws.extended, h, False)
+        constraints.project(ws.extended, h)
     if ws.momentum is None:
         update_velocities(x, x_n, v, h)
     else:
-        ws.momentum.apply(x, x_n, v, h, False)
+        ws.momentum.apply(x, x_n, v, h)
     rows = contact.detect()
     contact.solve(rows)
     low = contact.hold_volumes(rows)

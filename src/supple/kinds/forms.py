@@ -45,13 +45,18 @@ class Number(Form):
 
     def check_bounds(self, given: float, what: str) -> None:
         """Raise `SceneError` for a number beyond the bounds."""
-        if not (
-            (self.above is None or given > self.above)
+        if not self.allows(given):
+            raise SceneError(f"{what} is {given:g}; it must be {self.bounds}")
+
+    def allows(self, given: float) -> bool:
+        """Whether a number is finite and within the bounds."""
+        return (
+            bool(np.isfinite(given))
+            and (self.above is None or given > self.above)
             and (self.least is None or given >= self.least)
             and (self.below is None or given < self.below)
             and (self.most is None or given <= self.most)
-        ):
-            raise SceneError(f"{what} is {given:g}; it must be {self.bounds}")
+        )
 
     @property
     def bounds(self) -> str:
@@ -71,6 +76,30 @@ def _word(end: float) -> str:
 
 POSITIVE, NON_NEGATIVE, ANY_NUMBER = Number(above=0.0), Number(least=0.0), Number()
 SHARE = Number(above=0.0, below=1.0)
+
+
+@dataclass(frozen=True)
+class NumberPerTet(Form):
+    """A number within bounds, or one for each tet of a body; it is stored as it is given."""
+
+    bounds: Number
+
+    def checked(self, value: Any, what: str) -> Any:
+        within = "" if self.bounds == ANY_NUMBER else f" {self.bounds.bounds}"
+        values = float_array(value, what, f"give a number{within}, or one per tetrahedron")
+        if values.ndim > 1:
+            raise SceneError(f"{what} has shape {values.shape}; give one number, or one per tetrahedron")
+        if values.size:
+            # The first that is not finite, or the smallest and the largest, decide.
+            unlike = np.flatnonzero(~np.isfinite(values.ravel()))
+            for tet in unlike[:1] if len(unlike) else (int(values.argmin()), int(values.argmax())):
+                each = float(values.ravel()[tet])
+                if not self.bounds.allows(each):
+                    where = f" (tet {tet})" if values.ndim else ""
+                    infinite = np.isinf(each) and self.bounds != ANY_NUMBER
+                    must = f"finite and {self.bounds.bounds}" if infinite else self.bounds.bounds
+                    raise SceneError(f"{what} is {each:g}{where}; it must be {must}")
+        return value
 
 
 @dataclass(frozen=True)
@@ -205,18 +234,21 @@ class Limits(Form):
 
 @dataclass(frozen=True)
 class ListOf(Form):
-    """A list of numbers, of vectors, or of either; the kind checks shapes and values.
+    """A list of numbers, of vectors, or of pairs of positive numbers; the kind checks shapes and values.
 
     Attributes
     ----------
-    things : "numbers", "vectors" or both; most : the largest length in a scene file
+    things : "numbers", "vectors" or "pairs", or several of them; most : the largest length in a scene file
     """
 
     things: tuple[str, ...] = ("numbers",)
     most: int | None = None
 
     def checked(self, value: Any, what: str) -> NDArray[np.float64]:
-        return float_array(value, what)
+        numbers = float_array(value, what, "give a list of numbers")
+        if numbers.ndim == 0:
+            raise SceneError(f"{what} is {value!r}; give a list of numbers")
+        return numbers
 
 
 NUMBERS, VECTORS = ListOf(), ListOf(("vectors",))
@@ -229,12 +261,14 @@ class OneOf(Form):
     Attributes
     ----------
     classes : all of them; give : the remedy where the object is of another one
+    base : of what Python may give besides
     """
 
     classes: Sequence[type]
     give: str
+    base: type | None = None
 
     def checked(self, value: Any, what: str) -> Any:
-        if not isinstance(value, tuple(self.classes)):
+        if not isinstance(value, self.base or tuple(self.classes)):
             raise SceneError(f"{what} is {value!r}; give {self.give}")
         return value

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
+from supple.kinds.forms import NON_NEGATIVE, NumberPerTet
 from supple.materials.material import Material
 from supple.materials.per_tet import NOT_ELASTIC, TetMaterial
 
@@ -23,13 +25,8 @@ class EdgesAndVolume(Material):
     Source: Macklin, Müller, Chentanez, "XPBD" (2016); Müller, "Simple and Unbreakable Simulation of Soft Bodies".
     """
 
-    edge_compliance: float = 0.0
-    volume_compliance: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require_finite("edge_compliance", positive=False, unit="m/N")
-        self._require_finite("volume_compliance", positive=False, unit="m^5/N")
+    edge_compliance: Annotated[float, NumberPerTet(NON_NEGATIVE)] = 0.0
+    volume_compliance: Annotated[float, NumberPerTet(NON_NEGATIVE)] = 0.0
 
     def per_tet(self, n_tets: int) -> TetMaterial:
         return self._tet_material(n_tets, NOT_ELASTIC, 0.0, 0.0)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, NumberPerTet
 from supple.materials.flows.j2 import J2_FLOW
 from supple.materials.lame import lame_from_engineering
 from supple.materials.laws.hencky import HENCKY
-from supple.materials.material import Hyperelastic
+from supple.materials.material import POISSON, Hyperelastic
 from supple.materials.per_tet import BY_LAW, LawTets, TetMaterial, one_per_tet
 
 
@@ -39,26 +41,17 @@ class J2Plastic(Hyperelastic):
     mapping schemes of the infinitesimal theory" (1992).
     """
 
-    youngs: float | NDArray[np.float64]
-    poisson: float | NDArray[np.float64]
-    yield_stress: float | NDArray[np.float64]
-    hardening: float | NDArray[np.float64] = 0.0
-    saturation_stress: float | NDArray[np.float64] | None = None
-    saturation_rate: float | NDArray[np.float64] = 0.0
+    youngs: Annotated[float | NDArray[np.float64], NumberPerTet(POSITIVE)]
+    poisson: Annotated[float | NDArray[np.float64], NumberPerTet(POISSON)]
+    yield_stress: Annotated[float | NDArray[np.float64], NumberPerTet(POSITIVE)]
+    hardening: Annotated[float | NDArray[np.float64], NumberPerTet(NON_NEGATIVE)] = 0.0
+    saturation_stress: Annotated[float | NDArray[np.float64] | None, NumberPerTet(POSITIVE)] = None
+    saturation_rate: Annotated[float | NDArray[np.float64], NumberPerTet(NON_NEGATIVE)] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key in ("youngs", "yield_stress"):
-            self._require_finite(key, positive=True, unit="Pa")
-        self._require_finite("hardening", positive=False, unit="Pa")
-        self._require_finite("saturation_rate", positive=False, unit="-")
-        self._require_number("poisson", "-")
-        nu = np.asarray(self.poisson)
-        if not ((nu > -1.0) & (nu < 0.5)).all():
-            raise SceneError(f"J2Plastic: poisson is {self.poisson}; it must be above -1 and below 0.5")
         if self.saturation_stress is None:
             object.__setattr__(self, "saturation_stress", self.yield_stress)
-        self._require_finite("saturation_stress", positive=True, unit="Pa")
         if (np.asarray(self.saturation_stress) < np.asarray(self.yield_stress)).any():
             raise SceneError("J2Plastic: saturation_stress is below yield_stress; give one that is not")
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Choice, Number, NumberPerTet
+from supple.kinds.kind import Kind
 from supple.materials.flows.internal import add_resting_densities, add_resting_hessians, add_resting_piolas
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.lame import lame_from_engineering
@@ -18,9 +21,11 @@ from supple.materials.laws.pointwise import densities_at, hessians_at, piolas_at
 from supple.materials.per_tet import NO_REGION, TetMaterial, one_per_tet
 from supple.materials.stretch_energies.stretches import StretchFunctions, no_volume_term
 
+POISSON = Number(above=-1.0, below=0.5)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Material(ABC):
+class Material(Kind, ABC):
     """Base of all materials.
 
     Parameters
@@ -34,40 +39,17 @@ class Material(ABC):
     SceneError : where a value is not finite or out of range.
     """
 
-    density: float = 1000.0
-    damping: float = 0.0
+    density: Annotated[float, NumberPerTet(POSITIVE)] = 1000.0
+    damping: Annotated[float, NumberPerTet(NON_NEGATIVE)] = 0.0
 
-    def __post_init__(self) -> None:
-        self._require_finite("density", positive=True, unit="kg/m^3")
-        self._require_finite("damping", positive=False, unit="s")
+    def __init_subclass__(cls) -> None:
+        """In scene files, StableNeoHookean is stable_neo_hookean."""
+        cls.kind = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
-    def _require_finite(self, field: str, *, positive: bool, unit: str) -> None:
-        values = self._values(field, unit)
-        low = values <= 0.0 if positive else values < 0.0
-        must = "above zero" if positive else "zero or more"
-        self._refuse(field, values, low, f"it must be finite and {must} [{unit}]")
-
-    def _require_number(self, field: str, unit: str) -> None:
-        values = self._values(field, unit)
-        self._refuse(field, values, np.zeros(values.shape, dtype=np.bool_), f"it must be finite [{unit}]")
-
-    def _values(self, field: str, unit: str) -> NDArray[np.float64]:
-        value = getattr(self, field)
-        kind = type(self).__name__
-        try:
-            values = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise SceneError(f"{kind}: {field} is {value!r}; give a number in {unit}") from None
-        if values.ndim > 1:
-            raise SceneError(f"{kind}: {field} has shape {values.shape}; give one number, or one per tetrahedron")
-        return values
-
-    def _refuse(self, field: str, values: NDArray[np.float64], low: NDArray[np.bool_], must: str) -> None:
-        bad = ~np.isfinite(values) | low
-        if bad.any():
-            first = values.reshape(-1)[np.flatnonzero(bad.reshape(-1))[0]]
-            at = f" (tet {np.flatnonzero(bad)[0]})" if values.ndim else ""
-            raise SceneError(f"{type(self).__name__}: {field} is {first:g}{at}; {must}")
+    @property
+    def label(self) -> str:
+        """The name of the material in messages."""
+        return type(self).__name__
 
     @abstractmethod
     def per_tet(self, n_tets: int) -> TetMaterial:
@@ -191,29 +173,16 @@ class Elastic(Hyperelastic):
 
     stretch_functions: ClassVar[StretchFunctions]
 
-    youngs: float | NDArray[np.float64]
-    poisson: float | NDArray[np.float64]
-    integration: str = "tets"
+    youngs: Annotated[float | NDArray[np.float64], NumberPerTet(POSITIVE)]
+    poisson: Annotated[float | NDArray[np.float64], NumberPerTet(POISSON)]
+    integration: Annotated[str, Choice(("tets", "patches"))] = "tets"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_integration()
-        self._require_finite("youngs", positive=True, unit="Pa")
-        kind = type(self).__name__
-        try:
-            nu = np.atleast_1d(np.asarray(self.poisson, dtype=np.float64))
-        except (TypeError, ValueError):
-            raise SceneError(f"{kind}: poisson is {self.poisson!r}; give a number above -1 and below 0.5") from None
-        bad = ~((nu > -1.0) & (nu < 0.5))
-        if bad.any():
-            raise SceneError(
-                f"{kind}: poisson is {nu[bad][0]:g}; it must be above -1 and below 0.5 (0.49 is nearly incompressible)"
-            )
 
     def _check_integration(self) -> None:
         kind = type(self).__name__
-        if self.integration not in ("tets", "patches"):
-            raise SceneError(f"{kind}: integration is {self.integration!r}; give 'tets' or 'patches'")
         if self.integration == "patches" and self.stretch_functions.volume_term is no_volume_term:
             raise SceneError(
                 f"{kind}: integration='patches' needs an energy with a volume term of J; give integration='tets', or "
@@ -221,7 +190,7 @@ class Elastic(Hyperelastic):
             )
 
     @classmethod
-    def kind(cls) -> int:
+    def energy_kind(cls) -> int:
         """The number by which kernels know the energy of this class.
 
         Raises
@@ -244,4 +213,4 @@ class Elastic(Hyperelastic):
         one_per_tet(self.youngs, n_tets, f"{name}: youngs")
         one_per_tet(self.poisson, n_tets, f"{name}: poisson")
         region = 0 if self.integration == "patches" else NO_REGION
-        return self._tet_material(n_tets, self.kind(), *self.lame_parameters(), region)
+        return self._tet_material(n_tets, self.energy_kind(), *self.lame_parameters(), region)

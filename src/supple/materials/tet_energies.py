@@ -15,16 +15,8 @@ from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpos
 from supple.numerics.svd3 import svd3 as decompose
 from supple.runtime.kernel_cache import njit, prange
 
-if TYPE_CHECKING:  # of each kind, see `isotropic.functions_of`
-    KIND = 0
-
-    def density(F, s, mu, lam): ...
-
-    def energy_density(F, mu, lam): ...
-
-    def principal_hessian(s, mu, lam, project): ...
-
-    def stress(U, s, V, mu, lam): ...
+if TYPE_CHECKING:  # of each kind, see `functions_of`
+    from supple.materials.isotropic import KIND, density, energy_density, principal_hessian, stress
 
 
 @njit(error_model="numpy")

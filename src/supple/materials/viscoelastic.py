@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import ListOf, OneOf
 from supple.materials.flows.maxwell import MAXWELL_FLOW
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.j2_plastic import J2Plastic
 from supple.materials.laws.hencky import MAXWELL
 from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import LawTets, TetMaterial
+from supple.materials.registry import UNRELAXED
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,8 +40,8 @@ class Viscoelastic(Hyperelastic):
     Source: Reese, Govindjee, "A theory of finite viscoelasticity and numerical aspects" (1998).
     """
 
-    material: Hyperelastic
-    prony: Sequence[tuple[float, float]]
+    material: Annotated[Hyperelastic, OneOf(UNRELAXED, "a hyperelastic one", Hyperelastic)]
+    prony: Annotated[Sequence[tuple[float, float]], ListOf(("pairs",), most=20)]
     density: float = field(init=False)
     damping: float = field(init=False)
 

@@ -1,5 +1,6 @@
 """From scene file to scene and run."""
 
+import importlib.util
 import json
 import logging
 import re
@@ -11,13 +12,13 @@ from jsonschema import Draft202012Validator
 
 import supple as sp
 from supple.app.scene_file.document import KINDS_OF_LISTS, SceneFileModel, json_schema
-from supple.app.scene_file.entries.materials import ELASTIC_KINDS
 from supple.app.scene_file.entries.solvers import solver_of_kind
 from supple.app.scene_file.loader import load_scene
 from supple.app.scene_file.yaml_reader import read_yaml
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
 
+ROOT = Path(__file__).parents[3]
 RUBBER = "{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}"
 BODY = f"{{name: cube, shape: {{kind: box, divisions: [1, 1, 1]}}, material: {RUBBER}}}"
 
@@ -172,15 +173,15 @@ obstacles: [{{kind: triangles, surface: {{file: meshes/box.stl, rotation: [0, 0,
 
 
 def test_every_elastic_material_has_a_kind(load):
-    assert list(ELASTIC_KINDS) == [
+    kinds = {material.kind: material for material in ELASTIC_MATERIALS}
+    assert list(kinds) == [
         "stable_neo_hookean",
         "neo_hookean",
         "fixed_corotated",
         "arap",
         "st_venant_kirchhoff",
     ]
-    assert list(ELASTIC_KINDS.values()) == list(ELASTIC_MATERIALS)
-    for kind, material in ELASTIC_KINDS.items():
+    for kind, material in kinds.items():
         run = load(f"bodies: [{BODY.replace('stable_neo_hookean', kind)}]\n")
         assert type(run.scene.bodies[0].material) is material
 
@@ -356,3 +357,17 @@ contact_pairs:
     assert not [e for e in schema.iter_errors(data) if "contact_pairs" in e.path]
     data["contact_pairs"][0]["second"] = []
     assert [e for e in schema.iter_errors(data) if "contact_pairs" in e.path]
+
+
+def test_the_table_of_the_documentation_has_every_key_of_every_kind():
+    """It is made from the same declarations as the schema."""
+    spec = importlib.util.spec_from_file_location("kinds_page", ROOT / "docs" / "building" / "kinds.py")
+    page = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(page)
+    text = page.kinds_page()
+    definitions = json_schema()["$defs"]
+    for kind in (kind for kinds in KINDS_OF_LISTS.values() for kind in kinds):
+        (section,) = re.findall(rf"^### [^\n]*`{kind.__name__}`\)?\n(.*?)(?=^##|\Z)", text, flags=re.S | re.M)
+        keys = set(definitions[f"{kind.__name__}Model"]["properties"]) - {"kind"}
+        assert {row.split("`")[1] for row in section.splitlines() if row.startswith("| `")} == keys
+        assert not re.search(r"\| *\|$", section, flags=re.M), "a key has no description"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import POSITIVE, Choice, NumberPerTet
 from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import BY_LAW, NO_REGION, Law, LawTets, TetMaterial, one_per_tet
 
@@ -30,12 +31,11 @@ class ByLaw(Hyperelastic):
 
     shear_formula: ClassVar[str]
 
-    bulk: float | NDArray[np.float64]
-    integration: str = "tets"
+    bulk: Annotated[float | NDArray[np.float64], NumberPerTet(POSITIVE)]
+    integration: Annotated[str, Choice(("tets", "patches"))] = "tets"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_bulk()
         self._check()
         self._check_integration()
         mu = np.atleast_1d(self.rest_moduli()[0])
@@ -45,22 +45,16 @@ class ByLaw(Hyperelastic):
                 f"{mu[~(mu > 0.0)][0]:g} Pa; give parameters with which it is above zero"
             )
 
-    def _check_bulk(self) -> None:
-        self._require_finite("bulk", positive=True, unit="Pa")
-
     def _check_integration(self) -> None:
         name = type(self).__name__
-        if self.integration not in ("tets", "patches"):
-            raise SceneError(f"{name}: integration is {self.integration!r}; give 'tets' or 'patches'")
         if self.integration == "patches" and self.law().bulk is None:
             raise SceneError(
                 f"{name}: integration='patches' needs an energy with the volume term K/2 (J - 1)^2; give "
                 "integration='tets'"
             )
 
-    @abstractmethod
     def _check(self) -> None:
-        """Raise a SceneError where a parameter cannot be used."""
+        """Raise a SceneError where parameters do not suit each other."""
 
     @abstractmethod
     def rest_moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

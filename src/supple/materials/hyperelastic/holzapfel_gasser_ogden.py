@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, ListOf, Number, NumberPerTet
 from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.laws.fibres import FIBRES
 from supple.materials.laws.ogden import OGDEN
@@ -37,22 +39,16 @@ class HolzapfelGasserOgden(ByLaw):
     orientations" (2006).
     """
 
-    c10: float | NDArray[np.float64]
-    k1: float | NDArray[np.float64]
-    k2: float | NDArray[np.float64]
-    kappa: float | NDArray[np.float64] = 0.0
-    directions: ArrayLike
+    c10: Annotated[float | NDArray[np.float64], NumberPerTet(POSITIVE)]
+    k1: Annotated[float | NDArray[np.float64], NumberPerTet(NON_NEGATIVE)]
+    k2: Annotated[float | NDArray[np.float64], NumberPerTet(POSITIVE)]
+    kappa: Annotated[float | NDArray[np.float64], NumberPerTet(Number(least=0.0, most=1.0 / 3.0))] = 0.0
+    directions: Annotated[ArrayLike, ListOf(("vectors",), most=100)]
 
     shear_formula = "2 c10"
 
     def _check(self) -> None:
-        for field in ("c10", "k2"):
-            self._require_finite(field, positive=True, unit="Pa" if field == "c10" else "-")
-        self._require_finite("k1", positive=False, unit="Pa")
-        self._require_finite("kappa", positive=False, unit="-")
         name = type(self).__name__
-        if np.max(self.kappa) > 1.0 / 3.0:
-            raise SceneError(f"{name}: kappa is {np.max(self.kappa):g}; give a dispersion from 0 to 1/3")
         try:
             directions = np.asarray(self.directions, dtype=np.float64)
         except (TypeError, ValueError):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.kinds.forms import ANY_NUMBER, NumberPerTet
 from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.laws.ogden import OGDEN
 from supple.materials.per_tet import Law
@@ -25,14 +27,10 @@ class MooneyRivlin(ByLaw):
     materials IV" (1948).
     """
 
-    c10: float | NDArray[np.float64]
-    c01: float | NDArray[np.float64] = 0.0
+    c10: Annotated[float | NDArray[np.float64], NumberPerTet(ANY_NUMBER)]
+    c01: Annotated[float | NDArray[np.float64], NumberPerTet(ANY_NUMBER)] = 0.0
 
     shear_formula = "2 (c10 + c01)"
-
-    def _check(self) -> None:
-        self._require_number("c10", "Pa")
-        self._require_number("c01", "Pa")
 
     def rest_moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return 2.0 * (np.asarray(self.c10) + np.asarray(self.c01)), np.asarray(self.bulk)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import ListOf
 from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.laws.ogden import OGDEN
 from supple.materials.per_tet import Law
@@ -34,8 +36,8 @@ class Ogden(ByLaw):
     Source: Ogden, "Large deformation isotropic elasticity" (1972).
     """
 
-    mu: Sequence[float]
-    alpha: Sequence[float]
+    mu: Annotated[Sequence[float], ListOf(most=9)]
+    alpha: Annotated[Sequence[float], ListOf(most=9)]
 
     shear_formula = "sum mu alpha / 2"
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.kinds.forms import ANY_NUMBER, NumberPerTet
 from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.laws.yeoh import YEOH
 from supple.materials.per_tet import Law
@@ -25,15 +27,11 @@ class Yeoh(ByLaw):
     Source: Yeoh, "Some forms of the strain energy function for rubber" (1993).
     """
 
-    c10: float | NDArray[np.float64]
-    c20: float | NDArray[np.float64] = 0.0
-    c30: float | NDArray[np.float64] = 0.0
+    c10: Annotated[float | NDArray[np.float64], NumberPerTet(ANY_NUMBER)]
+    c20: Annotated[float | NDArray[np.float64], NumberPerTet(ANY_NUMBER)] = 0.0
+    c30: Annotated[float | NDArray[np.float64], NumberPerTet(ANY_NUMBER)] = 0.0
 
     shear_formula = "2 c10"
-
-    def _check(self) -> None:
-        for field in ("c10", "c20", "c30"):
-            self._require_number(field, "Pa")
 
     def rest_moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return 2.0 * np.asarray(self.c10), np.asarray(self.bulk)

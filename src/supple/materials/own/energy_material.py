@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import permutations
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.forms import NON_NEGATIVE, Choice, Form, NumberPerTet
 from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.own.derivation import (
     OwnLaw,
@@ -21,6 +22,31 @@ from supple.materials.own.derivation import (
     stress_at_rest,
 )
 from supple.materials.own.formula import VARIABLES
+
+
+@dataclass(frozen=True)
+class FormulaText(Form):
+    """A formula as a text, or a function of symbols."""
+
+    def checked(self, value: Any, what: str) -> Any:
+        if not callable(value) and not isinstance(value, str):
+            raise SceneError(f"{what} is a {type(value).__name__}; give a formula or a function")
+        return value
+
+
+@dataclass(frozen=True)
+class NamedNumbers(Form):
+    """Finite numbers by name, each one or one per tetrahedron."""
+
+    def checked(self, value: Any, what: str) -> Any:
+        for name, given in value.items():
+            try:
+                good = np.isfinite(np.asarray(given, dtype=np.float64)).all()
+            except (TypeError, ValueError):
+                good = False
+            if not good:
+                raise SceneError(f"EnergyMaterial: the parameter {name!r} is {given!r}; give finite numbers")
+        return value
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -45,29 +71,15 @@ class EnergyMaterial(ByLaw):
     SceneError : where psi is not such a formula, is not symmetric in the stretches, or has a stress at rest.
     """
 
-    psi: Callable[..., Any] | str
-    of: str = "invariants"
-    parameters: Mapping[str, float | NDArray[np.float64]] = field(default_factory=dict)
-    bulk: float | NDArray[np.float64] = 0.0
+    psi: Annotated[Callable[..., Any] | str, FormulaText()]
+    of: Annotated[str, Choice(tuple(VARIABLES))] = "invariants"
+    parameters: Annotated[Mapping[str, float | NDArray[np.float64]], NamedNumbers()] = field(default_factory=dict)
+    bulk: Annotated[float | NDArray[np.float64], NumberPerTet(NON_NEGATIVE)] = 0.0
     formula: str = field(init=False, default="")
 
     shear_formula = "that of psi"
 
-    def _check_bulk(self) -> None:
-        self._require_finite("bulk", positive=False, unit="Pa")
-
     def _check(self) -> None:
-        if self.of not in VARIABLES:
-            raise SceneError(f"EnergyMaterial: of is {self.of!r}; give 'invariants' or 'stretches'")
-        if not callable(self.psi) and not isinstance(self.psi, str):
-            raise SceneError(f"EnergyMaterial: psi is a {type(self.psi).__name__}; give a formula or a function")
-        for name, value in self.parameters.items():
-            try:
-                good = np.isfinite(np.asarray(value, dtype=np.float64)).all()
-            except (TypeError, ValueError):
-                good = False
-            if not good:
-                raise SceneError(f"EnergyMaterial: the parameter {name!r} is {value!r}; give finite numbers")
         expression = expression_of(self.psi, self.of, self._names)
         object.__setattr__(self, "formula", str(expression))
         object.__setattr__(self, "_expression", expression)

@@ -10,16 +10,8 @@ from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
 from supple.numerics.svd3 import svd3 as decompose
 from supple.runtime.kernel_cache import njit, prange
 
-if TYPE_CHECKING:  # of each kind, see `isotropic.functions_of`
-    KIND = 0
-
-    def density(F, s, mu, lam): ...
-
-    def energy_density(F, mu, lam): ...
-
-    def principal_hessian(s, mu, lam, project): ...
-
-    def stress(U, s, V, mu, lam): ...
+if TYPE_CHECKING:  # of each kind, see `functions_of`
+    from supple.materials.isotropic import KIND, density, energy_density, principal_hessian, stress
 
 
 # Numbers of a patch's frame: U (9), psi_ij (6), alpha (3) and beta (3) times its volume, see `isotropic`.

@@ -28,7 +28,7 @@ class Cable(Kind):
     ----------
     points : two or more, each ("finger", 12), a vertex of a body's mesh; ("finger", (x, y, z)), a place inside of a
         body in its own coordinates [m]; or (None, (x, y, z)), a fixed place in the world.
-    length : of the cable without tension [m]; a number, a `Curve`, or a function of time [s].
+    length : of the cable without tension [m]; a number, a `Curve`, or a function of time.
     tension : at the winch [N], zero or more; likewise.
     winch_speed : by which the length without tension decreases from the distances at the start [m/s], negative to
         release the cable; likewise. It is integrated from time 0 on.

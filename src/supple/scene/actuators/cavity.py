@@ -27,8 +27,8 @@ class Cavity(Kind):
     Parameters
     ----------
     body : name of the soft body.
-    pressure : difference to the pressure outside [Pa]; a number, a `Curve`, or a function of time [s].
-    volume : of an incompressible fluid [m^3], above zero; a number, a `Curve`, or a function of time [s].
+    pressure : difference to the pressure outside [Pa]; a number, a `Curve`, or a function of time.
+    volume : of an incompressible fluid [m^3], above zero; a number, a `Curve`, or a function of time.
     gas : an ideal gas.
     void : which of the voids that the body encloses, from 0; the largest is the first.
     triangles : rows of `mesh.surface.triangles` instead: a closed surface about the cavity.

@@ -20,7 +20,7 @@ class Gas(Kind):
 
     Parameters
     ----------
-    amount : n [mol]; a number, a `Curve`, or a function of time [s]; None for the amount that has the pressure
+    amount : n [mol]; a number, a `Curve`, or a function of time; None for the amount that has the pressure
         `ambient` at the start.
     temperature : T at the volume of the start [K].
     gamma : 1 for constant temperature; the ratio of specific heats, 1.4 for air, where no heat is exchanged.

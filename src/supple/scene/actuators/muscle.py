@@ -53,7 +53,7 @@ class Muscle(OnBody):
     strength : S, the largest stress per area at rest [Pa].
     direction : (3,) of all fibres, or (m, 3) of each tet of the muscle, in the body's own coordinates; of any length
         [-].
-    activation : a, from 0 to 1; a number, a `Curve`, or a function of time [s].
+    activation : a, from 0 to 1; a number, a `Curve`, or a function of time.
     tets : None for all tets of the body, an `InBox` that holds all four corners of a tet at the start, or rows of the
         mesh's tets.
     force_length : f [-] at stretches, as (stretches, values): increasing numbers above zero, and numbers of zero or

@@ -32,7 +32,7 @@ class AxisJoint(Joint):
 
     axis: Annotated[ArrayLike, Direction()] = (0.0, 0.0, 1.0)
     limits: Annotated[tuple[float, float] | None, Limits("exchange them, or use a FixedJoint")] = None
-    motor: Annotated[Motor | None, OneOf(MOTORS, "PositionMotor(...) or another motor")] = None
+    motor: Annotated[Motor | None, OneOf(MOTORS, "PositionMotor(...) or another motor", Motor)] = None
     damping: Annotated[float, NON_NEGATIVE] = 0.0
     friction: Annotated[float, NON_NEGATIVE] = 0.0
     max_effort: Annotated[float | None, POSITIVE] = None

@@ -70,7 +70,7 @@ class PositionMotor(Motor):
 
     Parameters
     ----------
-    target : [m] or [rad]; a number, a `Curve`, or a function of time [s].
+    target : [m] or [rad]; a number, a `Curve`, or a function of time.
     stiffness : k [N/m] or [N m/rad], zero or more.
     damping : d [N s/m] or [N m s/rad], zero or more; not zero together with the stiffness.
     max_force : largest effort [N] or [N m]; None: no bound.
@@ -102,7 +102,7 @@ class VelocityMotor(Motor):
 
     Parameters
     ----------
-    target : [m/s] or [rad/s]; a number, a `Curve`, or a function of time [s].
+    target : [m/s] or [rad/s]; a number, a `Curve`, or a function of time.
     max_force : largest effort [N] or [N m]; None: no bound.
 
     Raises
@@ -122,7 +122,7 @@ class ForceMotor(Motor):
 
     Parameters
     ----------
-    force : [N] for a slider, a torque [N m] for a hinge; a number, a `Curve`, or a function of time [s].
+    force : [N] for a slider, a torque [N m] for a hinge; a number, a `Curve`, or a function of time.
     max_force : where the effort is cut off [N] or [N m]; None: nowhere.
 
     Raises

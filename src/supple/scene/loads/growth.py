@@ -31,7 +31,7 @@ class Growth(OnBody):
     Parameters
     ----------
     body : name of the soft body.
-    stretch : of lengths, from 1e-3 to 1e3 [-]; a number, a `Curve`, or a function of time [s]. For heat,
+    stretch : of lengths, from 1e-3 to 1e3 [-]; a number, a `Curve`, or a function of time. For heat,
         1 + alpha (T - T0).
     direction : None for all directions alike; (3,) for one, or (m, 3) for one of each tet, in the body's own
         coordinates; of any length [-].

@@ -29,7 +29,7 @@ class Spring(Load):
         place inside of it in its own coordinates [m], and anywhere for a rigid body; or (None, (x, y, z)), a fixed
         place in the world.
     stiffness : k [N/m], above zero.
-    rest_length : l0 [m]; a number, a `Curve`, or a function of time [s]; None for the distance at the start.
+    rest_length : l0 [m]; a number, a `Curve`, or a function of time; None for the distance at the start.
     name : appears in messages.
 
     Raises

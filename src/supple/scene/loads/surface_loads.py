@@ -21,7 +21,7 @@ class Traction(OnSurface):
     Parameters
     ----------
     body : name of the body.
-    traction : (3,) [N/m^2], a `Curve`, or a function of time [s].
+    traction : (3,) [N/m^2], a `Curve`, or a function of time.
     region : None for the whole surface, an `InBox` that holds all three corners of a triangle at the start, or rows of
         `mesh.surface.triangles`.
     name : appears in messages.
@@ -46,7 +46,7 @@ class Pressure(OnSurface):
     Parameters
     ----------
     body : name of the body.
-    pressure : [Pa], positive where it pushes on the body; a number, a `Curve`, or a function of time [s].
+    pressure : [Pa], positive where it pushes on the body; a number, a `Curve`, or a function of time.
     region, name : as of `Traction`.
 
     Raises

@@ -193,10 +193,10 @@ class BodyModel(Model):
         with at("skin"):
             skin = meshes.surface(self.skin) if self.skin is not None else fine
         with at("material"):
-            material = self.material.build()
+            material = self.material.build(meshes)
         if self.regions is not None:
             with at("regions"):
-                material = with_regions(material, self.regions, mesh)
+                material = with_regions(material, self.regions, mesh, meshes)
         return Body(self.name, mesh, material, skin=skin, collide=self.collide or "tets", **self._placement())
 
 

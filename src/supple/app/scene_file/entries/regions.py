@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from supple.app.scene_file.entries.materials import ElasticMaterialModel
+from supple.app.scene_file.entries.mesh_sources import MeshStore
 from supple.app.scene_file.model import Index, Model, Name, Vector
 from supple.errors import SceneError
 from supple.materials.elastic_tets.regions import Regions
@@ -55,7 +56,7 @@ class RegionModel(Model):
         return chosen
 
 
-def with_regions(material: Material, regions: list[RegionModel], mesh: TetMesh) -> Material:
+def with_regions(material: Material, regions: list[RegionModel], mesh: TetMesh, meshes: MeshStore) -> Material:
     """The body's material, replaced in each tet by that of the last region that contains the tet.
 
     Raises
@@ -68,4 +69,4 @@ def with_regions(material: Material, regions: list[RegionModel], mesh: TetMesh) 
     for k, region in enumerate(regions):
         with at(k):
             index[region.select(mesh)] = k + 1
-    return Regions(materials=[material, *(region.material.build() for region in regions)], index=index)
+    return Regions(materials=[material, *(region.material.build(meshes) for region in regions)], index=index)

@@ -10,6 +10,7 @@ from supple.app.scene_file.entries.kinds import entry_of, keys_of, model_of, spe
 from supple.app.scene_file.entries.mesh_sources import MeshStore, SurfaceModel
 from supple.app.scene_file.model import Count, Extents, Index, Model, Name, NonNegative, Number, Positive, Vector
 from supple.kinds import forms
+from supple.materials.own.energy_material import FormulaText, NamedNumbers
 from supple.scene.actuators.muscle import ForceLength
 from supple.scene.contact_pairs import NameList
 from supple.scene.forces import ForceForm
@@ -95,6 +96,8 @@ _plain(PointForm, PointModel)
 _plain(PointList, Annotated[list[PointModel], Field(min_length=2)])
 _plain(PairList, Annotated[list[Annotated[list[Index], Field(min_length=2, max_length=2)]], Field(min_length=1)])
 _plain(Surface, SurfaceModel)
+_plain(FormulaText, Annotated[str, Field(max_length=4000)])
+_plain(NamedNumbers, dict[Name, Number])
 
 
 @spelled.register
@@ -120,6 +123,7 @@ def _(form: forms.Counts) -> Any:
 @spelled.register
 def _(form: forms.ListOf) -> Any:
     kinds = {"numbers": Number, "vectors": Vector}
+    kinds["pairs"] = Annotated[list[Positive], Field(min_length=2, max_length=2)]
     lists = tuple(list[kinds[thing]] for thing in form.things)
     return Annotated[Union[lists], Field(min_length=1, max_length=form.most)]  # noqa: UP007
 
@@ -143,6 +147,11 @@ def _(form: OverTimeOf) -> Any:
 @spelled.register
 def _(form: MotionForm) -> Any:
     return model_of(Keyframes, False)
+
+
+@spelled.register
+def _(form: forms.NumberPerTet) -> Any:
+    return spelled(form.bounds)
 
 
 @spelled.register

@@ -161,7 +161,7 @@ class Elasticity(JointlyEvaluated):
         own = self.own
         if own.all():
             return material.kind, material.mu, material.lam
-        zero = np.int32(StableNeoHookean.kind())  # with mu = lam = 0, an energy that is zero for every F
+        zero = np.int32(StableNeoHookean.energy_kind())  # with mu = lam = 0, an energy that is zero for every F
         return np.where(own, material.kind, zero), np.where(own, material.mu, 0.0), np.where(own, material.lam, 0.0)
 
 

@@ -77,5 +77,5 @@ class StitchEnergy(Potential):
     @cached_property
     def _tets(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
         tets = self.stitching.tets
-        kind = np.full(len(tets), StableNeoHookean.kind(), dtype=np.int32)
+        kind = np.full(len(tets), StableNeoHookean.energy_kind(), dtype=np.int32)
         return tets.vertices, tets.rest_shape_inverse, tets.rest_volumes, kind, tets.mu, tets.lam

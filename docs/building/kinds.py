@@ -1,0 +1,59 @@
+"""The table of all kinds of a scene file, made from the declared fields of their classes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import MISSING
+from typing import Any
+
+from supple.app.scene_file.document import KINDS_OF_LISTS
+from supple.app.scene_file.entries.kinds import keys_of
+from supple.app.scene_file.entries.materials import MATERIALS
+from supple.app.scene_file.entries.solvers import SOLVERS
+from supple.kinds.descriptions import first_paragraph
+from supple.kinds.kind import Kind, declared
+from supple.scene.joints.motors import MOTORS
+
+HEAD = """\
+# Keys of scene files
+
+What a [scene file](scene_files.md) can contain, by the lists that the entries are in. Where there is more than one
+kind, an entry has its name as `kind`. Keys are called as the parameters in Python. Shapes and the keys of bodies are
+in the schema that `supple schema` prints.
+"""
+
+
+def kinds_page() -> str:
+    """The text of the page."""
+    lists: dict[str, Sequence[type[Kind]]] = {
+        "material": MATERIALS,
+        "solver": SOLVERS,
+        **KINDS_OF_LISTS,
+        "motor": MOTORS,
+    }
+    parts = [HEAD]
+    for name, kinds in lists.items():
+        parts.append(f"## {name}\n")
+        for kind in kinds:
+            title = f"`kind: {kind.kind}` (`{kind.__name__}`)" if len(kinds) > 1 else f"`{kind.__name__}`"
+            rows = [row for field in declared(kind).items() for row in _rows(*field)]
+            table = "\n".join(["| key | default | meaning |", "|---|---|---|", *rows])
+            parts.append(f"### {title}\n\n{first_paragraph(kind)}\n\n{table}\n")
+    return "\n".join(parts)
+
+
+def _rows(name: str, field: Any) -> list[str]:
+    """A row for each key that a field has."""
+    found = []
+    for key, (_, words) in keys_of(field.form, name).items():
+        text = (words or field.description.replace("None", "null")).replace("|", "\\|")
+        default = field.default
+        shown = "required" if default is MISSING else "" if default is None else f"`{_short(default)}`"
+        found.append(f"| `{key}` | {shown if not words else ''} | {text} |")
+    return found
+
+
+def _short(default: Any) -> str:
+    if isinstance(default, Kind):
+        return "{}"
+    return str(list(default)) if isinstance(default, tuple) else str(default).lower()
