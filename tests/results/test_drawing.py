@@ -7,10 +7,10 @@ import pytest
 
 import supple as sp
 from supple.mesh.surface import SurfaceMesh
-from supple.results.export.floor_shadow import FloorShadow
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
 from supple.results.view.creases import split_at_creases, vertex_normals
+from supple.results.view.floor_shadow import FloorShadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame, view_of
 from supple.results.view.surfaces import body_surface, obstacle_surfaces
 from supple.simulate import simulate
@@ -92,7 +92,7 @@ def test_vertices_are_split_where_edges_are_sharp(tools):
 
 def test_a_shadow_is_below_its_body_and_fades_with_height():
     box = sp.shapes.box(size=(0.4, 0.2, 0.4), divisions=(1, 1, 1)).surface  # two triangles on each side
-    shadow = FloorShadow(np.zeros(3), np.array([0, 1.0, 0]), np.array([0.3, 0.5, 0]), 1.0)
+    shadow = FloorShadow(np.zeros(3), np.array([0, 1.0, 0]), np.array([0.3, 0.5, 0]), 1.0, 256)
     low, high = (shadow.darkness([(box.vertices + np.array([0, y, 0]), box.triangles)]) for y in (0.1, 0.9))
     assert low.max() > 0.6 > 0.3 > high.max() > 0.02
     rows, columns = np.nonzero(low > 0.3)

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from supple.errors import SuppleError
 from supple.results.export.film import COLORS, Film
-from supple.results.export.floor_shadow import FloorShadow
 from supple.results.recording.reader import Recording, read_recording
 from supple.results.view.camera import eye_of
 from supple.results.view.color_scale import Limits, Range
 from supple.results.view.creases import vertex_normals
 from supple.results.view.fields import Field
+from supple.results.view.floor_shadow import FloorShadow, casting_surfaces, floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.model import Model, Moment
-from supple.results.view.surfaces import SoftSurface, Surface, surfaces_of
+from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
 _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
@@ -31,7 +31,7 @@ _BACKGROUND, _HORIZON = "#e3e8ef", "#fbfcfd"
 _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4), ((0.5, 1.0, -4.0), "#ffffff", 0.25))
 _BODY: Any = {"ambient": 0.28, "diffuse": 0.8, "specular": 0.25, "specular_power": 30}
 _OBSTACLE: Any = {"ambient": 0.7, "diffuse": 0.55, "specular": 0.0}
-_SHADOW = (30, 34, 48)
+_SHADOW_CELLS = 256
 _MARGIN = 1.12  # of the distance of the camera: room beside the bodies
 _SAMPLED = 24  # moments from which the ends of a color scale are found
 
@@ -48,7 +48,7 @@ class Studio:
         plotter.enable_anti_aliasing("msaa", multi_samples=4)
         self._add_lights(pyvista)
         self._field = COLORS.get(film.color)
-        self._meshes: list[tuple[Any, Surface]] = []
+        self._meshes: list[tuple[Any, SoftSurface | RigidSurface]] = []
         ends = self._ends(moments)
         for number, flat in enumerate(surfaces_of(model)):
             surface = flat.creased(model)
@@ -65,13 +65,10 @@ class Studio:
             )  # fmt: skip
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
-        solid = [one.obstacle.plane is None and not one.obstacle.is_room for one in model.obstacles]
-        self._casts_shadow = [True] * len(model.bodies) + solid
+        self._casting = casting_surfaces(model, [surface for _, surface in self._meshes])
         self._bodies = len(model.bodies)
-        floor = self._floor(model, pyvista) if film.shadows else None
-        self._shadow: FloorShadow | None
-        self._floor_actor: Any
-        self._shadow, self._floor_actor = floor or (None, None)
+        self._shadow = floor_shadow(model, _SHADOW_CELLS) if film.shadows else None
+        self._floor: Any = None if self._shadow is None else self._add_floor(pyvista, self._shadow)
         plotter.show(auto_close=False, interactive=False)  # pyvista renders nothing before
 
     def _add_lights(self, pyvista: Any) -> None:
@@ -93,17 +90,10 @@ class Studio:
         chosen = [moments[i] for i in evenly(len(moments), _SAMPLED)]
         return Limits(self._field, Range()).follow(np.concatenate([self._field.values(moment) for moment in chosen]))
 
-    def _floor(self, model: Model, pyvista: Any) -> tuple[FloorShadow, Any] | None:
-        view = model.view
-        planes = [one.obstacle.plane for one in model.obstacles]
-        floors = [plane for plane in planes if plane is not None and float(plane[1] @ view.up) > 0.99]
-        if not floors:
-            return None
-        point, _ = max(floors, key=lambda plane: float(plane[0] @ view.up))
-        shadow = FloorShadow(point, view.up, view.center, view.radius)
+    def _add_floor(self, pyvista: Any, shadow: FloorShadow) -> Any:
         mesh = pyvista.PolyData(shadow.corners, np.array([4, 0, 1, 2, 3]))
         mesh.active_texture_coordinates = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
-        return shadow, self._plotter.add_mesh(mesh, texture=_texture(np.zeros((4, 4))), lighting=False)
+        return self._plotter.add_mesh(mesh, texture=_texture(shadow.picture([])), lighting=False)
 
     def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
         """(height, width, 3) of a moment, at a share of the film's length."""
@@ -118,14 +108,9 @@ class Studio:
             if nodal is not None and "field" in mesh.point_data and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = surface.of(nodal)[:, 0]
         if self._shadow is not None:
-            dark = self._shadow.darkness(
-                [
-                    (x, surface.triangles)
-                    for x, (_, surface), casts in zip(points, self._meshes, self._casts_shadow, strict=True)
-                    if casts
-                ]
-            )
-            self._floor_actor.texture = _texture(dark)
+            at = {id(surface): x for (_, surface), x in zip(self._meshes, points, strict=True)}
+            cast = [(at[id(surface)], surface.triangles) for surface in self._casting]
+            self._floor.texture = _texture(self._shadow.picture(cast))
         self._aim(np.concatenate(points[: self._bodies]), share)
         self._plotter.render()
         return np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
@@ -185,12 +170,9 @@ def _nodal(moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.repeat(np.nan_to_num(mean)[:, None], 3, axis=1)
 
 
-def _texture(darkness: NDArray[np.float64]) -> Any:
-    """Of the color of shadows, as opaque as they are dark."""
+def _texture(image: NDArray[np.uint8]) -> Any:
     import pyvista
 
-    image = np.empty((*darkness.shape, 4), dtype=np.uint8)
-    image[..., :3], image[..., 3] = _SHADOW, np.round(255.0 * darkness)
     texture = pyvista.Texture(np.ascontiguousarray(image[::-1]))  # its first row is the upper one
     texture.interpolate = True
     return texture

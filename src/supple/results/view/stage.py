@@ -18,6 +18,7 @@ from supple.results.view.layers.joints import JointView
 from supple.results.view.layers.layer import Layer
 from supple.results.view.layers.obstacles import ObstacleView
 from supple.results.view.layers.section import Cut
+from supple.results.view.layers.shadow import ShadowView
 from supple.results.view.layers.skin import SkinView
 from supple.results.view.layers.springs import PusherView, SpringView
 from supple.results.view.layers.stitches import StitchView
@@ -115,6 +116,7 @@ class Stage:
         scene, moment, options = self._scene, self.moment, self.options
         self._bodies = self._make_bodies()
         self._layers = [self._bodies, Ground(scene, moment), ObstacleView(scene, moment), SpringView(scene, moment)]
+        self._layers.append(ShadowView(scene, moment))
         self._layers += [PusherView(scene, moment), Dots(scene, moment, "/pins", _PIN_COLOR, 0.04, _pins)]
         self._layers.append(JointView(scene, moment))
         if options.velocities:

@@ -63,6 +63,23 @@ def test_changed_options_remove_all_old_layers(server, fake):
     assert drawn - {"/bodies/tets", "/contacts"} == {"/bodies/0 body 0", "/bodies/1 body 1"}
 
 
+def test_bodies_cast_shadows_on_the_floor(server, fake):
+    """Darker where a body is near the floor, and none without a floor."""
+    builder = MomentBuilder()
+    stage = Stage(server, builder.moment(fake.snapshot), ViewOptions())
+    shadow = server.scene._handle_from_node_name["/shadow"]
+    lift = np.array([0.0, 50.0, 0.0])
+    near = shadow.image[..., 3].astype(int)
+    stage.show(builder.moment(fake.show(positions=fake.snapshot.positions + lift)))
+    far = shadow.image[..., 3].astype(int)
+    assert near.max() > 50
+    assert far.max() < 0.5 * near.max()
+    assert near[0].max() == near[-1].max() == 0
+    description = replace(fake.snapshot.description, obstacles=())
+    none = (np.zeros((0, 3, 3)), np.zeros((0, 3)))
+    Stage(server, MomentBuilder().moment(fake.show(description=description, obstacle_poses=none)), ViewOptions())
+
+
 def test_values_that_are_not_finite_are_not_sent(server, fake):
     x = fake.snapshot.positions.copy()
     x[3], x[4] = np.nan, np.inf
