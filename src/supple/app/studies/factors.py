@@ -137,7 +137,8 @@ class LogUniform(_Range):
         return self.low, math.sqrt(self.low) * math.sqrt(self.high), self.high
 
 
-uniform, loguniform = Uniform, LogUniform
+uniform = Uniform
+loguniform = LogUniform
 
 
 def as_factor(name: str, given: Any) -> Factor:
