@@ -77,13 +77,12 @@ def _texts(cells: Any, columns: dict[str, str]) -> list[str]:
 
 def measured_on(figures: dict[str, Any]) -> str:
     """When the figures were measured, on what, and what else the machine did."""
-    after = f" before and {figures['load_after']} after" if "load_after" in figures else ""
-    text = f"Measured on {figures['date']}, on a machine of load {figures['load']}{after} on {figures['cores']} cores"
-    if "versions" not in figures:
+    after = f" to {figures['load_after']}" if "load_after" in figures else ""
+    text = f"Measured on {figures['date']}, load {figures['load']}{after}, {figures['cores']} cores"
+    if "threads" not in figures:
         return f"{text}."
-    versions = ", ".join(f"{name} {version}" for name, version in figures["versions"].items())
     threads = f"{figures['threads']} thread" + "s" * (figures["threads"] > 1)
-    return f"{text} ({figures['processor']}, {versions}, {threads})."
+    return f"{text} ({figures['processor']}, {threads})."
 
 
 def table_text(figures: dict[str, Any]) -> str:

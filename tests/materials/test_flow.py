@@ -205,7 +205,7 @@ def test_what_cannot_be_is_one_clear_line():
     for prony, message in (
         ([(0.6, 1.0), (0.5, 2.0)], "the shares of prony add up to 1.1; it must be below 1"),
         ([(0.5, -1.0)], "a share or a time that is not above zero"),
-        ([0.5, 1.0], "prony is no list of pairs"),
+        ([0.5, 1.0], "prony is not a list of pairs"),
     ):
         with pytest.raises(SceneError, match=message):
             sp.Viscoelastic(material=RUBBER, prony=prony)

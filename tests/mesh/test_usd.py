@@ -61,7 +61,7 @@ def test_prims_are_placed_in_metres(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("solid x\n", "no USD file"),
+        ("solid x\n", "not a USD file"),
         ('#usda 1.0\ndef TetMesh "a" {\n', "OpenUSD cannot read it"),
         ("#usda 1.0\n", "no tetrahedra"),
         (

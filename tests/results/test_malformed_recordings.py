@@ -70,7 +70,7 @@ DAMAGES = {
     "rows of another body": (_scene("bodies/0/vertices", slice(0, 2)), "points to row"),
     "no header": (_delete("supple/header"), "supple/header is missing"),
     "header is no JSON": (_set("supple/header", "{"), "its description of the scene"),
-    "header is a number": (_set("supple/header", 3.0), "is no text"),
+    "header is a number": (_set("supple/header", 3.0), "is not a text"),
     "header is deep": (_set("supple/header", '{"tuple": [' * 60 + "]}" * 60), "nested too deeply"),
     "header of another class": (_set("supple/header", '{"class": "System", "fields": {}}'), "'System'"),
     "no bodies": (_scene("bodies", ()), "no bodies"),
@@ -116,8 +116,8 @@ def test_damaged_contents_are_errors_of_one_line(tmp_path, recorded, damage):
     [
         ("missing.vtkhdf", None, "there is no such file"),
         ("empty.vtkhdf", b"", "is empty"),
-        ("text.vtkhdf", b"solid ascii\n" * 50, "it is no HDF5 file"),
-        ("noise.vtkhdf", random.Random(1).randbytes(5000), "it is no HDF5 file"),
+        ("text.vtkhdf", b"solid ascii\n" * 50, "it is not an HDF5 file"),
+        ("noise.vtkhdf", random.Random(1).randbytes(5000), "it is not an HDF5 file"),
         ("head.vtkhdf", b"\x89HDF\r\n\x1a\n" + bytes(500), "is damaged"),
     ],
 )
@@ -135,7 +135,7 @@ def test_folders_and_plain_hdf5(tmp_path):
         read_recording(tmp_path)
     with h5py.File(tmp_path / "plain.h5", "w") as file:
         file["x"] = 1
-    with pytest.raises(OutputError, match="is no recording of Supple"):
+    with pytest.raises(OutputError, match="is not a recording of Supple"):
         read_recording(tmp_path / "plain.h5")
 
 

@@ -212,7 +212,7 @@ def test_unusable_paths_are_errors(tmp_path, tools):
         Recorder(tmp_path / "folder.vtkhdf")
     with pytest.raises(OutputError, match=r"name it recording\.vtkhdf"):
         Recorder(tmp_path / "recording")
-    with pytest.raises(OutputError, match=r"file: is no folder, and must be one"):
+    with pytest.raises(OutputError, match=r"file: is not a folder, and must be one"):
         tools.record(tmp_path / "file" / "recording.vtkhdf", 1)
     assert (tmp_path / "file").read_text() == "x"
 

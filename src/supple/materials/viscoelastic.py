@@ -53,7 +53,7 @@ class Viscoelastic(Hyperelastic):
         super().__post_init__()
         pairs = _numbers(self.prony)
         if pairs.ndim != 2 or pairs.shape[1] != 2:
-            raise SceneError("Viscoelastic: prony is no list of pairs (share of the shear modulus, time [s])")
+            raise SceneError("Viscoelastic: prony is not a list of pairs (share of the shear modulus, time [s])")
         if not (np.isfinite(pairs) & (pairs > 0.0)).all():
             raise SceneError("Viscoelastic: prony has a share or a time that is not above zero and finite")
         if not pairs[:, 0].sum() < 1.0:

@@ -115,7 +115,7 @@ def node_weights(
 
 
 def check_middle_nodes(nodes: NDArray[np.int32], n_vertices: int) -> None:
-    """Check that each edge has one node, that no other edge has, and that is no corner.
+    """Check that each edge has one node, that no other edge has, and that is not a corner.
 
     Raises
     ------

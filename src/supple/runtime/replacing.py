@@ -57,7 +57,7 @@ def whole_files(*paths: Path, error: type[SuppleError] = OutputError) -> Iterato
 
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
-    """A temporary folder to fill; it becomes `path`, in place of a folder of that name that was written before.
+    """A temporary folder to fill; it becomes `path`, instead of a folder of that name that was written before.
 
     A folder that holds anything other than files with the same suffixes is left alone.
 
@@ -92,7 +92,9 @@ def parent_folder(path: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
-        raise OutputError(f"{path.parent}: is no folder, and must be one to hold {path.name}; give another") from None
+        raise OutputError(
+            f"{path.parent}: is not a folder, and must be one to hold {path.name}; give another"
+        ) from None
     except OSError as error:
         raise output_error(path.parent, error) from None
     return path.parent

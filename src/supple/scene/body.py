@@ -30,7 +30,7 @@ class PlacedBody(ABC):
     ----------
     name, position, rotation, velocity, angular_velocity, friction : see `Body`
     mesh : the tets whose vertices move; material : of these tets
-    skin : the surface that is drawn in place of the mesh's own; None where that is drawn
+    skin : the surface that is drawn instead of the mesh's own; None where that is drawn
     """
 
     name: str

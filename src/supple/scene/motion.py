@@ -31,7 +31,7 @@ class Keyframes(Kind):
     displacements : (k, 3) [m], or None for no translation
     angles : (k,) [rad] about one axis, or None; they may count whole turns
     axis, pivot : (3,) axis of the rotation: through `pivot` [m] along `axis`
-    rotations : (k, 3) in place of angles: rotation vectors about `pivot` [rad]. From one keyframe to the next, the
+    rotations : (k, 3) instead of angles: rotation vectors about `pivot` [rad]. From one keyframe to the next, the
         shortest rotation is taken at constant rate (Shoemake, "Animating rotation with quaternion curves", 1985).
 
     Raises

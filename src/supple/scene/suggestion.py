@@ -1,4 +1,4 @@
-"""A suggestion in place of an unknown name."""
+"""A suggestion for an unknown name."""
 
 from __future__ import annotations
 

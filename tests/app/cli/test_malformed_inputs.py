@@ -102,7 +102,7 @@ CASES = {
         {"a.obj": obj(POINTS, FACES)},
         ["mesh", "a.obj", "-o", "o.1.node", "--max-volume", "-1"],
     ),
-    "meshing with a volume that is no number": (
+    "meshing with a volume that is not a number": (
         {"a.obj": obj(POINTS, FACES)},
         ["mesh", "a.obj", "-o", "o.1.node", "--max-volume", "small"],
     ),

@@ -88,7 +88,7 @@ def test_a_format_is_not_written_under_the_suffix_of_another(place, capsys):
             "out/plot.png: this is a folder, and a file of that name must be written; choose another --output",
         ),
         ("out/recording.vtkhdf/", "out/recording.vtkhdf: is a folder"),
-        ("out", "out: is no folder, and must be one to hold recording.vtkhdf; give another"),
+        ("out", "out: is not a folder, and must be one to hold recording.vtkhdf; give another"),
     ],
 )
 def test_an_output_path_in_use_is_reported_before_the_simulation(place, capsys, existing, message):

@@ -169,12 +169,12 @@ def test_the_interval_of_checkpoints(folder, every, kept):
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["resume", "nowhere"], "nowhere: is no run folder"),
-        (["resume", "meshes"], "meshes: is no run folder"),
-        (["resume", "scene.yaml"], "scene.yaml: is no run folder"),
+        (["resume", "nowhere"], "nowhere: is not a run folder"),
+        (["resume", "meshes"], "meshes: is not a run folder"),
+        (["resume", "scene.yaml"], "scene.yaml: is not a run folder"),
         (["run", "scene.yaml", "--checkpoint-every", "-1"], "--checkpoint-every is -1"),
         (["run", "scene.yaml", "--checkpoint-every", "1.5"], "not a whole number"),
-        (["info", "meshes"], "meshes: is no run folder"),
+        (["info", "meshes"], "meshes: is not a run folder"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(folder, capfd, arguments, reason):

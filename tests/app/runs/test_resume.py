@@ -211,7 +211,7 @@ def test_another_run_is_refused_and_nothing_is_written(out, scene, solver, steps
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path):
-    with pytest.raises(OutputError, match=r"is no run folder: it has no run/run\.json"):
+    with pytest.raises(OutputError, match=r"is not a run folder: it has no run/run\.json"):
         sp.resume(tmp_path)
 
 

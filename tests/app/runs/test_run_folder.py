@@ -130,9 +130,9 @@ def test_a_scene_that_the_solver_refuses_leaves_no_folder(out):
 
 def test_a_file_in_the_place_of_the_folder_is_refused(out):
     out.write_text("mine")
-    with pytest.raises(OutputError, match="is no folder"):
+    with pytest.raises(OutputError, match="is not a folder"):
         sp.RunFolder(out, Drift())
-    with pytest.raises(OutputError, match="is no folder"):
+    with pytest.raises(OutputError, match="is not a folder"):
         sp.RunFolder(out, Drift(), overwrite=True)
     assert out.read_text() == "mine"
 

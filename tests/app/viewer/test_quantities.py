@@ -32,7 +32,7 @@ def test_typed_values(text, unit, value):
     "text", ["", "kPa", "30 kN", "30 k", "1,5 kPa", "1 Pa Pa", "1e", "nan", "inf Pa", "0x10", "3 4"]
 )
 def test_other_texts_are_refused_with_an_example(text):
-    with pytest.raises(CommandError, match="is no value of stiffness; type for example 30 kPa"):
+    with pytest.raises(CommandError, match="is not a value of stiffness; type for example 30 kPa"):
         typed(text, "Pa", "stiffness")
 
 

@@ -73,7 +73,7 @@ def test_every_cut_is_found(path):
 def test_other_files_are_named(path):
     data = path.read_bytes()
     assert "another version; simulate it again" in damage(path, data.replace(b"checkpoint 1\n", b"checkpoint 2\n"))
-    assert "is no checkpoint" in damage(path, b"\x89HDF\r\n")
+    assert "is not a checkpoint" in damage(path, b"\x89HDF\r\n")
     path.unlink()
     with pytest.raises(OutputError, match="cannot be read: No such file"):
         read_checkpoint(path)

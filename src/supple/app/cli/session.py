@@ -64,7 +64,7 @@ class Products:
             paths.refuse_a_run()
 
     def refuse_folders(self) -> None:
-        """Raise `OutputError` where a folder is in the place of a file; before the simulation."""
+        """Raise `OutputError` where a folder has the name of a file; before the simulation."""
         for path in self.files().values():
             if path.is_dir():
                 raise OutputError(

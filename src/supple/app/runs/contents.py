@@ -79,10 +79,10 @@ class RunPaths:
                 path.unlink(missing_ok=True)
 
     def refuse_other_kinds(self) -> None:
-        """Raise `OutputError` where there is a file in the place of a folder, or a folder in that of the recording."""
+        """Raise `OutputError` where a file has the name of a folder, or a folder that of the recording."""
         name = self.recording.name
         if self.folder.exists() and not self.folder.is_dir():
-            raise OutputError(f"{self.folder}: is no folder, and must be one to hold {name}; give another")
+            raise OutputError(f"{self.folder}: is not a folder, and must be one to hold {name}; give another")
         if self.recording.is_dir():
             raise OutputError(f"{self.recording}: is a folder, and must be a file; give another folder to run in")
 

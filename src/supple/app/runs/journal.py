@@ -100,7 +100,7 @@ def read_journal(path: Path) -> Journal:
     """
     if not path.exists():
         folder, inside = path.parent.parent, f"{path.parent.name}/{path.name}"
-        raise OutputError(f"{folder}: is no run folder: it has no {inside}; give the --output of a run")
+        raise OutputError(f"{folder}: is not a run folder: it has no {inside}; give the --output of a run")
     try:
         text = path.read_bytes()
         if json.loads(text)["format"] != _FORMAT:

@@ -16,7 +16,7 @@ _SELECTIONS = ("pins", "forces", "soft_targets", "welds")
 
 
 def with_numbers(model: SceneFileModel, meshes: MeshStore) -> SceneFileModel:
-    """The scene file with vertices and tets in the place of their sets; itself where it names no set.
+    """The scene file with vertices and tets instead of their sets; itself where it names no set.
 
     Raises
     ------

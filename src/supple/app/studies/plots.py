@@ -139,7 +139,7 @@ def _some_done(table: StudyTable) -> NDArray[np.bool_]:
 
 
 def _positions(column: NDArray[Any]) -> tuple[NDArray[np.float64], list[str] | None]:
-    """Places on an axis; for values that are no numbers, 0, 1, 2, ..., and their labels."""
+    """Places on an axis; for values that are not numbers, 0, 1, 2, ..., and their labels."""
     if column.dtype != object:
         return column.astype(float), None
     labels = list(dict.fromkeys(str(value) for value in column))

@@ -95,7 +95,7 @@ def _start(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses) -> N
 def _points_of_vertices(system: System, surfaces: ContactSurfaces) -> NDArray[np.int64]:
     """(n + a,) the point of each vertex and anchor; -1 for vertices inside bodies."""
     anchors = system.stitching.anchors
-    row = np.full(len(system.points) + 1, -1, dtype=np.int64)  # the last one for what is no point
+    row = np.full(len(system.points) + 1, -1, dtype=np.int64)  # the last one for what is not a point
     row[surfaces.rows] = np.arange(len(surfaces.rows))
     point = row[system.stitching.points_of_nodes(system.points)]
     for k in np.unique(anchors.owner):

@@ -24,7 +24,7 @@ class Ogden(ByLaw):
 
     Parameters
     ----------
-    mu : one number for each term [Pa], of any sign. Programs that write 2 mu / alpha^2 in place of mu / alpha have
+    mu : one number for each term [Pa], of any sign. Programs that write 2 mu / alpha^2 for mu / alpha have
         other mu: give 2 mu / alpha of theirs.
     alpha : one exponent for each term [-], not zero.
     bulk : bulk modulus K [Pa]. Where another program has D1, K = 2 / D1.

@@ -68,7 +68,7 @@ class EnergyMaterial(ByLaw):
 
     Raises
     ------
-    SceneError : where psi is no such formula, is not symmetric in the stretches, or has a stress at rest.
+    SceneError : where psi is not such a formula, is not symmetric in the stretches, or has a stress at rest.
     """
 
     psi: Annotated[Callable[..., Any] | str, FormulaText()]

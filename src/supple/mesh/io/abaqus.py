@@ -18,7 +18,7 @@ from supple.mesh.io.text import decoded, integer, numbers, shortened
 
 # Solid tets, with their nodes and VTK's number. The longer name first: variants such as C3D10M begin with it.
 _SOLID = {"C3D10": (10, QUADRATIC_TETRA), "C3D4": (4, TETRA)}
-# Elements that are no solids: trusses, beams, shells, membranes and rigid surfaces, which meshers write for boundaries.
+# Not solids: trusses, beams, shells, membranes and rigid surfaces, which meshers write for boundaries.
 _NOT_SOLID = ("T3D", "T2D", "B2", "B3", "S3", "S4", "S6", "S8", "S9", "STRI", "M3D", "R3D", "CPS", "CPE", "MASS")
 _KEYWORDS = ("NODE", "ELEMENT", "NSET", "ELSET")
 _MOST_MEMBERS = 100_000_000

@@ -47,7 +47,7 @@ def edge_of_volume(volume: float) -> float:
 def warn_of_many(tets: float, volume: float, seconds: float) -> None:
     """Log before the start where about so many tets of a whole volume [m^3] may take longer than a time limit [s].
 
-    It is no refusal: the time depends on the machine, and the limit ends the mesher.
+    It is not a refusal: the time depends on the machine, and the limit ends the mesher.
     """
     if tets >= MANY:
         edge = edge_of_volume(TETS_OF_BOUND * volume / MANY)

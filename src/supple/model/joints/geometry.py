@@ -88,8 +88,8 @@ class JointGeometry:
     Attributes
     ----------
     corners : (j, 8) control points of the first side, then of the second; the latter repeat the first's, with
-        coefficients of zero, where the second is no body
-    alone : (j,) whether the second is no body
+        coefficients of zero, where the second is not a body
+    alone : (j,) whether the second is not a body
     sizes : (j,) diameter of gyration of the smaller body [m], by which directions are multiplied in `differences`
     stiffness : (j,) of the smaller body against strain [N/m]; masses : (j,) of the lighter one [kg]
     centers : where forces are reduced to, the joint's points

@@ -105,7 +105,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
     if not data.startswith(_FORMAT):
         if data.startswith(_FAMILY):
             raise OutputError(f"{path}: was written by another version; simulate it again")
-        raise OutputError(f"{path}: is no checkpoint; give one that a run folder of Supple holds")
+        raise OutputError(f"{path}: is not a checkpoint; give one that a run folder of Supple holds")
     content = data[len(_FORMAT) + _DIGEST_LENGTH :]
     written = data[len(_FORMAT) : len(_FORMAT) + _DIGEST_LENGTH]
     if written != hashlib.sha256(content).hexdigest().encode() + b"\n":

@@ -49,7 +49,9 @@ class CheckedFile:
         if not start:
             return OutputError(f"{self.path}: is empty; record the simulation again")
         if start != b"\x89HDF\r\n\x1a\n":
-            return OutputError(f"{self.path}: is not a recording: it is no HDF5 file; give a .vtkhdf that Supple wrote")
+            return OutputError(
+                f"{self.path}: is not a recording: it is not an HDF5 file; give a .vtkhdf that Supple wrote"
+            )
         if "truncated" in reason:
             return OutputError(f"{self.path}: is cut off: it has only {self._bytes} bytes; copy all of it again")
         return self.broken(" ".join(reason.split()))
@@ -64,7 +66,7 @@ class CheckedFile:
 
     def other(self, what: str) -> OutputError:
         """The error for a file of another kind."""
-        return OutputError(f"{self.path}: is no recording of Supple: {what}; give a .vtkhdf that Supple wrote")
+        return OutputError(f"{self.path}: is not a recording of Supple: {what}; give a .vtkhdf that Supple wrote")
 
     def attribute(self, path: str, name: str) -> Any:
         """An attribute, or None where it does not exist."""
@@ -80,7 +82,7 @@ class CheckedFile:
         except (KeyError, OSError, RuntimeError, ValueError):
             raise self.broken(f"{path} is missing") from None
         if not isinstance(item, h5py.Dataset):
-            raise self.broken(f"{path} is no dataset")
+            raise self.broken(f"{path} is not a dataset")
         return item
 
     def text(self, path: str) -> str:
@@ -91,7 +93,7 @@ class CheckedFile:
         except (OSError, RuntimeError, ValueError):
             value = None
         if not isinstance(value, bytes):
-            raise self.broken(f"{path} is no text")
+            raise self.broken(f"{path} is not a text")
         return value.decode("utf-8", errors="replace")
 
     def array(self, path: str) -> NDArray[Any]:

@@ -105,7 +105,7 @@ class RecordingFile:
 
     @property
     def is_in_place(self) -> bool:
-        """Whether `path` still leads to this file: writing to one that was deleted is no error of the system."""
+        """Whether `path` still leads to this file: writing to one that was deleted is not an error of the system."""
         try:
             return os.path.samestat(os.fstat(self._file.fileno()), self.path.stat())
         except OSError:

@@ -1,4 +1,4 @@
-"""Polyhedra in place of round surfaces."""
+"""Polyhedra for round surfaces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from supple.mesh.primitives.surfaces import sphere_surface
 
 # An icosahedron's faces split into this many along each edge: faces stay within 0.4 % of the radius.
 SPHERE_SPLITS = 12
-# Sides of the prism in place of a cylinder: within 0.13 % of the radius.
+# Sides of the prism for a cylinder: within 0.13 % of the radius.
 CYLINDER_SIDES = 64
 
 

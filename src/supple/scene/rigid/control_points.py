@@ -8,7 +8,7 @@ with the center c and the second moment per mass S, and each has a quarter of th
 sum v_k v_k^T = 4 1, their mass, center and second moment are the body's, and so are the kinetic energy, the momentum
 and the angular momentum of every affine motion.
 
-Source: Lan et al., "Affine Body Dynamics" (2022), section 3, with points in the place of the coefficients A and t.
+Source: Lan et al., "Affine Body Dynamics" (2022), section 3, with points instead of the coefficients A and t.
 """
 
 from __future__ import annotations

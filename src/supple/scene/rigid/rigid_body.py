@@ -172,7 +172,7 @@ class RigidBody(PlacedBody):
         solid = of_solid(self.shape, owner)
         if self.mass is None:
             if self.inertia is not None:
-                raise SceneError(f"{owner}: inertia needs a mass [kg] in place of the density; give mass=...")
+                raise SceneError(f"{owner}: inertia needs a mass [kg] instead of the density; give mass=...")
             if self.center is not None:
                 raise SceneError(f"{owner}: center needs a mass and an inertia; give both")
             return with_mass(solid, solid.volume * positive(self.density, f"{owner}: density"), owner)

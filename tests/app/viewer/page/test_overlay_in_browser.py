@@ -114,7 +114,7 @@ def test_values_have_units_and_are_typed_with_them(fresh):
         place = np.log10(pascals)
         fresh.screen.wait(lambda: abs(fresh.screen.reads(youngs.handle) - place) < 0.06, "the slider")  # noqa: B023
     fresh.screen.write("Young's modulus", "30 newton")
-    fresh.tab.get_by_text("is no value of Young's modulus; type for example 30 kPa").wait_for()
+    fresh.tab.get_by_text("is not a value of Young's modulus; type for example 30 kPa").wait_for()
     fresh.screen.wait(lambda: box.input_value() == "2 MPa", "the value as it was")
 
 

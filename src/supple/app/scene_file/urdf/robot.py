@@ -135,7 +135,7 @@ def _robot(root: ElementTree.Element, folder: Path) -> Robot:
 
 
 def _root(links: dict[str, Link], joints: dict[str, RobotJoint]) -> str:
-    """The name of the link that is no child; raises where the links are not one tree."""
+    """The name of the link that is not a child; raises where the links are not one tree."""
     parents: dict[str, str] = {}
     for joint in joints.values():
         if joint.child in parents:

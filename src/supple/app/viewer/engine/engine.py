@@ -79,7 +79,7 @@ class Engine:
             self._process.start()
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             raise SceneError(
-                f"the scene cannot be sent to another process ({error}); use Keyframes in place of functions of time "
+                f"the scene cannot be sent to another process ({error}); use Keyframes instead of functions of time "
                 "that are defined inside other functions"
             ) from None
         # Only the child keeps these ends open: so each process detects the end of the other one.

@@ -41,13 +41,13 @@ def typed(text: str, unit: str = "", name: str = "the value") -> float:
 
     Raises
     ------
-    CommandError : where it is no number, or has another unit.
+    CommandError : where it is not a number, or has another unit.
     """
     match = _TYPED.fullmatch(text.translate(_POWERS))
     factor = None if match is None else _factor(match[2].replace(" ", ""), unit)
     if match is None or factor is None:
         example = written(3e4, unit) if unit in ("Pa", "J/m^3") else written(0.02, unit)
-        raise CommandError(f"{displayed(text)} is no value of {name}; type for example {example}")
+        raise CommandError(f"{displayed(text)} is not a value of {name}; type for example {example}")
     return float(match[1]) * factor
 
 

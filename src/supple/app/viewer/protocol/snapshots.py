@@ -15,7 +15,7 @@ from supple.results.recording.actions.joints import RecordedJoint
 from supple.results.recording.actions.stitches import RecordedStitches
 from supple.results.recording.scene import RecordedObstacle
 
-RIGID = "rigid"  # in place of a material
+RIGID = "rigid"  # instead of a material
 PUSHER = "pusher"  # name of the obstacle that the mouse moves
 
 

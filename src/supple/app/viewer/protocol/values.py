@@ -19,7 +19,7 @@ def displayed(value: object) -> str:
 
 
 def number(value: object, what: str, low: float, high: float) -> float:
-    """The value as float; raises `CommandError` where it is no finite number from `low` to `high`."""
+    """The value as float; raises `CommandError` where it is not a finite number from `low` to `high`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise CommandError(f"{what} is {displayed(value)}; give a number")
     if not low <= value <= high or not math.isfinite(value):
@@ -28,7 +28,7 @@ def number(value: object, what: str, low: float, high: float) -> float:
 
 
 def whole(value: object, what: str, low: int, high: int) -> int:
-    """The value as int; raises `CommandError` where it is no whole number from `low` to `high`."""
+    """The value as int; raises `CommandError` where it is not a whole number from `low` to `high`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise CommandError(f"{what} is {displayed(value)}; give a whole number")
     if not low <= value <= high:

@@ -31,7 +31,7 @@ def read_usd(data: bytes) -> CellSoup:
     if find_spec("pxr") is None:
         raise FormatError(INSTALL)
     if not data.startswith((b"#usda", b"PXR-USDC")):
-        raise FormatError("it is no USD file: it begins with neither PXR-USDC nor #usda")
+        raise FormatError("it is not a USD file: it begins with neither PXR-USDC nor #usda")
     return read_in_child(data, "usd", ".usda" if data.startswith(b"#usda") else ".usdc").soup
 
 

@@ -24,7 +24,7 @@ class StitchViscosity:
 
     Attributes
     ----------
-    tets : their viscosity; springs : those with damping, `stiffness` times tau in place of the stiffness [N s/m]
+    tets : their viscosity; springs : those with damping, `stiffness` times tau instead of the stiffness [N s/m]
     """
 
     tets: Viscosity

@@ -36,7 +36,7 @@ class Seams:
 def _stitched(system: System, owner: NDArray[np.int32]) -> NDArray[np.int64]:
     """(k, 2) triangles around stitches of bodies to bodies."""
     nodes, triangles, points = system.stitching.nodes(), system.triangles, system.points
-    # Anchors on obstacles are no points of bodies.
+    # Anchors on obstacles are not points of bodies.
     nodes = np.append(system.stitching.points_of_nodes(points), -1)[nodes].astype(np.int32)
     nodes = nodes[(nodes[:, 0] >= 0) & (nodes[:, 1] >= 0)]
     if not len(nodes):

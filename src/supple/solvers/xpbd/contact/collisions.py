@@ -263,7 +263,7 @@ class Collisions:
 def _owners(system: System, obstacles: ObstacleContacts, surfaces: ContactSurfaces, rigid: RigidBodies) -> Owners:
     names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
     vertex = obstacles.embedded.single
-    # The points of soft bodies are their vertices; a control point is no point.
+    # The points of soft bodies are their vertices; a control point is not a point.
     points, single = np.full(len(obstacles.embedded), -1, dtype=np.int32), system.points.single
     points[single[single >= 0]] = np.flatnonzero(single >= 0)
     points[vertex < 0] = np.flatnonzero(single < 0)

@@ -191,12 +191,12 @@ class ObstacleContacts:
     def predict(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> None:
         """Take notice of the prediction of a substep, before any forces of contacts; see `begin_substep`.
 
-        What other bodies press onto an obstacle approaches it by their forces. This is no impact either.
+        What other bodies press onto an obstacle approaches it by their forces. This is not an impact either.
         """
         self._moved.begin_substep()
         self._moved.take(x, self._predicted)
         self._moved.take(x_prev, self._begun)
-        # What rests on a point approaches it in every substep by its fall; this is no impact.
+        # What rests on a point approaches it in every substep by its fall; this is not an impact.
         self._predicted[len(x) :] -= h * h * self._gravity
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:

@@ -140,7 +140,7 @@ class SurfaceCollisions:
         self._take(x, x_prev)
         self._predicted[:], self._begun[:] = self._x, self._before
         if len(self._rigid):
-            # What rests on a point approaches it in every substep by its fall; this is no impact.
+            # What rests on a point approaches it in every substep by its fall; this is not an impact.
             self._predicted -= h * h * self._falling
         if rows.loads:
             push_rows(self._x, self._before, self._movers, rows.described, h)

@@ -216,7 +216,7 @@ class Damping:
         return ViscousMemory(forces, velocities, self._interval, state_velocities)
 
     def _fast_bodies(self, H: float) -> NDArray[np.bool_]:
-        """(b,) where the strain of an element changes so much in a cycle that f_1 and v_1 are no guesses for it."""
+        """(b,) where the strain of an element changes so much in a cycle that f_1 and v_1 are not guesses for it."""
         fast = np.zeros(len(self._groups.blocks) - 1, dtype=np.bool_)
         for made, bodies in zip(self._sums, self._bodies, strict=True):
             fast[bodies[made.rates > (LARGEST_STRAIN / H) ** 2]] = True
