@@ -33,6 +33,7 @@ RETURNED = {
         "supple.solvers.implicit.details.ImplicitDetails",
     ),
     "recordings": ("supple.results.recording.frame.RecordedFrame",),
+    "meshes": ("supple.mesh.sets.MeshSets",),
 }
 
 

@@ -33,7 +33,6 @@ from .mesh import shapes as shapes
 from .mesh.meshing.decimation import decimate_surface as decimate_surface
 from .mesh.meshing.repair import repair_surface as repair_surface
 from .mesh.meshing.tetrahedralize import tetrahedralize as tetrahedralize
-from .mesh.sets import read_sets as read_sets
 from .mesh.surface import SurfaceMesh as SurfaceMesh
 from .mesh.tetmesh import TetMesh as TetMesh
 from .model.state import Status as Status

@@ -170,8 +170,8 @@ READERS = {
         )
         for kind in SURFACE_WRITERS
     },
-    "sets .inp": Reader(text_file("s.inp", SETS), "s.inp", sp.read_sets),
-    "sets .msh": Reader(text_file("s.msh", GROUPS), "s.msh", sp.read_sets),
+    "sets .inp": Reader(text_file("s.inp", SETS), "s.inp", sp.TetMesh.load),
+    "sets .msh": Reader(text_file("s.msh", GROUPS), "s.msh", sp.TetMesh.load),
     "surface .glb": Reader(
         lambda folder: trimesh.Trimesh(CUBE.vertices, CUBE.triangles).export(folder / "s.glb"),
         "s.glb",

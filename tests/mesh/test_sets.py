@@ -45,7 +45,7 @@ ORDER = [*np.setdiff1d(np.arange(len(MESH.tets)), BONE), *BONE]  # of the tets i
 def test_sets_of_abaqus(tmp_path):
     path = tmp_path / "a.inp"
     path.write_text(abaqus())
-    sets = sp.read_sets(path)
+    sets = sp.TetMesh.load(path).sets
     assert sets.tet_count == len(MESH.tets)
     for name in ("Left", "LEFT", "held"):
         np.testing.assert_array_equal(sets.vertices_of(name), LEFT)
@@ -122,7 +122,8 @@ def gmsh_41(path, binary):
 def test_physical_groups_of_gmsh(tmp_path, write, binary):
     path = tmp_path / "a.msh"
     write(path, binary)
-    sets, mesh = sp.read_sets(path), sp.TetMesh.load(path)
+    mesh = sp.TetMesh.load(path)
+    sets = mesh.sets
     np.testing.assert_allclose(mesh.vertices, MESH.vertices)
     np.testing.assert_array_equal(sets.vertices_of("left"), LEFT)
     centers = mesh.vertices[mesh.tets].mean(axis=1)
@@ -135,7 +136,7 @@ def test_physical_groups_of_gmsh(tmp_path, write, binary):
 
 def test_a_file_without_groups_has_no_sets(tmp_path):
     MESH.save(tmp_path / "a.msh")
-    sets = sp.read_sets(tmp_path / "a.msh")
+    sets = sp.TetMesh.load(tmp_path / "a.msh").sets
     assert (dict(sets.vertices), dict(sets.tets), sets.tet_count) == ({}, {}, len(MESH.tets))
     with pytest.raises(MeshError, match="there is no set of vertices 'left'; there are: none"):
         sets.vertices_of("left")
@@ -144,7 +145,6 @@ def test_a_file_without_groups_has_no_sets(tmp_path):
 GOOD = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4\n9,1,2,3,4\n"
 HEAD = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
 MALFORMED = {
-    "another format": ("a.stl", "solid\nendsolid\n", "sets are read from .inp and .msh"),
     "no tets": ("a.inp", "*NODE\n1,0,0,0\n", "a.inp: it has no tetrahedra"),
     "no name": ("a.inp", GOOD + "*NSET\n1\n", "a.inp:8: \\*NSET has no name"),
     "unknown node": ("a.inp", GOOD + "*NSET, NSET=a\n1, 5\n", "node 5 is used, and does not exist"),
@@ -174,7 +174,7 @@ def test_malformed_files_give_one_line(tmp_path, case):
     name, text, words = MALFORMED[case]
     (tmp_path / name).write_text(text)
     with pytest.raises(MeshError, match=words) as caught:
-        sp.read_sets(tmp_path / name)
+        sp.TetMesh.load(tmp_path / name)
     assert "\n" not in str(caught.value)
 
 

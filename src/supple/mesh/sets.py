@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.mesh.io import abaqus
-from supple.mesh.io.cells import FormatError, MeshFile, tets_of
-from supple.mesh.io.file_contents import file_contents
-from supple.mesh.io.libraries.meshio import read_msh
+from supple.mesh.io.mesh_files import TetFile
 from supple.runtime.displayed import Displayed
-
-_READERS: dict[str, Callable[[bytes], MeshFile]] = {".inp": abaqus.read, ".msh": read_msh}
-SETS_EXTENSIONS = tuple(_READERS)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeshSets(Displayed):
-    """Named sets of a mesh file, in the numbering of `TetMesh.load`: for pins, forces and regions.
+    """Named sets of a mesh: for pins, forces and regions.
+
+    They are the node and element sets of Abaqus (.inp) and the physical groups of Gmsh (.msh). A group of surfaces or
+    curves, and an element set, is also a set of the vertices of its elements.
 
     Attributes
     ----------
@@ -84,37 +80,17 @@ def _found(sets: Mapping[str, NDArray[np.int32]], name: str, kind: str) -> NDArr
     raise MeshError(f"there is no set of {kind} {name!r}; there are: {listed}")
 
 
-def read_sets(path: str | Path) -> MeshSets:
-    """The named sets of a mesh file: node and element sets of Abaqus (.inp), physical groups of Gmsh (.msh).
+def sets_of(file: TetFile) -> MeshSets:
+    """The sets of a file. Vertices that belong to no tet are left out, as `TetMesh.load` does.
 
-    A physical group of surfaces or curves, and an element set, is also a set of the vertices of its elements. Vertices
-    that belong to no tet are left out, as `TetMesh.load` does.
-
-    Parameters
-    ----------
-    path : of the mesh file.
-
-    Raises
-    ------
-    MeshError : where the file cannot be read, or has a format without sets; the text begins with the path.
+    A set of tets is also one of their vertices, where no set of vertices has its name.
     """
-    path = Path(path)
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
-        raise MeshError(f"{path}: sets are read from {' and '.join(_READERS)} files, not from '{path.suffix}'")
-    data = file_contents(path)
-    try:
-        found = reader(data)
-        tets = tets_of(found.soup)
-    except FormatError as error:
-        where = f"{path}:{error.line}" if error.line is not None else str(path)
-        raise MeshError(f"{where}: {error.reason}") from None
-    used = np.zeros(len(found.soup.points), dtype=bool)
-    used[tets] = True
+    used = np.zeros(len(file.points), dtype=bool)
+    used[file.tets] = True
     place = np.cumsum(used) - 1
-    of_nodes = {name: place[rows[used[rows]]].astype(np.int32) for name, rows in found.node_sets.items()}
-    of_tets = {name: rows.astype(np.int32) for name, rows in found.tet_sets.items()}
+    of_nodes = {name: place[rows[used[rows]]].astype(np.int32) for name, rows in file.node_sets.items()}
+    of_tets = {name: rows.astype(np.int32) for name, rows in file.tet_sets.items()}
     for name, rows in of_tets.items():
-        of_nodes.setdefault(name, place[np.unique(tets[rows])].astype(np.int32))
+        of_nodes.setdefault(name, place[np.unique(file.tets[rows])].astype(np.int32))
     vertices = {name: rows for name, rows in of_nodes.items() if len(rows)}
-    return MeshSets(vertices, of_tets, len(tets))
+    return MeshSets(vertices, of_tets, len(file.tets))

@@ -24,6 +24,7 @@ from supple.mesh.quadratic import (
     with_middle_nodes,
 )
 from supple.mesh.quality import min_dihedrals, radius_ratios
+from supple.mesh.sets import MeshSets, sets_of
 from supple.mesh.surface import SurfaceMesh, linear_map
 from supple.mesh.topology import (
     TET_EDGES,
@@ -155,14 +156,15 @@ class TetMesh(Displayed):
         MeshError : where the file is missing, malformed, of another kind, or has no usable tets; the text starts
             with the path.
         """
-        points, tets, source = read_tets(path)
+        file = read_tets(path)
+        source = file.source
         try:
-            mesh = cls.dropping_unused(points, tets)
+            mesh = cls.dropping_unused(file.points, file.tets)
         except MeshError as error:
             raise MeshError(f"{source}: {str(error).removeprefix('TetMesh: ')} (counted from 0)") from None
         if mesh.turned:
             logger.info("%s: %d of %d tets had negative winding and were turned", source, mesh.turned, len(mesh.tets))
-        return mesh
+        return mesh._with_sets(sets_of(file))
 
     def save(self, path: str | Path) -> None:
         """Write the mesh as TetGen's four files (.node, .ele, .edge or .face), .msh, .vtu, .vtk, .inp, .usd, .usda or
@@ -255,7 +257,16 @@ class TetMesh(Displayed):
     ) -> TetMesh:
         """The mesh scaled, then turned by a matrix (3, 3), then moved by a vector (3,) [m]."""
         linear, shift = linear_map(scale, rotation, translation, "TetMesh.transformed")
-        return TetMesh(self.vertices @ linear.T + shift, self.nodes)
+        return TetMesh(self.vertices @ linear.T + shift, self.nodes)._with_sets(self.sets)
+
+    @property
+    def sets(self) -> MeshSets:
+        """The named sets of the file that the mesh was loaded from (.inp, .msh); none of other meshes."""
+        return self.__dict__.get("_sets") or MeshSets({}, {}, len(self.tets))
+
+    def _with_sets(self, sets: MeshSets) -> TetMesh:
+        object.__setattr__(self, "_sets", sets)
+        return self
 
 
 def _determinants(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.float64]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import vertex_array
 from supple.mesh.io import abaqus, obj, off, ply, stl, vtk_legacy, vtk_xml
-from supple.mesh.io.cells import CellSoup, FormatError, tets_of
+from supple.mesh.io.cells import CellSoup, FormatError, MeshFile, tets_of
 from supple.mesh.io.file_contents import file_contents
 from supple.mesh.io.libraries.meshio import read_msh, write_msh
 from supple.mesh.io.libraries.trimesh import read_glb
@@ -44,11 +45,11 @@ SURFACE_WRITERS = {
     ".vtu": vtk_xml.written_cells,
     ".vtk": vtk_legacy.written_surface,
 }
-TET_READERS: dict[str, Callable[[bytes], CellSoup]] = {
-    ".msh": lambda data: read_msh(data).soup,
+TET_READERS: dict[str, Callable[[bytes], CellSoup | MeshFile]] = {
+    ".msh": read_msh,
     ".vtu": vtk_xml.read,
     ".vtk": vtk_legacy.read,
-    ".inp": lambda data: abaqus.read(data).soup,
+    ".inp": abaqus.read,
     **dict.fromkeys(USD_SUFFIXES, read_usd),
 }
 TET_WRITERS = {".vtu": vtk_xml.written_cells, ".vtk": vtk_legacy.written_cells, ".inp": abaqus.written}
@@ -103,8 +104,18 @@ def write_surface(path: str | Path, vertices: NDArray[np.float64], triangles: ND
     _write_whole(path, lambda temporary: temporary.write_bytes(writer(vertices, triangles)))
 
 
-def read_tets(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.integer], Path]:
-    """Vertices (n, 3), tets (m, 4) or (m, 10), and the file that lists the tets; see `TetMesh.load`."""
+class TetFile(NamedTuple):
+    """Points (n, 3), tets (m, 4) or (m, 10), the file that lists them; by name, rows of points and of tets in sets."""
+
+    points: NDArray[np.float64]
+    tets: NDArray[np.integer]
+    source: Path
+    node_sets: Mapping[str, NDArray[np.int64]] = {}
+    tet_sets: Mapping[str, NDArray[np.int64]] = {}
+
+
+def read_tets(path: str | Path) -> TetFile:
+    """What a file of tets contains; see `TetMesh.load`."""
     path = Path(path)
     extension = path.suffix.lower()
     if is_tetgen_path(path):
@@ -112,14 +123,15 @@ def read_tets(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.integer
         ele = family_paths(path)[".ele"]
         if family.order == 2:
             logger.warning("%s: ten-node tets: only their four corners are used; to keep them, convert it to .vtu", ele)
-        return family.points, family.tets, ele
+        return TetFile(family.points, family.tets, ele)
     if extension not in TET_EXTENSIONS:
         hint = "; a surface is loaded with SurfaceMesh.load" if extension in SURFACE_READERS else ""
         raise _unknown_extension(path, TET_EXTENSIONS, hint)
     data = file_contents(path)
     try:
-        soup = TET_READERS[extension](data)
-        return soup.points, tets_of(soup), path
+        found = TET_READERS[extension](data)
+        file = found if isinstance(found, MeshFile) else MeshFile(found)
+        return TetFile(file.soup.points, tets_of(file.soup), path, file.node_sets, file.tet_sets)
     except FormatError as error:
         raise _located(path, error) from None
 

@@ -130,7 +130,6 @@ def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
 def _mesh(file: Path, suffix: str) -> None:
     from supple.errors import MeshError
     from supple.mesh.io.mesh_files import SURFACE_READERS, TET_EXTENSIONS
-    from supple.mesh.sets import SETS_EXTENSIONS, read_sets
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
 
@@ -151,8 +150,8 @@ def _mesh(file: Path, suffix: str) -> None:
             except MeshError:
                 raise error from None
     rows = _tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh, file)
-    if isinstance(mesh, TetMesh) and suffix in SETS_EXTENSIONS:
-        rows += [(f"sets of {kind}", listed) for kind, listed in read_sets(file).listed().items()]
+    if isinstance(mesh, TetMesh) and suffix in (".inp", ".msh"):
+        rows += [(f"sets of {kind}", listed) for kind, listed in mesh.sets.listed().items()]
     print_table(rows, str(file))
 
 

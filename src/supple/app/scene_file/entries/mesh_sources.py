@@ -12,7 +12,6 @@ from supple.app.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel
 from supple.app.scene_file.model import FilePath, Model, Positive, Vector
 from supple.errors import MeshError
 from supple.mesh.meshing.units import warn_of_millimetres
-from supple.mesh.sets import MeshSets, read_sets
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.located import at
@@ -114,10 +113,6 @@ class MeshStore:
     def fine(self, source: MeshFileModel) -> SurfaceMesh | None:
         """The surface in a file, which was reduced before it was filled; None where it was not."""
         return self._once(source, lambda: self._read(source))[1]
-
-    def sets(self, source: MeshFileModel) -> MeshSets:
-        """The named sets of a file of tets."""
-        return self._once(source, lambda: read_sets(self.located(source.file)), "sets ")
 
     def shape(self, shape: ShapeModel, order: int = 1) -> TetMesh:
         """The tet mesh of a shape."""
