@@ -101,7 +101,7 @@ def by_xpbd(system, x, h=1 / 1200, steps=12_000):
         A = inertia + h * K[free][:, :, free].reshape(inertia.shape)
         v[free] = np.linalg.solve(A, inertia @ v[free].ravel()).reshape(-1, 3)
         points[:, :3] += h * v
-        constraints.project(points, h, False)
+        constraints.project(points, h)
         v = (points[:, :3] - before) / h
         path.append(points[:, :3].copy())
     return np.array(path)

@@ -46,7 +46,7 @@ class Number(Form):
     def check_bounds(self, given: float, what: str) -> None:
         """Raise `SceneError` for a number beyond the bounds."""
         if not self.allows(given):
-            raise SceneError(f"{what} is {given:g}; it must be {self.bounds}")
+            raise SceneError(f"{what} is {given:g}; it must be {self.needed(given)}")
 
     def allows(self, given: float) -> bool:
         """Whether a number is finite and within the bounds."""
@@ -57,6 +57,12 @@ class Number(Form):
             and (self.below is None or given < self.below)
             and (self.most is None or given <= self.most)
         )
+
+    def needed(self, given: float) -> str:
+        """What a number that is not allowed must be, in words."""
+        ends = sum(end is not None for end in (self.above, self.least, self.below, self.most))
+        # Bounds on both sides say it themselves.
+        return f"finite and {self.bounds}" if ends == 1 and not np.isfinite(given) else self.bounds
 
     @property
     def bounds(self) -> str:
@@ -96,9 +102,7 @@ class NumberPerTet(Form):
                 each = float(values.ravel()[tet])
                 if not self.bounds.allows(each):
                     where = f" (tet {tet})" if values.ndim else ""
-                    infinite = np.isinf(each) and self.bounds != ANY_NUMBER
-                    must = f"finite and {self.bounds.bounds}" if infinite else self.bounds.bounds
-                    raise SceneError(f"{what} is {each:g}{where}; it must be {must}")
+                    raise SceneError(f"{what} is {each:g}{where}; it must be {self.bounds.needed(each)}")
         return value
 
 

@@ -10,9 +10,9 @@ from supple.app.viewer.app import opened_page
 from supple.app.viewer.replay import Replay
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.options import ViewOptions
-from supple.results.view.page import _evenly, page_of_moments
+from supple.results.view.page import page_of_moments
 
 STEPS = 30
 
@@ -93,8 +93,8 @@ def test_exported_pages_keep_times_and_drop_frames_above_the_limit(recorded, mon
         thin = page_of_moments(taken, ViewOptions("tets", "volume ratio J"))
     assert len(thin) < len(whole)
     assert "<title>ball · Supple</title>" in thin
-    assert _evenly(10, 4) == [0, 3, 6, 9]
-    assert _evenly(3, 9) == [0, 1, 2]
+    assert evenly(10, 4) == [0, 3, 6, 9]
+    assert evenly(3, 9) == [0, 1, 2]
 
 
 def test_a_recording_in_the_browser(recorded, look, browser, pixels, spot, tmp_path):

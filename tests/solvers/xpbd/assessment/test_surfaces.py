@@ -72,7 +72,7 @@ def test_a_vertex_that_barely_overlaps_an_obstacle_is_not_found():
         sp.obstacles.Capsule(start=(0.1, -0.6, -3), end=(0.1, -0.6, 3), radius=0.2, name="solid"),
         sp.obstacles.Cylinder(start=(0.1, -0.6, -3), end=(0.1, -0.6, 3), radius=0.2, name="solid"),
     ],
-    ids=lambda solid: solid.file_kind,
+    ids=lambda solid: solid.kind,
 )
 def test_a_round_solid_between_vertices_is_found(solid):
     cube = sp.shapes.box((1.0, 1.0, 1.0), (1, 1, 1))

@@ -145,7 +145,7 @@ def test_the_power_of_the_forces_is_the_quadratic_form_of_their_matrix():
         assert damping is not None
         damping._motion[:, :3], damping._motion[:, 3:] = x[order], v[order]
         expected = v.ravel() @ viscosity(system, x) @ v.ravel()
-        assert damping._powers(0.0, False).sum() == pytest.approx(expected, rel=1e-12)
+        assert damping._powers(0.0).sum() == pytest.approx(expected, rel=1e-12)
 
 
 def test_each_element_counts_once_in_the_parts_of_its_body():
