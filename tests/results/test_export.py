@@ -11,9 +11,10 @@ import sys
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.errors import OutputError
 from supple.results.export import glb as export_glb
-from supple.results.export import video
+from supple.results.export import video, video_worker
 from supple.results.export.exporter import FORMATS, export
 from supple.results.recording.reader import read_recording
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
@@ -243,6 +244,20 @@ def test_a_picture_is_colored_by_a_field_has_a_legend_and_a_shadow(tmp_path, too
     darker = (shown[2] - shown[1]).sum(axis=2) > 30
     assert 0.002 < darker.mean() < 0.3
     assert ((shown[2] - shown[1]).sum(axis=2) < -30).mean() < 1e-3  # a shadow makes nothing brighter
+
+
+def test_a_field_of_quadratic_tets_has_values_at_middle_nodes(tmp_path):
+    path = tmp_path / "q.vtkhdf"
+    mesh = sp.shapes.box(divisions=(2, 1, 1), order=2)
+    body = sp.Body("q", mesh, sp.StableNeoHookean(youngs=1e4, poisson=0.3))
+    list(sp.simulate(sp.Scene([body], gravity=(0, 0, 0)), sp.Implicit(), 0.01, 1, sinks=[sp.Recorder(path)]))
+    with sp.read_recording(path) as recording:
+        model = model_of_recording(recording)
+        moment = moment_of_frame(model, recording[-1])
+        values = video_worker._nodal(moment, np.linspace(2.0, 3.0, len(model.tets)))
+        drawn = body_surface(model, model.bodies[0]).of(values)
+    assert len(drawn) > len(np.unique(mesh.tets))
+    assert 2.0 <= drawn.min() < drawn.max() <= 3.0
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from supple.results.view.camera import eye_of
 from supple.results.view.color_scale import Limits, Range
 from supple.results.view.creases import vertex_normals
 from supple.results.view.fields import Field
-from supple.results.view.floor_shadow import FloorShadow, casting_surfaces, floor_shadow
+from supple.results.view.floor_shadow import FloorShadow, floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.model import Model, Moment
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of
@@ -57,15 +57,14 @@ class Studio:
             if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = np.zeros(mesh.n_points)
                 look = _scale(self._field, ends, film.size[0])
-            room = getattr(surface, "room", False)
-            opacity = 1.0 if room else getattr(surface, "opacity", 1.0)
+            room = surface.room
+            opacity = 1.0 if room else surface.opacity
             actor = plotter.add_mesh(
                 mesh, opacity=opacity, culling="front" if room else None, **look,
                 **(_BODY if number < len(model.bodies) else _OBSTACLE),
             )  # fmt: skip
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
-        self._casting = casting_surfaces(model, [surface for _, surface in self._meshes])
         self._bodies = len(model.bodies)
         self._shadow = floor_shadow(model, _SHADOW_CELLS) if film.shadows else None
         self._floor: Any = None if self._shadow is None else self._add_floor(pyvista, self._shadow)
@@ -108,8 +107,8 @@ class Studio:
             if nodal is not None and "field" in mesh.point_data and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = surface.of(nodal)[:, 0]
         if self._shadow is not None:
-            at = {id(surface): x for (_, surface), x in zip(self._meshes, points, strict=True)}
-            cast = [(at[id(surface)], surface.triangles) for surface in self._casting]
+            drawn = zip(points, (surface for _, surface in self._meshes), strict=True)
+            cast = [(x, surface.triangles) for x, surface in drawn if surface.casts_shadow]
             self._floor.texture = _texture(self._shadow.picture(cast))
         self._aim(np.concatenate(points[: self._bodies]), share)
         self._plotter.render()
@@ -158,15 +157,15 @@ def _nodal(moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
     n = len(moment.positions)
     total, count = np.bincount(corners, own, minlength=n), np.bincount(corners, minlength=n)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    for body in model.bodies:
+    for body in model.bodies:  # a middle node is beside corners in the quarters of a side, but for the inner one
         triangles = body.triangles + body.vertices.start
         unknown = np.asarray(np.isnan(mean[triangles]))
-        if unknown.any():
-            around = np.nanmean(np.where(np.all(unknown, axis=1, keepdims=True), 0.0, mean[triangles]), axis=1)
-            rows = triangles[unknown]
-            filled = np.bincount(rows, np.repeat(around, unknown.sum(axis=1)), minlength=n)
-            times = np.bincount(rows, minlength=n)
-            mean = np.where(np.isnan(mean) & (times > 0), filled / np.maximum(times, 1), mean)
+        mixed = np.any(unknown, axis=1) & ~np.all(unknown, axis=1)
+        around = np.repeat(np.nanmean(mean[triangles[mixed]], axis=1), unknown[mixed].sum(axis=1))
+        rows = triangles[mixed][unknown[mixed]]
+        times = np.bincount(rows, minlength=n)
+        filled = np.bincount(rows, around, minlength=n) / np.maximum(times, 1)
+        mean = np.where(np.isnan(mean) & (times > 0), filled, mean)
     return np.repeat(np.nan_to_num(mean)[:, None], 3, axis=1)
 
 

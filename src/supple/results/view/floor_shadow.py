@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from supple.results.view.model import Model
-from supple.results.view.surfaces import RigidSurface, SoftSurface
 
 # Of the dark rim of a contact and of the wide shadow around it, as shares of the radius of the scene: the height above
 # the floor at which it fades, and its blur; and how dark it becomes.
@@ -79,13 +78,6 @@ def floor_shadow(model: Model, cells: int) -> FloorShadow | None:
     if not floors:
         return None
     return FloorShadow(max(floors, key=lambda point: float(point @ view.up)), view.up, view.center, view.radius, cells)
-
-
-def casting_surfaces(model: Model, surfaces: list[SoftSurface | RigidSurface]) -> list[SoftSurface | RigidSurface]:
-    """Of the surfaces of bodies and obstacles those that cast a shadow: all but planes and rooms."""
-    bodies = len(model.bodies)
-    solid = [one.obstacle.plane is None and not one.obstacle.is_room for one in model.obstacles]
-    return [surface for surface, casts in zip(surfaces, [True] * bodies + solid, strict=True) if casts]
 
 
 def _samples(

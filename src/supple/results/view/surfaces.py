@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,9 @@ class SoftSurface(Surface):
     body: ModelBody
     skin: bool
     rows: NDArray[np.int64]
+    opacity: ClassVar[float] = 1.0
+    room: ClassVar[bool] = False
+    casts_shadow: ClassVar[bool] = True
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (k, 3) at the drawn vertices, of values (n, 3) at all vertices of the model."""
@@ -90,12 +93,14 @@ class RigidSurface(Surface):
     pose : (3, 4) rotation and translation of a moment
     opacity : from 0 to 1
     room : whether it is seen from within; its triangles face outwards, and a page draws only their backs
+    casts_shadow : on floors; planes and rooms do not
     """
 
     vertices: NDArray[np.float64]
     pose: Callable[[Moment], NDArray[np.float64]]
     opacity: float = 1.0
     room: bool = False
+    casts_shadow: bool = True
 
     def at(self, moment: Moment) -> NDArray[np.float64]:
         pose = self.pose(moment)
@@ -152,10 +157,9 @@ def obstacle_surfaces(model: Model) -> list[RigidSurface]:
         triangles = triangles.astype(np.int32)
         if obstacle.is_room and _volume(vertices, triangles) < 0.0:
             triangles = triangles[:, ::-1].copy()
+        solid, pose = obstacle.plane is None and not obstacle.is_room, _pose_of(number)
         made.append(
-            RigidSurface(
-                recorded.name, triangles, OBSTACLE_COLOR, vertices, _pose_of(number), opacity, obstacle.is_room
-            )
+            RigidSurface(recorded.name, triangles, OBSTACLE_COLOR, vertices, pose, opacity, obstacle.is_room, solid)
         )
     return made
 

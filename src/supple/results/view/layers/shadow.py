@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from supple.results.view.floor_shadow import casting_surfaces, floor_shadow
+from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.layers.layer import Layer
 from supple.results.view.layers.rotation import quaternion
 from supple.results.view.model import Moment
@@ -25,7 +25,7 @@ class ShadowView(Layer):
             return
         # The boundary of the tets casts the shadow of a skin: it has fewer triangles.
         bodies = [body_surface(model, body) if body.rigid else boundary_surface(body) for body in model.bodies]
-        self._casting = casting_surfaces(model, [*bodies, *obstacle_surfaces(model)])
+        self._casting = [one for one in (*bodies, *obstacle_surfaces(model)) if one.casts_shadow]
         corners = self._shadow.corners
         first, second = corners[1] - corners[0], corners[3] - corners[0]
         size = float(np.linalg.norm(first))
