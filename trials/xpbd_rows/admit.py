@@ -48,13 +48,13 @@ class Marks(NamedTuple):
     planes: NDArray[np.bool_]
 
 
-@njit(error_model="numpy", inline="always")
+@njit(inline="always")
 def least_distance(before, nearest):
     """What must remain of a distance."""
     return min((1.0 - 1e-6) * before, max(KEEP_DISTANCE * before, nearest))
 
 
-@njit(error_model="numpy")
+@njit
 def _shorten(base, points, i, share, marks, count, turn):
     """Leave a node a share of its motion; returns how many nodes were changed in this round."""
     moved = False
@@ -65,7 +65,7 @@ def _shorten(base, points, i, share, marks, count, turn):
     return _note(i, marks, count, turn) if moved else count
 
 
-@njit(error_model="numpy")
+@njit
 def _note(i, marks, count, turn):
     if marks.stamp[i] != turn:
         marks.stamp[i] = turn
@@ -74,7 +74,7 @@ def _note(i, marks, count, turn):
     return count
 
 
-@njit(error_model="numpy")
+@njit
 def _apart(x, rows, e, n):
     """How far the sides of a pair are apart along n."""
     p, q, r, s = rows.nodes[e, 0], rows.nodes[e, 1], rows.nodes[e, 2], rows.nodes[e, 3]
@@ -83,7 +83,7 @@ def _apart(x, rows, e, n):
     return min(along(x, p, n), along(x, q, n)) - max(along(x, r, n), along(x, s, n))
 
 
-@njit(error_model="numpy")
+@njit
 def _plane(base, points, rows, e, n, margin):
     """Where the plane of a pair stands along n: where both sides would arrive at the same time."""
     top, floor = np.inf, -np.inf
@@ -105,7 +105,7 @@ def _plane(base, points, rows, e, n, margin):
     return max(min(where, lowest - margin), highest + margin)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def admit(base, points, rows, count, tets, low, moved, keep, nearest, marks, cuts):
     """Shorten motions from `base` (N, 3) in `points` (N, 4) until the guarantee holds; see the module.
 
@@ -180,7 +180,7 @@ def admit(base, points, rows, count, tets, low, moved, keep, nearest, marks, cut
     return cut, rounds
 
 
-@njit(error_model="numpy")
+@njit
 def _low_around(points, tets, keep, marks, changed, low):
     """List the tets around changed nodes that have too little volume, after the first `low`."""
     for k in range(changed):
@@ -195,7 +195,7 @@ def _low_around(points, tets, keep, marks, changed, low):
     return low
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def count_crossing(points, rows, count, nearest):
     """How many pairs that were apart are not, after `admit`: what was carried went through something."""
     bad = 0
@@ -206,7 +206,7 @@ def count_crossing(points, rows, count, nearest):
     return bad
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def widen(points, rows, count, gap, most, marks):
     """Widen gaps of pushing pairs that are too narrow by at most `most` [m]; put nodes back onto walls.
 
@@ -235,7 +235,7 @@ def widen(points, rows, count, gap, most, marks):
     return moved
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def share_motion(points, begin, velocities, cuts, count):
     """Give back what the cuts took: the velocities of the four nodes go over to those of their common rigid motion.
 
@@ -273,7 +273,7 @@ def share_motion(points, begin, velocities, cuts, count):
                 velocities[v, j] += part * (mean[j] + turned[j] - velocities[v, j])
 
 
-@njit(error_model="numpy")
+@njit
 def _spin(points, begin, velocities, nodes, e, center):
     """The angular velocity of four free nodes with their angular momentum; zero where they are in a line."""
     xx = yy = zz = xy = yz = zx = 0.0
@@ -295,6 +295,6 @@ def _spin(points, begin, velocities, nodes, e, center):
     return solve_symmetric((xx, yy, zz, xy, yz, zx), moment)
 
 
-@njit(error_model="numpy")
+@njit
 def determinant_of(a, b, c):
     return dot(a, cross(b, c))

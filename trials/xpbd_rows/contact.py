@@ -253,7 +253,7 @@ class RowContact:
         return cut
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _farther(points, reference, most, far):
     """Which nodes (N,) are farther than `most` [m] from a reference (N, 3); returns whether there are any."""
     found = False

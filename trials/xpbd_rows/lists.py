@@ -206,7 +206,7 @@ def _hand_on(old: Pairs, new: Pairs) -> None:
     new.impulses[found], new.normals[found] = old.impulses[held[place[found]]], old.normals[held[place[found]]]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _largest_deviation(x, begin, v, age, nodes):
     """The square of how far a node is from where it was expected; inf where that is not finite."""
     most = 0.0
@@ -222,7 +222,7 @@ def _largest_deviation(x, begin, v, age, nodes):
     return most
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _deviating(x, begin, v, age, nodes, margin, left):
     left[:] = False
     for i in nodes:
@@ -234,7 +234,7 @@ def _deviating(x, begin, v, age, nodes, margin, left):
         left[i] = not a * a + b * b + c * c <= margin * margin
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _asked(left, start, nodes):
     """(q,) the patches with a node that is in `left` (N,)."""
     out = np.zeros(len(start) - 1, dtype=np.bool_)
@@ -244,7 +244,7 @@ def _asked(left, start, nodes):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _fastest(v, nodes, owner, owners):
     """The square of the largest velocity of a node relative to the mean of its thing."""
     means = np.zeros((owners, 4))

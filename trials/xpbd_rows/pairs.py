@@ -59,7 +59,7 @@ class Pairs(NamedTuple):
         )
 
 
-@njit(error_model="numpy")
+@njit
 def weights_of(x, nodes, k, kind):
     """The weights (4) of a pair of surfaces at places x, and r."""
     p, q, r, s = row(x, nodes[k, 0]), row(x, nodes[k, 1]), row(x, nodes[k, 2]), row(x, nodes[k, 3])
@@ -76,18 +76,18 @@ def weights_of(x, nodes, k, kind):
     )
 
 
-@njit(error_model="numpy", inline="always")
+@njit(inline="always")
 def along(x, i, n):
     """The coordinate of node i along n."""
     return x[i, 0] * n[0] + x[i, 1] * n[1] + x[i, 2] * n[2]
 
 
-@njit(error_model="numpy")
+@njit
 def is_loaded(impulses, k):
     return impulses[k, 0] != 0.0 or impulses[k, 1] != 0.0 or impulses[k, 2] != 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def describe_pairs(first, points, edges, simplices, far, pairs):
     """Fill in what pairs of surfaces are, from row `first` on: nodes, kinds, keys, whether they push, and friction.
 
@@ -118,7 +118,7 @@ def describe_pairs(first, points, edges, simplices, far, pairs):
             pairs.pushes[k] = dot(r, r) > far * far
 
 
-@njit(error_model="numpy")
+@njit
 def room_between(begin, end, nodes, k, kind, n):
     """The width of the slab across n that neither side of a pair enters, at the beginning and at the end."""
     p, q, r, s = nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3]
@@ -130,7 +130,7 @@ def room_between(begin, end, nodes, k, kind, n):
     return min(low, min(one, other)) - high
 
 
-@njit(error_model="numpy")
+@njit
 def relative_speed(v, nodes, k, kind):
     """The largest relative speed of nodes of the two sides of a pair."""
     p, q, r, s = row(v, nodes[k, 0]), row(v, nodes[k, 1]), row(v, nodes[k, 2]), row(v, nodes[k, 3])
@@ -145,7 +145,7 @@ def relative_speed(v, nodes, k, kind):
     return math.sqrt(max(most, max(dot(a, a), dot(b, b))))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def near_pairs(x, v, pairs, time, reach, out):
     """The pairs that may come nearer than `reach` while their nodes go on for a time; all pairs with shapes."""
     count = 0

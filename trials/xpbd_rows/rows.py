@@ -52,7 +52,7 @@ class Rows(NamedTuple):
         )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def detect(begin, end, near, pairs, walls, reach, targets, chosen, moved, first, rows):
     """Append the rows of all pairs that are not sure to keep `reach` [m] on the way; returns the number of rows.
 

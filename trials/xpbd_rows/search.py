@@ -22,7 +22,7 @@ from trials.xpbd_rows.surface import RowSurface
 _SCRATCH = 64
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _boxes(x, way, nodes, out):
     """Write the box that each part (m, k) of nodes sweeps to out (m, 6)."""
     for e in range(len(nodes)):
@@ -35,7 +35,7 @@ def _boxes(x, way, nodes, out):
             out[e, j], out[e, 3 + j] = low, high
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _boxes_of_patches(start, items, boxes, out):
     for q in range(len(out)):
         for j in range(3):
@@ -45,7 +45,7 @@ def _boxes_of_patches(start, items, boxes, out):
             out[q, j], out[q, 3 + j] = low, high
 
 
-@njit(error_model="numpy", inline="always")
+@njit(inline="always")
 def _meet(a, i, b, j, reach):
     return (
         a[i, 0] - reach <= b[j, 3] and b[j, 0] - reach <= a[i, 3]
@@ -54,13 +54,13 @@ def _meet(a, i, b, j, reach):
     )  # fmt: skip
 
 
-@njit(error_model="numpy", inline="always")
+@njit(inline="always")
 def _relative(way, a, b):
     d = subtract(row(way, a), row(way, b))
     return dot(d, d)
 
 
-@njit(error_model="numpy")
+@njit
 def _point_near(x, way, v, triangles, t, reach):
     """Whether a point may come nearer to a triangle than `reach`."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -74,7 +74,7 @@ def _point_near(x, way, v, triangles, t, reach):
     return point_triangle_square(x, v, triangles, t) <= far * far
 
 
-@njit(error_model="numpy")
+@njit
 def _edges_near(x, way, edges, e, f, reach):
     """Whether two edges may come nearer than `reach`."""
     a, b, c, d = edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1]
@@ -88,7 +88,7 @@ def _edges_near(x, way, edges, e, f, reach):
     return edge_edge_square(x, edges, e, f) <= far * far
 
 
-@njit(error_model="numpy")
+@njit
 def _reaching(start, items, q, boxes, other, o, reach, out):
     """The parts of patch q that reach into a box; returns their number."""
     count = 0
@@ -99,7 +99,7 @@ def _reaching(start, items, q, boxes, other, o, reach, out):
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_points, out_edges):
     """List pairs with a part in a patch that is asked (q,). Returns the numbers of both kinds, which may not fit.
 

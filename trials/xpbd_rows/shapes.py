@@ -73,7 +73,7 @@ def _kernel_of(function: Callable[..., Any]) -> Callable[..., Any]:
     copy = FunctionType(_walls_of.__code__, {**_walls_of.__globals__, "contact": function}, _walls_of.__name__)
     copy.__qualname__ = f"{_walls_of.__qualname__}_{reached_code(copy).hex()[:14]}"
     copy.__module__ = _walls_of.__module__
-    return njit(cache=True, error_model="numpy")(copy)
+    return njit(cache=True)(copy)
 
 
 class RowShapes:

@@ -16,7 +16,7 @@ from supple.runtime.kernel_cache import njit
 from trials.xpbd_rows.pairs import SHAPE, is_loaded, weights_of
 
 
-@njit(error_model="numpy")
+@njit
 def vector(x, rows, e):
     """r of a row at places x."""
     a, b, c, d = rows.weights[e, 0], rows.weights[e, 1], rows.weights[e, 2], rows.weights[e, 3]
@@ -29,7 +29,7 @@ def vector(x, rows, e):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def displace(points, rows, e, f):
     """Move the nodes of a row by the impulse f on its first side and its opposite on the second."""
     for i in range(4):
@@ -39,7 +39,7 @@ def displace(points, rows, e, f):
             points[v, j] += g * f[j]
 
 
-@njit(error_model="numpy")
+@njit
 def _turn(points, begin, rows, e, moment):
     """Put a couple with this moment about x_n on the four nodes, if all of them can move."""
     cx = cy = cz = 0.0
@@ -72,7 +72,7 @@ def _turn(points, begin, rows, e, moment):
             points[v, j] += points[v, 3] * d[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def solve(points, begin, rows, count, tolerance, most):
     """Sweep over the rows until no sweep changes an n . r by more than the tolerance [m], at most so many times.
 
@@ -113,7 +113,7 @@ def solve(points, begin, rows, count, tolerance, most):
     return sweeps, residual
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def push_kept(points, velocities, near, pairs, walls, gap, h):
     """Begin a substep with the impulses that are kept, along the normals of now; those that no longer hold are zero."""
     shape = len(near) - len(walls.gaps)
@@ -151,7 +151,7 @@ def push_kept(points, velocities, near, pairs, walls, gap, h):
                 velocities[v, j] += g * pairs.impulses[k, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def keep_impulses(rows, count, velocities, h, rates, near, pairs):
     """Keep what the next substep begins with: not what stopped the approach with which this one began.
 

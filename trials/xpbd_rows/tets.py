@@ -50,26 +50,26 @@ class Tets(NamedTuple):
         return cls(nodes, scales, around, np.zeros(m), np.zeros(m), np.zeros(4 * m, dtype=np.int64))
 
 
-@njit(error_model="numpy")
+@njit
 def determinant(x, nodes, t):
     a = row(x, nodes[t, 0])
     u, v, w = subtract(row(x, nodes[t, 1]), a), subtract(row(x, nodes[t, 2]), a), subtract(row(x, nodes[t, 3]), a)
     return dot(u, cross(v, w))
 
 
-@njit(error_model="numpy", inline="always")
+@njit(inline="always")
 def least_J(before, share):
     """What must remain of J: a share of it, or all of it below `FLATTEST`. Inverted tets are not guarded."""
     return min((1.0 - 1e-6) * before, max(share * before, FLATTEST)) if before > 0.0 else -np.inf
 
 
-@njit(error_model="numpy", inline="always")
+@njit(inline="always")
 def guarded_J(before):
     """What the guard asks for."""
     return min(before, max(ONSET, 0.5 * before)) if before > 0.0 else -np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def measure(points, tets, guard, share):
     """Write J of all tets; returns how many, listed in `low`, have less than what must remain.
 
@@ -86,14 +86,14 @@ def measure(points, tets, guard, share):
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def set_bounds(tets, bounds):
     """Write what the guard asks for to bounds (m,)."""
     for t in range(len(bounds)):
         bounds[t] = guarded_J(tets.J[t])
 
 
-@njit(error_model="numpy")
+@njit
 def _least_corner(base, points, tets, t, share):
     """The smallest determinant where each vertex has made none of its motion, or this share of it."""
     least = np.inf
@@ -109,7 +109,7 @@ def _least_corner(base, points, tets, t, share):
     return least
 
 
-@njit(error_model="numpy", inline="always")
+@njit(inline="always")
 def _part(base, points, i, share):
     return (
         base[i, 0] + share * (points[i, 0] - base[i, 0]),
@@ -118,7 +118,7 @@ def _part(base, points, i, share):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def share_of_tet(base, points, tets, t, keep):
     """The largest share of the motions from `base` that a tet can make, to 1/256; 1 where it can make all."""
     # A little more than what is asked for, so that round-off does not ask again.

@@ -35,17 +35,17 @@ _MOST_STEPS = 10_000
 ROUND_OFF = 4.0 * 2.0**-52
 
 
-@njit(error_model="numpy")
+@njit
 def _largest(p):
     return max(abs(p[0]), abs(p[1]), abs(p[2]))
 
 
-@njit(error_model="numpy")
+@njit
 def _moved(x, p, t):
     return (x[0] + t * p[0], x[1] + t * p[1], x[2] + t * p[2])
 
 
-@njit(error_model="numpy")
+@njit
 def _time_to(gap, speed, keep):
     """When gap + t speed falls to `keep`: 0 where it is below or there is no gap, infinite where it does not fall."""
     if not gap > 0.0:
@@ -55,14 +55,14 @@ def _time_to(gap, speed, keep):
     return max(0.0, (gap - keep) / -speed)
 
 
-@njit(error_model="numpy")
+@njit
 def _bound(n, a, p, b, q, so_far, keep):
     """The time and the gap so far, or those of a point a + t p and b + t q along n where they are smaller."""
     gap = dot(n, subtract(a, b))
     return min(so_far[0], _time_to(gap, dot(n, subtract(p, q)), keep)), min(so_far[1], gap)
 
 
-@njit(error_model="numpy")
+@njit
 def _direction(r):
     """The unit vector along r, and the length of r; scaled, so that squares stay in range."""
     size = _largest(r)
@@ -73,7 +73,7 @@ def _direction(r):
     return (u[0] / length, u[1] / length, u[2] / length), size * length
 
 
-@njit(error_model="numpy")
+@njit
 def _point_triangle_bound(n, a, b, c, p, q, r, keep):
     """How long all corners keep their distance along n from a point at the origin, and the least distance now."""
     zero = (0.0, 0.0, 0.0)
@@ -82,7 +82,7 @@ def _point_triangle_bound(n, a, b, c, p, q, r, keep):
     return _bound(n, c, r, zero, zero, least, keep)
 
 
-@njit(error_model="numpy")
+@njit
 def _edge_edge_bound(n, b, c, d, p, q, r, keep):
     """The same for both ends of the edge c d and both ends of the edge of the origin and b."""
     zero = (0.0, 0.0, 0.0)
@@ -92,7 +92,7 @@ def _edge_edge_bound(n, b, c, d, p, q, r, keep):
     return _bound(n, d, r, b, p, least, keep)
 
 
-@njit(error_model="numpy")
+@njit
 def _normal(u, v, n):
     """The unit vector normal to u and v, on the side of n.
 
@@ -102,7 +102,7 @@ def _normal(u, v, n):
     return m if dot(m, n) >= 0.0 else (-m[0], -m[1], -m[2])
 
 
-@njit(error_model="numpy")
+@njit
 def point_triangle_time(x, way, v, corners, limit):
     """How long, up to `limit`, point v and the triangle of `corners` (3) may move along `way` (s, 3) from x (s, 3).
 
@@ -141,7 +141,7 @@ def point_triangle_time(x, way, v, corners, limit):
     return time
 
 
-@njit(error_model="numpy")
+@njit
 def edge_edge_time(x, way, one, other, limit):
     """The same for edges with the ends `one` (2) and `other` (2); see `point_triangle_time`."""
     o, shift = row(x, one[0]), row(way, one[0])

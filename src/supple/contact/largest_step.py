@@ -78,7 +78,7 @@ def _pair(row: NDArray[np.int32]) -> tuple[int, int]:
     return int(row[0]), int(row[1])
 
 
-@njit(error_model="numpy")
+@njit
 def _clear(x, way, a, b, c, d, ends):
     """Whether the boxes of two parts stay so far apart along one axis that the pair certainly keeps its distance.
 
@@ -104,7 +104,7 @@ def _clear(x, way, a, b, c, d, ends):
     return False
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _first_point(x, way, triangles, pairs):
     """The least step of pairs (k, 2) of points and triangles, and the pair's row; 1 and -1 for a full step."""
     steps, rows = np.ones(_RUNS), np.full(_RUNS, -1, dtype=np.int64)
@@ -120,7 +120,7 @@ def _first_point(x, way, triangles, pairs):
     return _least(steps, rows, 1.0)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _first_edge(x, way, edges, pairs, limit):
     """The same for pairs of edges, of those with a step below `limit`."""
     steps, rows = np.full(_RUNS, limit), np.full(_RUNS, -1, dtype=np.int64)
@@ -136,7 +136,7 @@ def _first_edge(x, way, edges, pairs, limit):
     return _least(steps, rows, limit)
 
 
-@njit(error_model="numpy")
+@njit
 def _least(steps, rows, limit):
     """The least step, and the first row that has it."""
     least, at = limit, np.int64(-1)

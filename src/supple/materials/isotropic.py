@@ -85,7 +85,7 @@ def _stress(U, s, V, mu, lam):
     return mat_mul_transposed(Up, V)
 
 
-@njit(error_model="numpy")
+@njit
 def stable_piola(F, mu, lam):
     """P = mu F + (lam (J - 1) - mu) cof F of Stable Neo-Hookean material, which needs no stretches."""
     c = lam * shape_and_volume(F)[1] - mu
@@ -104,7 +104,7 @@ def stable_piola(F, mu, lam):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def nearest_semidefinite(A):
     """A symmetric 3x3 matrix (a00, a11, a22, a12, a02, a01) with its negative eigenvalues set to zero."""
     a00, a11, a22, a12, a02, a01 = A
@@ -144,7 +144,7 @@ def _principal_hessian(s, mu, lam, project):
     return A, alpha, beta
 
 
-@njit(error_model="numpy")
+@njit
 def hessian_block(U, A, alpha, beta, g, h):
     """sum_jl (d^2 psi / dF_ij dF_kl) G_j H_l for g = V^T G, h = V^T H: the 3x3 block (i, k) of two nodes with shape
     gradients G and H, per rest volume."""
@@ -246,7 +246,7 @@ def piolas(F, kind, mu, lam, out):
             store_mat(P, out, e)
 
 
-@njit(error_model="numpy")
+@njit
 def store_hessian(U, A, alpha, beta, V, out, e):
     """Write the Hessian (9, 9) in F, from its parts in the principal axes U and V, to out[e]."""
     for j in range(3):

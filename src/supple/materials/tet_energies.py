@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # of each kind, see `functions_of`
     from supple.materials.isotropic import KIND, density, energy_density, principal_hessian, stress
 
 
-@njit(error_model="numpy")
+@njit
 def edge_matrix(x, tets, e):
     """Ds = [x1 - x0, x2 - x0, x3 - x0] of tet e, nine numbers row after row."""
     a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
@@ -36,13 +36,13 @@ def edge_matrix(x, tets, e):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def deformation_gradient(x, tets, Dm_inv, e):
     """F = Ds Dm^-1 of tet e, nine numbers row after row."""
     return mat_mul(edge_matrix(x, tets, e), load_mat(Dm_inv, e))
 
 
-@njit(error_model="numpy")
+@njit
 def put_gradient(P, B, volume, out, e):
     """The gradient of a tet's energy by its four nodes into out[e], for its stress P and B = Dm^-1."""
     G = mat_mul_transposed(P, B)
@@ -55,14 +55,14 @@ def put_gradient(P, B, volume, out, e):
         out[e, 0, i] = -total
 
 
-@njit(error_model="numpy")
+@njit
 def _symmetric(K):
     """A block of one node with itself, made symmetric to the last bit."""
     a, b, c = 0.5 * (K[1] + K[3]), 0.5 * (K[2] + K[6]), 0.5 * (K[5] + K[7])
     return (K[0], a, b, a, K[4], c, b, c, K[8])
 
 
-@njit(error_model="numpy")
+@njit
 def _put_pair(out, e, p, q, K):
     """Write block (p, q) of a 12x12 matrix, and its transpose as block (q, p)."""
     for i in range(3):
@@ -72,7 +72,7 @@ def _put_pair(out, e, p, q, K):
             out[e, 3 * q + j, 3 * p + i] = value
 
 
-@njit(error_model="numpy")
+@njit
 def _minus_sum(A, B, C):
     return (
         -(A[0] + B[0] + C[0]),
@@ -87,7 +87,7 @@ def _minus_sum(A, B, C):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def put_hessian(U, A, alpha, beta, V, B, volume, out, e):
     """The 12x12 Hessian of one tet into out[e], for F = U diag(s) V^T and the result of `principal_hessian`; B = Dm^-1,
     whose rows are the shape gradients of nodes 1, 2, 3."""

@@ -80,7 +80,7 @@ class Embedding:
         return mixed(self.corners, self.weights, np.ascontiguousarray(x))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def mixed(corners, weights, x):
     """Points (k, 3), each the sum of the rows `corners` (k, w) of x (n, 3), weighted by `weights` (k, w)."""
     out = np.empty((len(corners), 3))

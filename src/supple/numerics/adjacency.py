@@ -31,7 +31,7 @@ def adjacency(rows: NDArray[np.integer], items: NDArray[np.integer], count: int)
     return Adjacency(start.astype(np.int32), found.astype(np.int32))
 
 
-@njit(error_model="numpy")
+@njit
 def in_list(lists, k, item):
     """Whether an item is in the list of thing k; `lists` are an `Adjacency` or its two arrays."""
     for i in range(lists[0][k], lists[0][k + 1]):  # noqa: SIM110

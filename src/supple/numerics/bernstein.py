@@ -36,7 +36,7 @@ ROUND_OFF = 2.0**-45
 DEEPEST = 12
 
 
-@njit(error_model="numpy")
+@njit
 def corner_derivatives(x, nodes, e, out):
     """out[c, k, i] = d x_i / d l_k at corner c of element e, k = 1, 2, 3 in the places 0, 1, 2; returns their size, the
     product of the largest lengths of the three."""
@@ -69,7 +69,7 @@ def corner_derivatives(x, nodes, e, out):
     return size
 
 
-@njit(error_model="numpy")
+@njit
 def _triple(A, a, B, b, C, c):
     """det[A_1^a, B_2^b, C_3^c]."""
     return (
@@ -79,7 +79,7 @@ def _triple(A, a, B, b, C, c):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def add_coefficients(A, B, C, factor, out):
     """Add `factor` times the coefficients of det[A_1, B_2, C_3], of derivatives (4, 3, 3) at the corners, to out."""
     for a in range(4):
@@ -89,7 +89,7 @@ def add_coefficients(A, B, C, factor, out):
                 out[k] += factor * _triple(A, a, B, b, C, c) / COUNT[k]
 
 
-@njit(error_model="numpy")
+@njit
 def longest_edge(corners):
     """The two of the corners (4, 4), barycentric coordinates, that are farthest from each other."""
     first, second, longest = 0, 1, -1.0
@@ -104,14 +104,14 @@ def longest_edge(corners):
     return first, second
 
 
-@njit(error_model="numpy")
+@njit
 def bisect_corners(corners, i, j):
     """Move corner j to the middle of i and j."""
     for k in range(4):
         corners[j, k] = 0.5 * (corners[i, k] + corners[j, k])
 
 
-@njit(error_model="numpy")
+@njit
 def bisect(values, i, j):
     """The coefficients of a cubic, as a symmetric array (4, 4, 4) over arrangements of corners, after corner j was
     moved to the middle of i and j: de Casteljau's rule."""
@@ -126,7 +126,7 @@ def bisect(values, i, j):
             values[a, b, j] = 0.5 * (values[a, b, i] + values[a, b, j])
 
 
-@njit(error_model="numpy")
+@njit
 def _all_above(values, least):
     for a in range(4):
         for b in range(4):
@@ -136,7 +136,7 @@ def _all_above(values, least):
     return True
 
 
-@njit(error_model="numpy")
+@njit
 def _is_positive(coefficients, least):
     """Whether the cubic is above `least` on the whole element, as far as `DEEPEST` bisections tell."""
     unsure = False
@@ -180,7 +180,7 @@ def _is_positive(coefficients, least):
     return True
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def positive_elements(x, nodes, out):
     """Whether each element's determinant is positive everywhere in it: x (n, 3), nodes (k, 10) -> out (k,) bool."""
     for e in prange(len(nodes)):
@@ -190,7 +190,7 @@ def positive_elements(x, nodes, out):
         out[e] = size < np.inf and _is_positive(coefficients, ROUND_OFF * size)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def positive_coefficients(x, nodes, out):
     """Whether all coefficients of each element are positive: x (n, 3), nodes (k, 10) -> out (k,) bool."""
     for e in prange(len(nodes)):
@@ -200,7 +200,7 @@ def positive_coefficients(x, nodes, out):
         out[e] = size < np.inf and coefficients.min() > ROUND_OFF * size
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def determinant_coefficients(x, nodes):
     """(k, 20) the coefficients of each element's determinant; those of the corners come first.
 

@@ -22,7 +22,7 @@ _ROUND_OFF = 2e-15
 _COMPENSATED_ROUND_OFF = 2e-30
 
 
-@njit(error_model="numpy")
+@njit
 def _is_positive(a, b, c, d, t):
     """Whether a t^3 + b t^2 + c t + d, t >= 0, is certainly above zero, with round-off taken into account.
 
@@ -42,7 +42,7 @@ def _is_positive(a, b, c, d, t):
     return value + error > _COMPENSATED_ROUND_OFF * size
 
 
-@njit(error_model="numpy")
+@njit
 def positive_on_unit_interval(a, b, c, d):
     """Whether all Bernstein coefficients on [0, 1] are above zero; then the cubic is above zero on the whole interval.
 
@@ -51,7 +51,7 @@ def positive_on_unit_interval(a, b, c, d):
     return d > 0.0 and d + c / 3.0 > 0.0 and d + (2.0 * c + b) / 3.0 > 0.0 and a + b + c + d > 0.0
 
 
-@njit(error_model="numpy")
+@njit
 def _extrema(a, b, c):
     """Real roots p <= q of the derivative 3 a t^2 + 2 b t + c; infinity for each one that does not exist."""
     A, B = 3.0 * a, 2.0 * b
@@ -72,7 +72,7 @@ def _extrema(a, b, c):
     return (p, q) if p <= q else (q, p)
 
 
-@njit(error_model="numpy")
+@njit
 def _bisect(a, b, c, d, low, high):
     """The last number in [low, high] where the cubic is certainly positive; it is so at low and not at high."""
     for _ in range(1100):
@@ -87,7 +87,7 @@ def _bisect(a, b, c, d, low, high):
     return low
 
 
-@njit(error_model="numpy")
+@njit
 def last_positive_before_root(a, b, c, d, end):
     """Where a t^3 + b t^2 + c t + d, positive at 0, has its first root in (0, end]: the last t before it.
 
@@ -116,7 +116,7 @@ def last_positive_before_root(a, b, c, d, end):
     return -1.0
 
 
-@njit(error_model="numpy")
+@njit
 def _root_bound(a, b, c, d):
     """An upper bound of all roots. Source: Fujiwara (1916)."""
     if a != 0.0:
@@ -130,13 +130,13 @@ def _root_bound(a, b, c, d):
     return min(2.0 * bound, 1e300)
 
 
-@njit(error_model="numpy")
+@njit
 def _first_root_below_bound(a, b, c, d):
     end = _root_bound(a, b, c, d)
     return last_positive_before_root(a, b, c, d, end) if end > 0.0 else -1.0
 
 
-@njit(error_model="numpy")
+@njit
 def _first_root(a, b, c, d, tol):
     if not (abs(a) < math.inf and abs(b) < math.inf and abs(c) < math.inf and abs(d) < math.inf):
         return math.nan
@@ -166,7 +166,7 @@ def _first_root(a, b, c, d, tol):
     return far
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _first_roots(coefficients, tol, out):
     for i in range(len(out)):
         out[i] = _first_root(coefficients[0, i], coefficients[1, i], coefficients[2, i], coefficients[3, i], tol)

@@ -6,33 +6,33 @@ A vector is (x, y, z). A matrix is nine numbers, row after row: M = (m00, m01, m
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(error_model="numpy")
+@njit
 def cross(a, b):
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@njit(error_model="numpy")
+@njit
 def subtract(a, b):
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@njit(error_model="numpy")
+@njit
 def row(x, i):
     """Row i of an (n, 3) array, as a vector."""
     return (x[i, 0], x[i, 1], x[i, 2])
 
 
-@njit(error_model="numpy")
+@njit
 def det(M):
     return M[0] * (M[4] * M[8] - M[5] * M[7]) - M[1] * (M[3] * M[8] - M[5] * M[6]) + M[2] * (M[3] * M[7] - M[4] * M[6])
 
 
-@njit(error_model="numpy")
+@njit
 def mat_mul(A, B):
     """A B"""
     return (
@@ -48,29 +48,29 @@ def mat_mul(A, B):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def transpose(M):
     return (M[0], M[3], M[6], M[1], M[4], M[7], M[2], M[5], M[8])
 
 
-@njit(error_model="numpy")
+@njit
 def mat_mul_transposed(A, B):
     """A B^T"""
     return mat_mul(A, transpose(B))
 
 
-@njit(error_model="numpy")
+@njit
 def load_mat(array, e):
     """Matrix e of an (m, 3, 3) array."""
     return _row(array, e, 0) + _row(array, e, 1) + _row(array, e, 2)
 
 
-@njit(error_model="numpy")
+@njit
 def _row(array, e, i):
     return (array[e, i, 0], array[e, i, 1], array[e, i, 2])
 
 
-@njit(error_model="numpy")
+@njit
 def store_mat(M, array, e):
     """Write M as matrix e of an (m, 3, 3) array."""
     for i in range(3):
@@ -78,7 +78,7 @@ def store_mat(M, array, e):
             array[e, i, j] = M[3 * i + j]
 
 
-@njit(error_model="numpy")
+@njit
 def symmetric_eigen(a00, a11, a22, a12, a02, a01):
     """Eigenvalues and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
 
@@ -126,7 +126,7 @@ def symmetric_eigen(a00, a11, a22, a12, a02, a01):
     return (a00, a11, a22), (x0, y0, z0, x1, y1, z1, x2, y2, z2)
 
 
-@njit(error_model="numpy")
+@njit
 def jacobi_rotation(app, aqq, apq):
     """Cosine, sine and tangent of the smaller rotation that makes entry (p, q) of a symmetric matrix vanish."""
     d = aqq - app
@@ -139,7 +139,7 @@ def jacobi_rotation(app, aqq, apq):
     return c, t * c, t
 
 
-@njit(error_model="numpy")
+@njit
 def copy_elements(source, target):
     """Copy an array into one of the same shape, both of them contiguous.
 

@@ -41,7 +41,7 @@ _UNSURE = 1e-9
 _RUN = 256
 
 
-@njit(error_model="numpy")
+@njit
 def _size_of_triple(a, b, c):
     """The sum of the absolute values of the terms of (a x b) . c."""
     return (
@@ -51,7 +51,7 @@ def _size_of_triple(a, b, c):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _tet_step(x, p, tets, e, keep):
     """Largest t in [0, 1] with volume(s) >= keep volume(0) of tet e for all s in [0, t].
 
@@ -106,7 +106,7 @@ def _tet_step(x, p, tets, e, keep):
     return 1.0 if t < 0.0 else t
 
 
-@njit(error_model="numpy")
+@njit
 def _precise_coefficients(x, p, tets, e):
     """a3, a2, a1, a0 of tet e from double-double numbers; each has the precision of one float."""
     x1, p1 = _precise_edge(x, tets, e, 1), _precise_edge(p, tets, e, 1)
@@ -117,13 +117,13 @@ def _precise_coefficients(x, p, tets, e):
     return dd.triple_product(p1, p2, p3)[0], a2[0], a1[0], dd.triple_product(x1, x2, x3)[0]
 
 
-@njit(error_model="numpy")
+@njit
 def _precise_edge(x, tets, e, k):
     i, o = tets[e, k], tets[e, 0]
     return (dd.difference(x[i, 0], x[o, 0]), dd.difference(x[i, 1], x[o, 1]), dd.difference(x[i, 2], x[o, 2]))
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True)
 def noninverting_step(x, direction, tets, guarded, keep):
     """The largest step in [0, 1] over which no guarded tet falls below `keep` of its volume at x; for solvers.
 
@@ -161,7 +161,7 @@ def noninverting_step(x, direction, tets, guarded, keep):
     return step, tet
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def volume_signs(x, tets):
     """(m,) six times the volumes, precise enough that slivers have the right sign."""
     out = np.empty(len(tets))

@@ -37,7 +37,7 @@ _DEEPEST = 24
 _RUN = 64
 
 
-@njit(error_model="numpy")
+@njit
 def _first_root(b0, b1, b2, b3):
     """The last t before the first root in [0, 1] of a cubic with these Bernstein coefficients; 2 where none is."""
     if b0 > 0.0 and b1 > 0.0 and b2 > 0.0 and b3 > 0.0:
@@ -49,7 +49,7 @@ def _first_root(b0, b1, b2, b3):
     return 2.0 if t < 0.0 else t
 
 
-@njit(error_model="numpy")
+@njit
 def _positive_until(b0, b1, b2, b3, t):
     """Whether the Bernstein coefficients on [0, t] are above zero: a test without roots that is sufficient."""
     s = 1.0 - t
@@ -58,7 +58,7 @@ def _positive_until(b0, b1, b2, b3, t):
     return b0 > 0.0 and c1 > 0.0 and c2 > 0.0 and s * c2 + t * d2 > 0.0
 
 
-@njit(error_model="numpy")
+@njit
 def _smallest_root(v):
     """The first root in [0, 1] of any of the cubics v (4, 4, 4, 4), over t first."""
     smallest = 2.0
@@ -69,7 +69,7 @@ def _smallest_root(v):
     return smallest
 
 
-@njit(error_model="numpy")
+@njit
 def _element_step(x, p, nodes, e, whole, keep, here, ahead, terms):
     """Largest t in [0, 1] for element e; 0 where it is inverted or flat somewhere, or something is not finite.
 
@@ -119,7 +119,7 @@ def _element_step(x, p, nodes, e, whole, keep, here, ahead, terms):
     return smallest
 
 
-@njit(error_model="numpy")
+@njit
 def _bisected_step(terms):
     values = np.empty((_DEEPEST + 2, 4, 4, 4, 4))
     corners = np.empty((_DEEPEST + 2, 4, 4))
@@ -168,7 +168,7 @@ def _bisected_step(terms):
     return min(lower, 1.0)
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True)
 def noninverting_step(x, direction, nodes, guarded, whole, keep):
     """The largest step in [0, 1] over which the determinant of no guarded element falls anywhere below `keep` of its
     value at x.

@@ -30,7 +30,7 @@ _MAX_SWEEPS = 20
 _LANES = 16
 
 
-@njit(error_model="numpy")
+@njit
 def svd3(F):
     """Rotation-variant SVD of one matrix, for kernels.
 
@@ -69,7 +69,7 @@ def svd3(F):
     return U, (math.ldexp(s[0], e), math.ldexp(s[1], e), math.ldexp(s[2], e)), V
 
 
-@njit(error_model="numpy")
+@njit
 def _orthogonalize(p, q, vp, vq, done):
     """Rotate columns p, q of F V (and of V) until orthogonal; `done` becomes False where another sweep is needed."""
     app = dot(p, p)
@@ -97,12 +97,12 @@ def _orthogonalize(p, q, vp, vq, done):
     return p, q, vp, vq, done
 
 
-@njit(error_model="numpy")
+@njit
 def _negated(a):
     return (-a[0], -a[1], -a[2])
 
 
-@njit(error_model="numpy")
+@njit
 def _svd_of_scaled(F):
     b0 = (F[0], F[3], F[6])
     b1 = (F[1], F[4], F[7])
@@ -138,7 +138,7 @@ def _svd_of_scaled(F):
     return U, (s0, s1, s2), V
 
 
-@njit(error_model="numpy")
+@njit
 def _unit_orthogonal(b, u):
     """The unit vector orthogonal to the unit vector u that is nearest to the direction of b (any for parallel b)."""
     along = dot(b, u)
@@ -161,7 +161,7 @@ def _unit_orthogonal(b, u):
     return (r[0] / size, r[1] / size, r[2] / size)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _svd_batch(F, U, s, V):
     for e in range(len(F)):
         u, stretches, v = svd3(load_mat(F, e))
@@ -172,7 +172,7 @@ def _svd_batch(F, U, s, V):
         s[e, 2] = stretches[2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def principal_stretches(F):
     """(m, 3) the singular values of `rotation_variant_svd` of F (m, 3, 3), without the rotations."""
     out = np.empty((len(F), 3))
@@ -203,7 +203,7 @@ def principal_stretches(F):
     return out
 
 
-@njit(error_model="numpy")
+@njit
 def _rotate_lanes(b, p, q):
     """`_orthogonalize` in all columns of b: rows p and q begin the two vectors. Returns whether to sweep again.
 

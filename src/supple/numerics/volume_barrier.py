@@ -10,7 +10,7 @@ import math
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def barrier_derivatives(J, onset):
     """b and its first and second derivative by J."""
     y = J / onset

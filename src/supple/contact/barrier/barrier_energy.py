@@ -23,7 +23,7 @@ from supple.runtime.threads import threads_for
 _PARALLEL_FROM = 300
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def barrier_energy(contacts, dhat, stiffness):
     """E [J]; stiffness : kappa [Pa]."""
     _, _, _, _, distances, weights = contacts
@@ -33,7 +33,7 @@ def barrier_energy(contacts, dhat, stiffness):
     return stiffness * total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def barrier_forces(contacts, dhat, stiffness):
     """(k,) normal forces -dE/dd [N], zero or more."""
     _, _, _, _, distances, weights = contacts
@@ -43,7 +43,7 @@ def barrier_forces(contacts, dhat, stiffness):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def add_barrier_gradient(contacts, dhat, stiffness, out):
     """Add the gradient by the points [N] to `out` (s, 3)."""
     kinds, points, coefficients, vectors, distances, weights = contacts
@@ -66,7 +66,7 @@ def barrier_hessian(
     return Couplings(rows, columns, blocks)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def block_starts(kinds):
     """(k + 1,) where the blocks of each contact begin: one for each unordered pair of its points."""
     start = np.zeros(len(kinds) + 1, dtype=np.int64)
@@ -76,7 +76,7 @@ def block_starts(kinds):
     return start
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def block_points(kinds, points, start):
     """Rows and columns (t,) of the blocks (i, j), i <= j, of contacts."""
     rows = np.empty(start[-1], dtype=np.int32)
@@ -91,7 +91,7 @@ def block_points(kinds, points, start):
     return rows, columns
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _write_hessians(x, contacts, start, dhat, stiffness, project, out):
     kinds, _, _, _, _, weights = contacts
     for k in prange(len(kinds)):
@@ -105,7 +105,7 @@ def _write_hessians(x, contacts, start, dhat, stiffness, project, out):
             _write_hessian(x, contacts, k, dhat, stiffness, project, out, start[k])
 
 
-@njit(error_model="numpy")
+@njit
 def _write_hessian(x, contacts, k, dhat, stiffness, project, out, first):
     """The blocks (i, j), i <= j, of contact k."""
     kinds, points, coefficients, vectors, distances, weights = contacts
@@ -118,7 +118,7 @@ def _write_hessian(x, contacts, k, dhat, stiffness, project, out, first):
     write_pair_hessian(kinds[k], c, row(vectors, k), distances[k], stencil, slopes, project, out, first)
 
 
-@njit(error_model="numpy")
+@njit
 def _write_joint_hessian(x, contacts, k, dhat, stiffness, out):
     """The positive part of the sum of two edges and of their nearest end, contact k + 1, whose energy is taken away.
 
@@ -155,7 +155,7 @@ def _write_joint_hessian(x, contacts, k, dhat, stiffness, out):
             b += 1
 
 
-@njit(error_model="numpy")
+@njit
 def _place(points, k, point):
     """Which of the points of contact k a point is."""
     for i in range(4):

@@ -13,7 +13,7 @@ import math
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def barrier_value(d, dhat):
     """e(d) [m] for d > 0."""
     if d >= dhat:
@@ -24,7 +24,7 @@ def barrier_value(d, dhat):
     return -dhat * below * below * 2.0 * math.log(r)
 
 
-@njit(error_model="numpy")
+@njit
 def barrier_slopes(d, dhat):
     """First and second derivative of e by d [1, 1/m] for d > 0: not above and not below zero."""
     if d >= dhat:

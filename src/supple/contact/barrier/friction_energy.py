@@ -57,19 +57,19 @@ class Slips(NamedTuple):
     forces: NDArray[np.float64]
 
 
-@njit(error_model="numpy")
+@njit
 def friction_potential(y, e):
     """F(y) [m]"""
     return y if y >= e else y * y / e * (1.0 - y / (3.0 * e)) + e / 3.0
 
 
-@njit(error_model="numpy")
+@njit
 def friction_ratio(y, e):
     """r(y) = F'(y) / y [1/m]"""
     return 1.0 / y if y >= e else (2.0 - y / e) / e
 
 
-@njit(error_model="numpy")
+@njit
 def ratio_slope(y, e):
     """r'(y) / (r(y) y) [1/m^2], not positive; 0 at y = 0, where it is multiplied by zero."""
     if y == 0.0:
@@ -77,7 +77,7 @@ def ratio_slope(y, e):
     return -1.0 / (y * y) if y >= e else -1.0 / (y * (2.0 * e - y))
 
 
-@njit(error_model="numpy")
+@njit
 def slip_of(x, slips, k):
     """u [m] of contact k."""
     kinds, points, coefficients, normals, offsets, _ = slips
@@ -92,7 +92,7 @@ def slip_of(x, slips, k):
     return (a - along * n[0], b - along * n[1], c - along * n[2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def friction_energy(x, slips, reach):
     """E at x (s, 3) [J]."""
     total = 0.0
@@ -102,7 +102,7 @@ def friction_energy(x, slips, reach):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def add_friction_gradient(x, slips, reach, out):
     """Add the gradient [N] to `out` (s, 3)."""
     kinds, points, coefficients, _, _, forces = slips
@@ -114,7 +114,7 @@ def add_friction_gradient(x, slips, reach, out):
                 out[points[k, i], j] += size * coefficients[k, i] * u[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def slip_forces(x, slips, reach):
     """(k, 3) the force of friction on the first side of every contact [N]."""
     out = np.empty((len(slips[0]), 3))
@@ -141,7 +141,7 @@ def friction_hessian(x: NDArray[np.float64], slips: Slips, reach: float, duals: 
     return Couplings(rows, columns, blocks)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _write_hessians(x, slips, start, reach, duals, out):
     kinds, _, coefficients, normals, _, forces = slips
     for k in prange(len(kinds)):
@@ -162,7 +162,7 @@ def _write_hessians(x, slips, start, reach, duals, out):
                 b += 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def renew_duals(x, way, slips, reach, duals):
     """Overwrite the duals (k, 3) by those at the end of a primal-dual step from x along all of `way` (s, 3).
 

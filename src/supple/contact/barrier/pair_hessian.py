@@ -20,7 +20,7 @@ from supple.contact.features.pair_geometry import point_count, tangent_modes
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def mode_matrix(slope, d, cc, w, project):
     """s00, s01, s11 of one mode (see the module).
 
@@ -45,7 +45,7 @@ def mode_matrix(slope, d, cc, w, project):
     return s00, s00 * ratio, s00 * ratio * ratio
 
 
-@njit(error_model="numpy")
+@njit
 def write_pair_hessian(kind, c, r, d, points, slopes, project, out, first):
     """Write the blocks (i, j), i <= j, of the Hessian, row after row, into out[first:] (t, 3, 3).
 

@@ -15,7 +15,7 @@ from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def height(x, pairs, k):
     """Signed distance of pair k [m], the plane's normal, and the length of its axis [m]."""
     base = row(x, pairs[k, 1])
@@ -25,7 +25,7 @@ def height(x, pairs, k):
     return dot(subtract(row(x, pairs[k, 0]), base), n), n, length
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def near_planes(x, pairs, dhat):
     """The pairs (k, 3) of a point, base and tip that are nearer than dhat.
 
@@ -48,7 +48,7 @@ def near_planes(x, pairs, dhat):
     return rows[:m].copy(), heights[:m].copy(), normals[:m].copy(), least
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def plane_energy(near, areas, dhat, stiffness):
     """Energy [J] of the pairs of `near_planes`; infinite where a point is on the plane or behind it."""
     rows, heights, _, _ = near
@@ -60,7 +60,7 @@ def plane_energy(near, areas, dhat, stiffness):
     return stiffness * total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def plane_forces(near, areas, dhat, stiffness):
     """(m,) forces of the planes along their normals [N]; none on points behind them."""
     rows, heights, _, _ = near
@@ -71,7 +71,7 @@ def plane_forces(near, areas, dhat, stiffness):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def add_plane_gradient(x, pairs, near, forces, out):
     """Add the gradient [N] to `out` (s, 3)."""
     rows = near[0]
@@ -87,7 +87,7 @@ def add_plane_gradient(x, pairs, near, forces, out):
             out[pairs[k, 2], j] -= forces[m] * along
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def plane_hessian(x, pairs, near, areas, dhat, stiffness):
     """Rows, columns and blocks of the Hessian: of points with themselves, with bases and with tips.
 
@@ -112,7 +112,7 @@ def plane_hessian(x, pairs, near, areas, dhat, stiffness):
     return one, two, blocks
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def largest_plane_step(x, way, pairs, keep):
     """Largest step along `way` (s, 3), at most 1, after which every height is still the share `keep` of what it was.
 
@@ -137,7 +137,7 @@ def largest_plane_step(x, way, pairs, keep):
     return step, pair
 
 
-@njit(error_model="numpy")
+@njit
 def _first_root(a, b, c):
     """Smallest positive root of a t^2 + b t + c with c > 0, or infinity; without cancellation."""
     discriminant = b * b - 4.0 * a * c

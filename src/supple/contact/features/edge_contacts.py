@@ -26,7 +26,7 @@ _CROSSING = 1e-3
 _SHARE = 1.5
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def edge_weights(x, pairs, mesh, areas, dhat, known):
     """Areas of the contacts of pairs of edges.
 
@@ -71,7 +71,7 @@ def edge_weights(x, pairs, mesh, areas, dhat, known):
     return weights, squares, keys, grown
 
 
-@njit(error_model="numpy")
+@njit
 def crossing_point(a, b, c, d):
     """Where the lines a b and c d are closest to each other.
 
@@ -90,7 +90,7 @@ def crossing_point(a, b, c, d):
     return dot(cross(w, v), n) / nn, dot(cross(w, u), n) / nn, r, nn / both
 
 
-@njit(error_model="numpy")
+@njit
 def _height(x, triangles, edges, edge_start, edge_items, e, other, r, sign):
     """How far the surface recedes beside edge e, against the direction sign * r, over the edge's length [m].
 
@@ -108,12 +108,12 @@ def _height(x, triangles, edges, edge_start, edge_items, e, other, r, sign):
     return least * math.sqrt(dot(along, along))
 
 
-@njit(error_model="numpy")
+@njit
 def _ends_at(triangles, t, v):
     return triangles[t, 0] == v or triangles[t, 1] == v or triangles[t, 2] == v
 
 
-@njit(error_model="numpy")
+@njit
 def _inward(x, triangles, t, a, b):
     """Unit vector in the plane of triangle t from its edge of the points a and b inwards; zero without area."""
     o = triangles[t, 0] + triangles[t, 1] + triangles[t, 2] - a - b
@@ -125,7 +125,7 @@ def _inward(x, triangles, t, a, b):
     return (m[0] / length, m[1] / length, m[2] / length)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def edge_ends(x, pairs, weights, edges):
     """Of the m pairs with a weight, the nearest end of one edge to the other.
 
@@ -146,7 +146,7 @@ def edge_ends(x, pairs, weights, edges):
     return rows, ends
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def saddle_weights(pairs, weights, rows, ends, edges, s):
     """Weights [m^2] that vertices (s,) need because they are ends of several edges that cross the same edge.
 
@@ -173,7 +173,7 @@ def saddle_weights(pairs, weights, rows, ends, edges, s):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def write_edge_contacts(x, pairs, weights, rows, ends, edges, first, out):
     """Write two contacts for each of the pairs of `edge_ends` into the rows of `out`, a `Contacts`, from `first` on."""
     kinds, points, coefficients, vectors, distances, areas = out
@@ -191,12 +191,12 @@ def write_edge_contacts(x, pairs, weights, rows, ends, edges, first, out):
         areas[n + 1] = -weights[k]
 
 
-@njit(error_model="numpy")
+@njit
 def _ids(edges, e, f):
     return edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1]
 
 
-@njit(error_model="numpy")
+@njit
 def _write_end(x, ids, end, n, kinds, points, coefficients, vectors, distances):
     """Row n: an end of two edges with the other edge, or with an end of that."""
     one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])

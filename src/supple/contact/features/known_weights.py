@@ -63,20 +63,20 @@ def _are_among(codes: NDArray[np.int64], ascending: NDArray[np.int64]) -> NDArra
     return np.searchsorted(ascending, codes, "right") > np.searchsorted(ascending, codes, "left")
 
 
-@njit(error_model="numpy")
+@njit
 def has_grown(known, now, full):
     """Whether a weight is to replace the known one (-1: none), where `full` is the largest possible."""
     return known < 0.0 or now > known + _LEAST_GROWTH * full
 
 
-@njit(error_model="numpy")
+@njit
 def known_weight(known, code):
     """The weight of a pair, or -1 where it is not known."""
     k = known_row(known, code)
     return known.weights[k] if k >= 0 else -1.0
 
 
-@njit(error_model="numpy")
+@njit
 def known_row(known, code):
     """Where a pair is in `known`, a `KnownWeights`, or -1."""
     codes = known.codes

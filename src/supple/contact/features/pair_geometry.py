@@ -22,20 +22,20 @@ VERTEX_VERTEX, VERTEX_EDGE, VERTEX_TRIANGLE, EDGE_EDGE = 0, 1, 2, 3
 _NONE = (0.0, 0.0, 0.0, 0.0)
 
 
-@njit(error_model="numpy")
+@njit
 def point_count(kind):
     """How many points a pair of a kind has."""
     return min(kind + 2, 4)
 
 
-@njit(error_model="numpy")
+@njit
 def normalized(a):
     """a / |a|"""
     length = math.sqrt(dot(a, a))
     return (a[0] / length, a[1] / length, a[2] / length)
 
 
-@njit(error_model="numpy")
+@njit
 def any_across(n):
     """A unit vector perpendicular to the unit vector n."""
     if abs(n[0]) <= abs(n[1]) and abs(n[0]) <= abs(n[2]):
@@ -45,7 +45,7 @@ def any_across(n):
     return normalized((-n[1], n[0], 0.0))
 
 
-@njit(error_model="numpy")
+@njit
 def tangent_modes(kind, n, a, b, c, d):
     """Two perpendicular unit vectors q across n, and how a displacement along n shifts the closest points along them.
 
@@ -77,7 +77,7 @@ def tangent_modes(kind, n, a, b, c, d):
     return _perpendicular_modes(subtract(b, a), subtract(c, d), (-1.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, -1.0))
 
 
-@njit(error_model="numpy")
+@njit
 def _perpendicular_modes(R0, R1, D0, D1):
     """The modes of two parameters: combinations A such that R A is orthonormal and the columns of D A perpendicular."""
     # The factor L of G = R^T R = L L^T; its last entry from the cross product, which keeps its digits in slivers.
@@ -104,11 +104,11 @@ def _perpendicular_modes(R0, R1, D0, D1):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _mixed3(x, a, y, b):
     return (x * a[0] + y * b[0], x * a[1] + y * b[1], x * a[2] + y * b[2])
 
 
-@njit(error_model="numpy")
+@njit
 def _mixed4(x, a, y, b):
     return (x * a[0] + y * b[0], x * a[1] + y * b[1], x * a[2] + y * b[2], x * a[3] + y * b[3])

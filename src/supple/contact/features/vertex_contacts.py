@@ -33,7 +33,7 @@ _FULL, _NONE = 0.25, 0.75
 REACH = math.sqrt(1.0 + _NONE**2)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def write_vertex_contacts(
     x, pairs, rows, starts, codes, signs, shares, mesh, owner, areas, saddles, dhat, known, out, keys, planes, grown
 ):
@@ -111,7 +111,7 @@ def write_vertex_contacts(
             grown[last] = now
 
 
-@njit(error_model="numpy")
+@njit
 def _write_contact(x, v, code, plane, triangles, edges, kinds, points, coefficients, k):
     """Kind, points and coefficients of contact k: of vertex v with the feature that a code names, or with its plane."""
     p = row(x, v)
@@ -136,7 +136,7 @@ def _write_contact(x, v, code, plane, triangles, edges, kinds, points, coefficie
         points[k, 1], coefficients[k, 1] = code - len(triangles) - len(edges), -1.0
 
 
-@njit(error_model="numpy")
+@njit
 def _foot(p, a, b, c):
     """Barycentric coordinates of the point of a triangle's plane that is closest to p."""
     g, h, r = subtract(b, a), subtract(c, a), subtract(p, a)
@@ -146,7 +146,7 @@ def _foot(p, a, b, c):
     return 1.0 - u - v, u, v
 
 
-@njit(error_model="numpy")
+@njit
 def _own_side(x, near_start, near_items, v, a, b, r, d, height):
     """1 where no neighbor of vertex v is nearer to what lies at -r, 0 where one is nearer by `height`.
 

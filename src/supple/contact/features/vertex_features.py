@@ -30,7 +30,7 @@ _BENT, _SHARP = 0.8, 0.6
 PARTS = 7
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
     """The parts of triangles that are closest to vertices.
 
@@ -68,7 +68,7 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
     return features, squares
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def grouped(pairs, features, triangles, owner):
     """The rows (m,) of the pairs that have a feature, by vertex and owner of the triangle.
 
@@ -123,12 +123,12 @@ def grouped(pairs, features, triangles, owner):
     return rows, start[: groups + 1]
 
 
-@njit(error_model="numpy")
+@njit
 def _owner(pairs, k, triangles, owner):
     return owner[triangles[pairs[k, 1], 0]]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reach):
     """The features that are left of each vertex's alternating sum, and how often each counts.
 
@@ -185,7 +185,7 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reac
     return codes, signs, counts, shares
 
 
-@njit(error_model="numpy")
+@njit
 def _normal(x, triangles, t):
     """Unit normal of a triangle; zero without area."""
     a = row(x, triangles[t, 0])
@@ -196,7 +196,7 @@ def _normal(x, triangles, t):
     return (n[0] / length, n[1] / length, n[2] / length)
 
 
-@njit(error_model="numpy")
+@njit
 def _facing_cosine(x, v, triangles, t, own_start, own_items):
     """The largest cosine of the angle at which triangle t and one of vertex v's own look at each other.
 
@@ -208,7 +208,7 @@ def _facing_cosine(x, v, triangles, t, own_start, own_items):
     return best
 
 
-@njit(error_model="numpy")
+@njit
 def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, reach, codes, signs):
     first, n = PARTS * begin, 0
     p = row(x, pairs[rows[begin], 0])
@@ -237,7 +237,7 @@ def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, tri
     return left
 
 
-@njit(error_model="numpy")
+@njit
 def _add(codes, signs, first, n, code, sign):
     """Count a code once more; returns how many codes there are."""
     for i in range(first, first + n):
@@ -248,7 +248,7 @@ def _add(codes, signs, first, n, code, sign):
     return n + 1
 
 
-@njit(error_model="numpy")
+@njit
 def _sharing_edge(pairs, rows, k, begin, end, triangle_edges, e):
     """How many triangles of a group have edge e; 0 where one before the k-th has it."""
     count = 0
@@ -261,7 +261,7 @@ def _sharing_edge(pairs, rows, k, begin, end, triangle_edges, e):
     return count
 
 
-@njit(error_model="numpy")
+@njit
 def _sharing_vertex(pairs, rows, k, begin, end, triangles, triangle_edges, edges, q):
     """How many triangles of a group have vertex q, and how many different edges at q they have; 0 as above."""
     around = sides = 0
@@ -280,7 +280,7 @@ def _sharing_vertex(pairs, rows, k, begin, end, triangles, triangle_edges, edges
     return around, sides
 
 
-@njit(error_model="numpy")
+@njit
 def _closest_on_edge(x, p, edges, e, triangle_count):
     """The feature of an edge that is closest to p, and the squared distance [m^2]."""
     a, b = row(x, edges[e, 0]), row(x, edges[e, 1])
@@ -292,7 +292,7 @@ def _closest_on_edge(x, p, edges, e, triangle_count):
     return triangle_count + e, dot(r, r)
 
 
-@njit(error_model="numpy")
+@njit
 def nearest_of_edge(p, a, b):
     """w in [0, 1], and the vector to p from the closest point (1 - w) a + w b."""
     along, r = subtract(b, a), subtract(p, a)
@@ -303,13 +303,13 @@ def nearest_of_edge(p, a, b):
     return w, (r[0] - w * along[0], r[1] - w * along[1], r[2] - w * along[2])
 
 
-@njit(error_model="numpy")
+@njit
 def beyond(key, s):
     """The code of a vertex that hangs beyond an outline; `key` is that of the vertex and the other side's owner."""
     return key + np.int64(s) * s
 
 
-@njit(error_model="numpy")
+@njit
 def share_between(x, low, high):
     """0 up to `low`, 1 from `high` on, linear between them."""
     return min(1.0, max(0.0, (x - low) / (high - low)))

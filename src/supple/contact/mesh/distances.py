@@ -8,7 +8,7 @@ from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(forceinline=True)
 def point_triangle_square(x, v, triangles, t):
     """The squared distance of point v and triangle t."""
     p, a, b, c = row(x, v), row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
@@ -16,7 +16,7 @@ def point_triangle_square(x, v, triangles, t):
     return dot(r, r)
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(forceinline=True)
 def edge_edge_square(x, edges, e, f):
     """The squared distance of two edges."""
     a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
@@ -25,7 +25,7 @@ def edge_edge_square(x, edges, e, f):
     return dot(r, r)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def points_nearer(x, triangles, pairs, reach):
     """Which pairs (k, 2) of points and triangles are nearer than `reach`."""
     near = np.empty(len(pairs), dtype=np.bool_)
@@ -34,7 +34,7 @@ def points_nearer(x, triangles, pairs, reach):
     return near
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def edges_nearer(x, edges, pairs, reach):
     """Which pairs (k, 2) of edges are nearer than `reach`."""
     near = np.empty(len(pairs), dtype=np.bool_)
@@ -43,7 +43,7 @@ def edges_nearer(x, edges, pairs, reach):
     return near
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def middles_of_points(x, triangles, pairs):
     """(k, 3) the middle between each point of pairs (k, 2) and the place on its triangle that is nearest to it."""
     out = np.empty((len(pairs), 3))
@@ -56,7 +56,7 @@ def middles_of_points(x, triangles, pairs):
     return out
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def middles_of_edges(x, edges, pairs):
     """(k, 3) the middle between the nearest places on the two edges of each of the pairs (k, 2)."""
     out = np.empty((len(pairs), 3))

@@ -18,7 +18,7 @@ def vertex_couplings(points: EmbeddedPoints, between: Couplings) -> Couplings:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _spread(rows, columns, blocks, start, vertices, weights):
     count = 0
     for t in range(len(rows)):

@@ -21,7 +21,7 @@ from supple.runtime.kernel_cache import njit, prange
 RUNS = 64
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def swept_boxes(begin, way, simplices, out):
     """Write the lowest and highest corner of what each simplex (m, k) of points (s, 3) sweeps to out (m, 6)."""
     for i in prange(len(simplices)):
@@ -35,7 +35,7 @@ def swept_boxes(begin, way, simplices, out):
             out[i, 3 + j] = high
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def boxes_of_owners(begin, way, owner, out):
     """Write the box that the points of each owner sweep to out (p, 6); inverted for owners without points."""
     out[:, :3] = np.inf
@@ -49,7 +49,7 @@ def boxes_of_owners(begin, way, owner, out):
             out[k, 3 + j] = max(out[k, 3 + j], a, b)
 
 
-@njit(error_model="numpy")
+@njit
 def meets_partner(box, owner, partners, owner_boxes):
     """Whether a box overlaps that of an owner that may touch its own."""
     for k in range(partners[0][owner], partners[0][owner + 1]):  # noqa: SIM110
@@ -58,7 +58,7 @@ def meets_partner(box, owner, partners, owner_boxes):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def partner_lists(boxes, others, allowed, start, items):
     """Lists of the owners that each may touch, where its box and that of the other overlap; returns their length.
 
@@ -78,7 +78,7 @@ def partner_lists(boxes, others, allowed, start, items):
     return count
 
 
-@njit(error_model="numpy")
+@njit
 def _points_of_run(r, shape, motion, rule, tree, reach, first, last, out):
     """The pairs of run r; rows `first` .. `last` of `out` are its room. Returns their number."""
     begin, triangles, owner = shape
@@ -117,7 +117,7 @@ def _points_of_run(r, shape, motion, rule, tree, reach, first, last, out):
     return count
 
 
-@njit(error_model="numpy")
+@njit
 def _edges_of_run(r, shape, motion, rule, tree, reach, first, last, out):
     """The pairs of run r, each once; see `_points_of_run`."""
     begin, edges, owner = shape
@@ -157,7 +157,7 @@ def _edges_of_run(r, shape, motion, rule, tree, reach, first, last, out):
     return count
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def find_points(shape, motion, rule, tree, reach, room, counts, out):
     """All runs of the search for pairs of points and triangles."""
     begin, simplices, owner = shape
@@ -175,7 +175,7 @@ def find_points(shape, motion, rule, tree, reach, room, counts, out):
         )
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def find_edges(shape, motion, rule, tree, reach, room, counts, out):
     """All runs of the search for pairs of edges."""
     begin, simplices, owner = shape
@@ -193,7 +193,7 @@ def find_edges(shape, motion, rule, tree, reach, room, counts, out):
         )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def sort_pairs(found, room, counts, size):
     """The pairs of all runs (k, 2) in ascending order; the first are below `size`."""
     start = np.zeros(size + 1, dtype=np.int64)
@@ -221,7 +221,7 @@ def sort_pairs(found, room, counts, size):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def covers(begin, end, two_ends, reference, owner, allowed, gap, limit):
     """Whether, at any moment of a straight way, pairs nearer than `gap` were nearer than `gap + limit` at `reference`.
 
@@ -241,7 +241,7 @@ def covers(begin, end, two_ends, reference, owner, allowed, gap, limit):
     return within and (not two_ends or _pairs_within(boxes, means[1], deviations[1], allowed, gap, limit))
 
 
-@njit(error_model="numpy")
+@njit
 def _motion_of_owners(x, begin, owner, boxes, means, deviations):
     """How points moved since `begin` (s, 3): of each owner the box, the mean, and the largest deviation from the mean.
 
@@ -273,7 +273,7 @@ def _motion_of_owners(x, begin, owner, boxes, means, deviations):
         deviations[k] = math.sqrt(deviations[k])
 
 
-@njit(error_model="numpy")
+@njit
 def _pairs_within(boxes, means, deviations, allowed, gap, limit):
     """Whether no two owners that may touch have moved by more than `limit` with respect to each other.
 

@@ -28,7 +28,7 @@ from supple.numerics.geometry.box_tree import (
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _boxes_of_triangles(points, triangles, radii, out):
     """Write the box of each triangle, enlarged by the largest motion of a corner, to out (t, 6)."""
     for t in range(len(triangles)):
@@ -39,7 +39,7 @@ def _boxes_of_triangles(points, triangles, radii, out):
             out[t, 3 + j] = max(points[a, j], points[b, j], points[c, j]) + moves
 
 
-@njit(error_model="numpy")
+@njit
 def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, scratch):
     """Append the triangles near the points of a group, of their own piece or of others; returns the number of all.
 
@@ -93,7 +93,7 @@ def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, s
     return count
 
 
-@njit(cache=True, parallel=True, rows=0, error_model="numpy")
+@njit(cache=True, parallel=True, rows=0)
 def _list_pairs(shapes, groups, radii, rules, partners, boxes, far_tree, near_tree, room, counts, out):
     """Write the pairs of each run of groups to its room of `out`, and their number to `counts`.
 

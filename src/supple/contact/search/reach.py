@@ -20,7 +20,7 @@ def any_beyond_reach(x, x_gathered, reach):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def common_motions(points, motions, pieces, all_share, each, common):
     """The motion of each piece as a rigid body, nearest to the motions (n, 3) of its points (n, 3).
 
@@ -57,7 +57,7 @@ def common_motions(points, motions, pieces, all_share, each, common):
     _turn(points, motions, pieces, each, drifts, centers, turns)
 
 
-@njit(error_model="numpy")
+@njit
 def _turn(points, motions, pieces, each, drifts, centers, turns):
     """Set each turn to Q - 1, with Q the polar factor of sum (X + u - mean) (X - center)^T."""
     turns[:] = 0.0
@@ -77,7 +77,7 @@ def _turn(points, motions, pieces, each, drifts, centers, turns):
                 turns[k, r, c] = Q[3 * r + c] - (r == c)
 
 
-@njit(error_model="numpy")
+@njit
 def _relative_squares(points, motions, i, k, common):
     """The squares of the motion of point i of piece k, less that common to all, and less that of the piece."""
     drifts, centers, turns = common

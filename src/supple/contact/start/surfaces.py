@@ -86,7 +86,7 @@ def _pieces(triangles: NDArray[np.int32], owner: NDArray[np.int32], n: int) -> N
     return np.column_stack([owner[rows], triangles[rows, 0]]).astype(np.int64)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def winding_number(x, triangles, q):
     """The winding number of a closed surface of triangles of x (n, 3) about the point q: 0 outside.
 

@@ -94,7 +94,7 @@ def _points(
     return PointsInTets(nodes, np.ascontiguousarray(gradients), np.ascontiguousarray(volumes))
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _deformation_gradients(x, nodes, gradients, out):
     for e in prange(len(nodes)):
         o = nodes[e, 0]

@@ -184,7 +184,7 @@ def cauchy_of_tets(
     return stresses
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def cauchy_stresses(P, F):
     """(m, 3, 3) P F^T / J [Pa], from P and F (m, 3, 3).
 
@@ -199,7 +199,7 @@ def cauchy_stresses(P, F):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def von_mises(cauchy):
     """(m,) sqrt(3/2 s : s) [Pa] of Cauchy stresses (m, 3, 3) with the deviator s."""
     out = np.empty(len(cauchy))

@@ -40,7 +40,7 @@ class J2Flow(Flow):
         return after
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _increments(p, accumulated, trial, out, works):
     """The growth of the accumulated plastic strain, and the plastic work, the integral of the yield stress over it."""
     for e in range(len(out)):

@@ -11,7 +11,7 @@ import numpy as np
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True)
 def element_forces(P, B, volumes, out):
     """The gradients (k, 4, 3) by the nodes [N] of stresses P (k, 3, 3), with B (k, 3, 3) and volumes (k,)."""
     for e in prange(len(P)):
@@ -24,7 +24,7 @@ def element_forces(P, B, volumes, out):
             out[e, 0, i] = -total
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True)
 def element_stiffness(H, B, volumes, out):
     """The Hessians (k, 12, 12) by the nodes [N/m] of Hessians H (k, 9, 9) by F."""
     for e in prange(len(H)):

@@ -50,7 +50,7 @@ class FibreLaw(Law):
         return psi, P, H
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True)
 def _models(F, p, second, psi, P, H):
     for e in prange(len(F)):
         k1, k2, kappa = p[e, 0], p[e, 1], p[e, 2]

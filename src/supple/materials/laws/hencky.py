@@ -14,14 +14,14 @@ from supple.materials.laws.log_strains import law_kernel, log_strains
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def isotropic_tensor(shear, volume):
     """shear (I - 1/3) + volume 1, as six numbers."""
     a, b = 2.0 / 3.0 * shear + volume, volume - shear / 3.0
     return (a, a, a, b, b, b)
 
 
-@njit(error_model="numpy")
+@njit
 def _energy(s, p):
     """p : K, mu."""
     e, mean = log_strains(s)

@@ -65,7 +65,7 @@ class IsotropicLaw(Law):
         return U, s, V, self.stretch_values(s, p)
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True)
 def decompositions(F, U, s, V):
     """F = U diag(s) V^T of every F (k, 3, 3), into U, s (k, 3) and V."""
     for e in prange(len(F)):
@@ -75,7 +75,7 @@ def decompositions(F, U, s, V):
         s[e, 0], s[e, 1], s[e, 2] = values
 
 
-@njit(error_model="numpy")
+@njit
 def principal_hessian_of(x, project):
     """`principal_hessian` of `supple.materials.isotropic` of the 16 values x of a tet."""
     A = (x[4], x[5], x[6], x[7], x[8], x[9])
@@ -88,7 +88,7 @@ def principal_hessian_of(x, project):
     return A, alpha, beta
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True)
 def _models(U, V, values, second, project, P, H):
     """Stresses (k, 3, 3) and, with `second`, Hessians (k, 9, 9), see `supple.materials.isotropic`."""
     for e in prange(len(values)):

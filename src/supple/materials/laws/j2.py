@@ -26,7 +26,7 @@ from supple.materials.laws.log_strains import law_kernel, log_strains
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def yield_stress(p, a):
     """Y(a), its derivative, and its integral from 0; p as of `_energy`."""
     more, decay = p[4] - p[2], math.exp(-p[5] * a)
@@ -35,7 +35,7 @@ def yield_stress(p, a):
     return p[2] + p[3] * a + saturated, p[3] + more * p[5] * decay, p[2] * a + 0.5 * p[3] * a * a + integral
 
 
-@njit(error_model="numpy")
+@njit
 def plastic_increment(p, a, trial):
     """d >= 0 with q_trial - 3 mu d = Y(a + d), and 0 where q_trial is at most Y(a)."""
     d = 0.0
@@ -49,7 +49,7 @@ def plastic_increment(p, a, trial):
     return d
 
 
-@njit(error_model="numpy")
+@njit
 def _energy(s, p):
     """p : K, mu, Y0, H, Y1, r, and a at the start of the step."""
     e, mean = log_strains(s)

@@ -32,14 +32,14 @@ from supple.runtime.kernel_cache import njit, prange
 VALUES = 16  # of a tet: psi, psi_i, psi_ij, and the quotients d and t
 
 
-@njit(error_model="numpy")
+@njit
 def log_strains(s):
     """e_i = ln s_i, and their mean."""
     e = (math.log(s[0]), math.log(s[1]), math.log(s[2]))
     return e, (e[0] + e[1] + e[2]) / 3.0
 
 
-@njit(error_model="numpy")
+@njit
 def exp_remainder(x, grown):
     """e^x - 1 - x, accurate near 0, from x and `grown` = e^x - 1."""
     if abs(x) > 0.1:
@@ -48,7 +48,7 @@ def exp_remainder(x, grown):
     return 0.5 * x * x * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * inner))))
 
 
-@njit(error_model="numpy")
+@njit
 def exp_quotient(x, y, grown_x, grown_y):
     """(e^x - e^y) / (x - y), from x, y and `grown` = e^x - 1 of both."""
     z = x - y
@@ -58,7 +58,7 @@ def exp_quotient(x, y, grown_x, grown_y):
     return (grown_y + 1.0) * (1.0 + 0.5 * z * (1.0 + z / 3.0 * (1.0 + 0.25 * z * inner)))
 
 
-@njit(error_model="numpy")
+@njit
 def _artanh_quotient(a, b):
     """artanh(r) / r for r = (a - b) / (a + b)."""
     r = (a - b) / (a + b)
@@ -68,7 +68,7 @@ def _artanh_quotient(a, b):
     return 1.0 + q * (1.0 / 3.0 + q * (0.2 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q * (1.0 / 11.0 + q / 13.0)))))
 
 
-@njit(error_model="numpy")
+@njit
 def deviatoric_projection(g):
     """P g P with P = I - 1/3: the derivative by e of a function whose derivative by the deviator is g (six numbers)."""
     r0, r1, r2 = (g[0] + g[5] + g[4]) / 3.0, (g[5] + g[1] + g[3]) / 3.0, (g[4] + g[3] + g[2]) / 3.0
@@ -83,7 +83,7 @@ def deviatoric_projection(g):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def with_squared_volume_change(s, psi, beta, g, bulk):
     """psi, tau and c of an energy of the deviatoric strains plus bulk/2 (J - 1)^2.
 
@@ -98,7 +98,7 @@ def with_squared_volume_change(s, psi, beta, g, bulk):
     return psi + 0.5 * bulk * j * j, tau, (c[0] + k, c[1] + k, c[2] + k, c[3] + k, c[4] + k, c[5] + k)
 
 
-@njit(error_model="numpy")
+@njit
 def put_values(s, psi, tau, c, b, out, e):
     """psi, psi_i, psi_ij, d_ij and t_ij into the `VALUES` numbers of out[e]."""
     u, v, w = 1.0 / s[0], 1.0 / s[1], 1.0 / s[2]
@@ -146,4 +146,4 @@ def law_kernel(name: str, function: Any, cache: bool = True) -> Any:
     # Not a closure: Numba gives these another name in each process where they hold a compiled function.
     values = FunctionType(_values.__code__, {**_values.__globals__, "energy": function}, name)
     values.__qualname__, values.__module__ = name, _values.__module__
-    return njit(cache=cache, parallel=True, error_model="numpy")(values)
+    return njit(cache=cache, parallel=True)(values)

@@ -25,7 +25,7 @@ from supple.materials.laws.log_strains import (
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _energy(s, p):
     """p : K, then mu_k and alpha_k of every term."""
     e, mean = log_strains(s)

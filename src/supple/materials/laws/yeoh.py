@@ -20,7 +20,7 @@ from supple.materials.laws.log_strains import (
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _energy(s, p):
     """p : K, c10, c20, c30."""
     e, mean = log_strains(s)

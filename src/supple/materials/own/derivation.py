@@ -124,7 +124,7 @@ class OwnLaw(IsotropicLaw):
 @lru_cache(maxsize=64)
 def compiled_law(expression: Any, of: str, names: tuple[str, ...]) -> OwnLaw:
     """The law of an expression of SymPy; its parameters are K of K/2 (J - 1)^2, and those with these names."""
-    function = njit(error_model="numpy")(derivatives(expression, of, names))
+    function = njit(derivatives(expression, of, names))
     name = f"own_{abs(hash((expression, of, names)))}"
     energy = _energy_of_invariants if of == "invariants" else _energy_of_stretches
     return OwnLaw(
@@ -136,7 +136,7 @@ def compiled_law(expression: Any, of: str, names: tuple[str, ...]) -> OwnLaw:
 
 
 def _energy_of_invariants(function: Any, count: int) -> Any:
-    @njit(error_model="numpy")
+    @njit
     def energy(s, p):
         e, _ = log_strains(s)
         a, b, c = s[0] * s[0], s[1] * s[1], s[2] * s[2]
@@ -175,7 +175,7 @@ def _energy_of_invariants(function: Any, count: int) -> Any:
 
 
 def _energy_of_stretches(function: Any, count: int) -> Any:
-    @njit(error_model="numpy")
+    @njit
     def stiffness(s, p, i, j):
         """(c_ii - 2 c_ij + c_jj) / 2."""
         f = function(s[0], s[1], s[2], *to_fixed_tuple(p[1:], count))
@@ -183,7 +183,7 @@ def _energy_of_stretches(function: Any, count: int) -> Any:
         pair = (float(f[7]), float(f[8]), float(f[9]))
         return 0.5 * (c[i] + c[j]) - pair[3 - i - j]
 
-    @njit(error_model="numpy")
+    @njit
     def quotient(s, e, tau, p, i, j):
         half = 0.5 * (e[i] - e[j])
         if abs(half) > 0.01:
@@ -200,7 +200,7 @@ def _energy_of_stretches(function: Any, count: int) -> Any:
             total += (5.0, 8.0, 5.0)[n] / 18.0 * stiffness(between, p, i, j)
         return total
 
-    @njit(error_model="numpy")
+    @njit
     def energy(s, p):
         e, _ = log_strains(s)
         f = function(s[0], s[1], s[2], *to_fixed_tuple(p[1:], count))
@@ -212,7 +212,7 @@ def _energy_of_stretches(function: Any, count: int) -> Any:
     return energy
 
 
-@njit(error_model="numpy")
+@njit
 def _with_volume(s, psi, tau, c, b, bulk):
     """An energy and its derivatives with bulk/2 (J - 1)^2 added."""
     j = volume_change(s)

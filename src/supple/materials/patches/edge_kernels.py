@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # of each kind, see `functions_of`
 FRAME = 21
 
 
-@njit(error_model="numpy")
+@njit
 def _mean_gradient(x, start, vertices, gradients, k):
     """F of patch k, from differences to its first vertex: far from the origin they keep their accuracy."""
     begin = start[k]
@@ -84,14 +84,14 @@ def edge_models(
                 frames[k, 18 + c] = v * beta[c]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def mean_gradients(x, start, vertices, gradients, rows, out):
     """F of the patches `rows` (r,) into out (r, 3, 3)."""
     for k in prange(len(rows)):
         store_mat(_mean_gradient(x, start, vertices, gradients, rows[k]), out, k)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def add_law_models(rows, start, gradients, volumes, U, V, values, second, project, energies, forces, frames):
     """Add what `edge_models` computes of the patches `rows` (r,), from the `values` (r, 16) of a law at their stretches
     and their U and V (r, 3, 3)."""

@@ -6,7 +6,7 @@ from supple.materials.isotropic import hessian_block
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(error_model="numpy")
+@njit
 def _edge_block(frames, turned, k, b, c):
     """The block of slots b and c of edge patch k."""
     f = frames[k]
@@ -17,7 +17,7 @@ def _edge_block(frames, turned, k, b, c):
     return hessian_block(U, A, alpha, beta, g, h)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def pair_blocks(
     rows, columns, edge_start, edge_slots, star_start, star_slots, edge_owner, frames, turned, star_owner,
     stiffness, directions, out,

@@ -15,7 +15,7 @@ from supple.numerics.svd3 import svd3 as decompose
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def volume_gradients(x, tets, Dm_inv, volumes, out):
     """d v_e by the nodes of every tet [m^2] into out (m, 4, 3)."""
     for e in prange(len(tets)):
@@ -25,7 +25,7 @@ def volume_gradients(x, tets, Dm_inv, volumes, out):
         put_gradient(C, load_mat(Dm_inv, e), volumes[e], out, e)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def star_pressures(x, tets, tet_start, patch_tets, volumes, kind, lam, energies, pressures, stiffness):
     """V_a l_a U [J], p_a = l_a U' [Pa] and l_a U'' / V_a [Pa/m^3] of every patch, into three arrays (v,)."""
     for a in prange(len(volumes)):
@@ -38,7 +38,7 @@ def star_pressures(x, tets, tet_start, patch_tets, volumes, kind, lam, energies,
         stiffness[a] = lam[a] * second / volumes[a]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def slot_gradients(tet_start, patch_tets, start, slots, of_tets, out):
     """sum_e dv_e of every patch by its slots, into out (s, 3); of_tets : (m, 4, 3) of `volume_gradients`."""
     for a in prange(len(start) - 1):
@@ -52,7 +52,7 @@ def slot_gradients(tet_start, patch_tets, start, slots, of_tets, out):
                     out[slots[e, q], i] += of_tets[e, q, i]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def pressure_hessians(x, tets, Dm_inv, volumes, pressures, project, out):
     """p_e d^2 v_e of every tet into out (m, 12, 12); in principal stretches, p d^2 J is p s_k between the stretches i
     and j, -p s_k against an in-plane change of shape and p s_k against a twist."""

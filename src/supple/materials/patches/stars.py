@@ -34,7 +34,7 @@ def star_patches(of_vertex: NDArray[np.int32], of_edge: NDArray[np.int32]) -> ND
     return patch
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _begin_patches(around, least, count, patch, size):
     """Make patches of the tets around vertices that have none, at least `least`; returns the number of patches."""
     start, tets = around
@@ -59,7 +59,7 @@ def _begin_patches(around, least, count, patch, size):
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _add_to_smallest(around, of_edge, patch, size):
     """Add each tet without a patch that shares an edge with one to the smallest of these."""
     start, tets = around

@@ -8,22 +8,22 @@ from supple.materials.stretch_energies.stretches import StretchFunctions, distan
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _density(F, s, mu, lam):
     return mu * distance_from_rotations(s)
 
 
-@njit(error_model="numpy")
+@njit
 def _gradient(s, mu, lam):
     return (2.0 * mu * (s[0] - 1.0), 2.0 * mu * (s[1] - 1.0), 2.0 * mu * (s[2] - 1.0))
 
 
-@njit(error_model="numpy")
+@njit
 def _curvature(s, mu, lam):
     return (2.0 * mu, 2.0 * mu, 2.0 * mu, 0.0, 0.0, 0.0)
 
 
-@njit(error_model="numpy")
+@njit
 def _quotients(s, mu, lam):
     """d_ij = 2 mu;  t_ij = 2 mu (1 - 2 / (s_i + s_j))"""
     q = rotation_quotients(s)

@@ -13,13 +13,13 @@ from supple.materials.stretch_energies.stretches import (
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _density(F, s, mu, lam):
     j = volume_change(s)
     return mu * distance_from_rotations(s) + 0.5 * lam * j * j
 
 
-@njit(error_model="numpy")
+@njit
 def _gradient(s, mu, lam):
     """psi_i = 2 mu (s_i - 1) + lam (J - 1) s_j s_k"""
     p = lam * volume_change(s)
@@ -30,7 +30,7 @@ def _gradient(s, mu, lam):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _curvature(s, mu, lam):
     """psi_ii = 2 mu + lam (s_j s_k)^2;  psi_ij = lam (s_j s_k)(s_i s_k) + lam (J - 1) s_k"""
     p = lam * volume_change(s)
@@ -45,7 +45,7 @@ def _curvature(s, mu, lam):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _quotients(s, mu, lam):
     """d_ij = 2 mu - lam (J - 1) s_k;  t_ij = 2 mu (1 - 2 / (s_i + s_j)) + lam (J - 1) s_k"""
     p = lam * volume_change(s)

@@ -13,14 +13,14 @@ from supple.numerics.mat3 import det
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _log_J(s):
     """ln J, accurate near the rest state and near collapse."""
     j = volume_change(s)
     return math.log1p(j) if j > -0.5 else math.log(s[0] * s[1] * s[2])
 
 
-@njit(error_model="numpy")
+@njit
 def _density(F, s, mu, lam):
     shape, j = shape_and_volume(F)
     if j <= -1.0:
@@ -29,7 +29,7 @@ def _density(F, s, mu, lam):
     return mu * (shape + (j - log_J)) + 0.5 * lam * log_J * log_J
 
 
-@njit(error_model="numpy")
+@njit
 def _tension(s, mu, lam):
     """c = lam ln J - mu, which stands with 1 / s_i in the stress; not-a-number for J <= 0, where there is no stress."""
     if s[2] <= 0.0:
@@ -37,14 +37,14 @@ def _tension(s, mu, lam):
     return lam * _log_J(s) - mu
 
 
-@njit(error_model="numpy")
+@njit
 def _gradient(s, mu, lam):
     """psi_i = mu s_i + c / s_i"""
     c = _tension(s, mu, lam)
     return (mu * s[0] + c / s[0], mu * s[1] + c / s[1], mu * s[2] + c / s[2])
 
 
-@njit(error_model="numpy")
+@njit
 def _curvature(s, mu, lam):
     """psi_ii = mu + (lam - c) / s_i^2;  psi_ij = lam / (s_i s_j)"""
     c = _tension(s, mu, lam)
@@ -59,7 +59,7 @@ def _curvature(s, mu, lam):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _quotients(s, mu, lam):
     """d_ij = mu - c / (s_i s_j);  t_ij = mu + c / (s_i s_j)"""
     c = _tension(s, mu, lam)
@@ -67,7 +67,7 @@ def _quotients(s, mu, lam):
     return (mu - p, mu - q, mu - r, mu + p, mu + q, mu + r)
 
 
-@njit(error_model="numpy")
+@njit
 def _volume_term(J):
     """(ln J)^2 / 2 and its derivatives."""
     if not J > 0.0:

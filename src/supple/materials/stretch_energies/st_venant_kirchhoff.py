@@ -7,7 +7,7 @@ from supple.materials.stretch_energies.stretches import StretchFunctions, green_
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _green_strains(s):
     return (
         0.5 * (s[0] - 1.0) * (s[0] + 1.0),
@@ -16,7 +16,7 @@ def _green_strains(s):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _density(F, s, mu, lam):
     """mu |E|^2 + lam/2 (tr E)^2"""
     a, b, c, d, e, f = green_strain(F)
@@ -24,7 +24,7 @@ def _density(F, s, mu, lam):
     return mu * (a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) + 0.5 * lam * trace * trace
 
 
-@njit(error_model="numpy")
+@njit
 def _gradient(s, mu, lam):
     """psi_i = s_i (2 mu e_i + lam sum e)"""
     e = _green_strains(s)
@@ -32,7 +32,7 @@ def _gradient(s, mu, lam):
     return (s[0] * (2.0 * mu * e[0] + p), s[1] * (2.0 * mu * e[1] + p), s[2] * (2.0 * mu * e[2] + p))
 
 
-@njit(error_model="numpy")
+@njit
 def _curvature(s, mu, lam):
     """psi_ii = 2 mu e_i + lam sum e + (2 mu + lam) s_i^2;  psi_ij = lam s_i s_j"""
     e = _green_strains(s)
@@ -48,7 +48,7 @@ def _curvature(s, mu, lam):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _quotients(s, mu, lam):
     """d_ij = mu (s_i^2 + s_i s_j + s_j^2 - 1) + lam sum e;  t_ij = mu (s_i^2 - s_i s_j + s_j^2 - 1) + lam sum e"""
     e = _green_strains(s)

@@ -12,26 +12,26 @@ from supple.materials.stretch_energies.stretches import (
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _density(F, s, mu, lam):
     shape, j = shape_and_volume(F)
     return mu * shape + 0.5 * lam * j * j
 
 
-@njit(error_model="numpy")
+@njit
 def _pressure(s, mu, lam):
     """c = d psi / d J at fixed Ic."""
     return lam * volume_change(s) - mu
 
 
-@njit(error_model="numpy")
+@njit
 def _gradient(s, mu, lam):
     """psi_i = mu s_i + c s_j s_k"""
     c = _pressure(s, mu, lam)
     return (mu * s[0] + c * s[1] * s[2], mu * s[1] + c * s[0] * s[2], mu * s[2] + c * s[0] * s[1])
 
 
-@njit(error_model="numpy")
+@njit
 def _curvature(s, mu, lam):
     """psi_ii = mu + lam (s_j s_k)^2;  psi_ij = lam (s_j s_k)(s_i s_k) + c s_k"""
     c = _pressure(s, mu, lam)
@@ -46,7 +46,7 @@ def _curvature(s, mu, lam):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _quotients(s, mu, lam):
     """d_ij = mu - c s_k;  t_ij = mu + c s_k"""
     c = _pressure(s, mu, lam)

@@ -10,12 +10,12 @@ from supple.numerics.mat3 import det
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def no_volume_term(J):
     return (0.0, 0.0, 0.0)
 
 
-@njit(error_model="numpy")
+@njit
 def squared_volume_change(J):
     """(J - 1)^2 / 2 and its derivatives."""
     j = J - 1.0
@@ -53,14 +53,14 @@ class StretchFunctions(NamedTuple):
     density_of_stretches: bool = False
 
 
-@njit(error_model="numpy")
+@njit
 def volume_change(s):
     """J - 1, without cancellation where all stretches are near 1."""
     a, b, c = s[0] - 1.0, s[1] - 1.0, s[2] - 1.0
     return a + b + c + (a * b + b * c + c * a) + a * b * c
 
 
-@njit(error_model="numpy")
+@njit
 def green_strain(F):
     """E = (F^T F - I) / 2 as (E00, E11, E22, E12, E02, E01)."""
     return (
@@ -73,7 +73,7 @@ def green_strain(F):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def shape_and_volume(F):
     """(Ic - 3) / 2 - (J - 1), the part of the neo-Hookean energies multiplied by mu, and J - 1.
 
@@ -91,14 +91,14 @@ def shape_and_volume(F):
     return trace - (J - 1.0), J - 1.0
 
 
-@njit(error_model="numpy")
+@njit
 def distance_from_rotations(s):
     """sum (s_i - 1)^2 = |F - R|^2, R the nearest rotation."""
     a, b, c = s[0] - 1.0, s[1] - 1.0, s[2] - 1.0
     return a * a + b * b + c * c
 
 
-@njit(error_model="numpy")
+@njit
 def rotation_quotients(s):
     """t_ij of sum (s_i - 1)^2 / 2: 1 - 2 / (s_i + s_j).
 
@@ -131,7 +131,7 @@ def _otherwise(name: str, unknown: Any) -> Any:
         return unknown
 
     otherwise.__qualname__ = otherwise.__name__ = f"{name}_of_unknown"
-    return njit(error_model="numpy")(otherwise)
+    return njit(otherwise)
 
 
 def _first_or_rest(name: str, own_kind: int, first: Any, rest: Any) -> Any:
@@ -141,7 +141,7 @@ def _first_or_rest(name: str, own_kind: int, first: Any, rest: Any) -> Any:
         return rest(kind, *arguments)
 
     choose.__qualname__ = choose.__name__ = f"{name}_or_rest"
-    return njit(error_model="numpy")(choose)
+    return njit(choose)
 
 
 UNKNOWN_THREE = (np.nan, np.nan, np.nan)

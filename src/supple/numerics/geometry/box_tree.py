@@ -121,7 +121,7 @@ def _extend_boxes(boxes, labels, out):
             out[k, j], out[k, 3 + j] = min(out[k, j], boxes[i, j]), max(out[k, 3 + j], boxes[i, 3 + j])
 
 
-@njit(error_model="numpy")
+@njit
 def overlap(nodes, i, box):
     """Whether node i overlaps a box of six numbers; touching counts."""
     # Without branches: which of the comparisons fails first cannot be predicted.
@@ -135,7 +135,7 @@ def overlap(nodes, i, box):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def which_overlap(nodes, i, boxes):
     """The boxes (6, GROUP) that node i overlaps, as bits of a number. Without branches, this is vector code."""
     found = 0
@@ -151,7 +151,7 @@ def which_overlap(nodes, i, boxes):
     return found
 
 
-@njit(error_model="numpy")
+@njit
 def from_root(nodes, box, stack):
     """Begin a search of the whole tree; returns the height of the stack."""
     if overlap(nodes, 1, box):
@@ -160,7 +160,7 @@ def from_root(nodes, box, stack):
     return 0
 
 
-@njit(error_model="numpy")
+@njit
 def after_leaf(nodes, leaf, box, stack):
     """Begin a search of the leaves after this one: pairs of one set of primitives are then found once."""
     i = len(nodes) // 2 + leaf
@@ -173,7 +173,7 @@ def after_leaf(nodes, leaf, box, stack):
     return top
 
 
-@njit(error_model="numpy")
+@njit
 def next_leaf(nodes, labels, box, label, same, stack, top):
     """The next leaf that overlaps, or -1, and the height of the stack.
 
@@ -199,7 +199,7 @@ def next_leaf(nodes, labels, box, label, same, stack, top):
     return -1, 0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def morton_codes(boxes):
     """(m,) 63 bits: those of the three coordinates of each center in turn."""
     low = np.empty(3)
@@ -227,7 +227,7 @@ def morton_codes(boxes):
     return codes
 
 
-@njit(error_model="numpy")
+@njit
 def _join(nodes, i):
     """Compute node i from its children; returns the sum of its sides."""
     size = 0.0
@@ -238,7 +238,7 @@ def _join(nodes, i):
     return size
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _refit(boxes, order, nodes):
     """Compute all nodes; returns the sum of the sides of those that are not leaves."""
     leaves = len(nodes) // 2
@@ -269,7 +269,7 @@ def _refit(boxes, order, nodes):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _labels_of_nodes(labels, order, leaves):
     out = np.full(2 * leaves, -2, dtype=np.int32)  # -2 where there is no primitive
     for k in range(len(order)):
@@ -283,7 +283,7 @@ def _labels_of_nodes(labels, order, leaves):
     return out
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _overlapping(nodes, labels, order, boxes, start, found):
     """Count the overlaps of box k in start[k + 1]; where `found` has room for them, write them instead."""
     for q in prange(len(boxes)):

@@ -94,7 +94,7 @@ class EmbeddedPoints:
         _spread(forces, self.start, self.vertices, self.weights, out)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _combine(x, start, vertices, weights, out):
     for i in range(len(start) - 1):
         for j in range(3):
@@ -104,7 +104,7 @@ def _combine(x, start, vertices, weights, out):
             out[i, j] = total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _spread(forces, start, vertices, weights, out):
     for i in range(len(start) - 1):
         for k in range(start[i], start[i + 1]):

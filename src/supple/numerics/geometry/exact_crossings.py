@@ -138,7 +138,7 @@ def triangles_meet(x, first, second, sides):
     return worst
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def kinds_of_pairs(x, triangles, pairs, kinds):
     """Write whether the triangles of each of the pairs (k, 2) are apart, touch or cross, to kinds (k,)."""
     for k in prange(len(pairs)):

@@ -87,7 +87,7 @@ def _beside_corner(x, first, second, at):
     return least > margin and most < -margin
 
 
-@njit(error_model="numpy")
+@njit
 def _beside_plane(x, one, other):
     """Whether all corners of a triangle, but for a shared one, are on one side of the other's plane, by more than
     round-off."""
@@ -105,7 +105,7 @@ def _beside_plane(x, one, other):
     return above or below
 
 
-@njit(error_model="numpy")
+@njit
 def _clearly_apart(x, first, second, shared, at):
     """Whether rounded numbers show that two triangles with at most one common vertex are otherwise apart."""
     if shared == 0:
@@ -116,7 +116,7 @@ def _clearly_apart(x, first, second, shared, at):
     return _beside_plane(x, first, second) or _beside_plane(x, second, first)
 
 
-@njit(error_model="numpy")
+@njit
 def _near_of_run(r, x, triangles, rules, ignored, tree, found):
     """Write the pairs of every `_RUNS`-th block, in it and with later ones, as far as they fit; returns how many.
 
@@ -173,7 +173,7 @@ def _near_of_run(r, x, triangles, rules, ignored, tree, found):
     return count
 
 
-@njit(cache=True, parallel=True, rows=0, error_model="numpy")
+@njit(cache=True, parallel=True, rows=0)
 def _near_pairs(x, triangles, rules, ignored, tree, room, pairs, counts):
     """The pairs of triangles that are not clearly apart, of all runs; rows room[r] .. room[r + 1] are for run r."""
     owner, collide, simple = rules

@@ -95,7 +95,7 @@ class TriangleTree(NamedTuple):
         return of_query[order], found[order], np.sqrt(squares[order])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _build(boxes, levels):
     nodes = (1 << (levels + 1)) - 1
     order = np.arange(len(boxes))
@@ -126,7 +126,7 @@ def _build(boxes, levels):
     return order, bounds, out
 
 
-@njit(error_model="numpy")
+@njit
 def _square_to_box(p, boxes, node):
     total = 0.0
     for k in range(3):
@@ -135,12 +135,12 @@ def _square_to_box(p, boxes, node):
     return total
 
 
-@njit(error_model="numpy")
+@njit
 def _corners(points, triangles, t):
     return row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
 
 
-@njit(error_model="numpy")
+@njit
 def _square_to_triangle(p, points, triangles, t):
     a, b, c = _corners(points, triangles, t)
     off = subtract(p, combine(closest_on_triangle(p, a, b, c), a, b, c))
@@ -165,13 +165,13 @@ def closest_places(
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _closest_places(queries, points, triangles, out):
     for k in range(len(queries)):
         out[k, 0], out[k, 1], out[k, 2] = closest_on_triangle(row(queries, k), *_corners(points, triangles, k))
 
 
-@njit(error_model="numpy")
+@njit
 def _square_height(p, points, triangles, t, normal):
     """Square of the distance from the triangle's plane, and the cosine between its normal and another one; 0, 0 for a
     triangle without area."""
@@ -183,14 +183,14 @@ def _square_height(p, points, triangles, t, normal):
     return dot(n, subtract(p, a)) ** 2 / area, dot(n, normal) / np.sqrt(area)
 
 
-@njit(error_model="numpy")
+@njit
 def _slack(square, p, largest):
     """The uncertainty of a squared distance from p."""
     off = ROUND_OFF * max(largest, abs(p[0]), abs(p[1]), abs(p[2]))
     return TIE * square + off * (2.0 * np.sqrt(square) + off)
 
 
-@njit(error_model="numpy")
+@njit
 def _comes_first(p, normal, points, triangles, t, best, largest):
     """Whether triangle t is preferred to `best`, which is equally near."""
     if best < 0:
@@ -205,7 +205,7 @@ def _comes_first(p, normal, points, triangles, t, best, largest):
     return t < best
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _nearest(queries, normals, within, points, triangles, order, bounds, boxes, found, squares):
     largest = np.abs(boxes[0]).max()  # coordinate [m]
     for q in prange(len(queries)):
@@ -241,7 +241,7 @@ def _nearest(queries, normals, within, points, triangles, order, bounds, boxes, 
             squares[q] = _square_to_triangle(p, points, triangles, best)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _all_within(queries, within, points, triangles, order, bounds, boxes, counts, starts, found, squares):
     """With an empty `found`, only count."""
     largest = np.abs(boxes[0]).max()  # coordinate [m]

@@ -14,7 +14,7 @@ from supple.runtime.kernel_cache import njit
 _FACING, _MARGIN = 1e-6, 1e-6
 
 
-@njit(error_model="numpy")
+@njit
 def _code(i):
     """64 bits that differ from number to number without order (splitmix64; Steele, Lea, Flood 2014)."""
     z = np.uint64(i) + np.uint64(0x9E3779B97F4A7C15)
@@ -23,7 +23,7 @@ def _code(i):
     return z ^ (z >> np.uint64(31))
 
 
-@njit(error_model="numpy")
+@njit
 def _may_cover(u, v, n, ray):
     """Whether the sector from u to v, which turns by less than half a turn about n, may cover a ray.
 
@@ -35,7 +35,7 @@ def _may_cover(u, v, n, ray):
     return after and dot(n, cross(ray, v)) >= least * np.sqrt(dot(v, v))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def simple_stars(x, triangles):
     """(n,) whether the triangles (t, 3) at each vertex x (n, 3) are apart from each other, but for what they share."""
     normals, rays = np.zeros((len(x), 3)), np.zeros((len(x), 3))

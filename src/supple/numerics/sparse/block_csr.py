@@ -124,7 +124,7 @@ def incidences(elements: NDArray[np.int32], rows: int) -> tuple[NDArray[np.int32
     return start.astype(np.int32), incidence.astype(np.int32)
 
 
-@njit(error_model="numpy")
+@njit
 def assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
     """Write the blocks of row i from the diagonal on, and their transposes."""
     for q in range(row_start[i], row_start[i + 1]):
@@ -177,7 +177,7 @@ def assemble_row(i, row_start, columns, mirror, entry_start, entries, element_bl
             data[t, 2, 2] = d22
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _assemble(row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
     for i in prange(len(row_start) - 1):
         assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data)

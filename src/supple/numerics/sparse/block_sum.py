@@ -99,7 +99,7 @@ class JointPattern:
             )
 
 
-@njit(error_model="numpy")
+@njit
 def _partners(rows, columns, row_of, n):
     """For every row the rows that couplings join it to: starts (n + 1,) and numbers, which may repeat."""
     start = np.zeros(n + 1, dtype=np.int32)
@@ -122,7 +122,7 @@ def _partners(rows, columns, row_of, n):
     return start, partners
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _join(row_start, columns, entry_start, coupled_rows, coupled_columns, row_of):
     """The union of the elements' blocks and those of couplings, with the arrays of `BlockPattern` but the entries.
 
@@ -174,7 +174,7 @@ def _join(row_start, columns, entry_start, coupled_rows, coupled_columns, row_of
     return start, joint[:k].copy(), diagonal, mirror, entries[: k + 1].copy()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _places(row_start, columns, coupled_rows, coupled_columns, row_of):
     """The arrays of `CouplingPlaces`; the first start is -1 where a coupling has no block."""
     blocks = len(columns)
@@ -209,7 +209,7 @@ def _places(row_start, columns, coupled_rows, coupled_columns, row_of):
     return start, entries
 
 
-@njit(error_model="numpy")
+@njit
 def _add_row(i, row_start, columns, mirror, coupling_start, couplings, blocks, data):
     for q in range(row_start[i], row_start[i + 1]):
         j = columns[q]
@@ -237,7 +237,7 @@ def _add_row(i, row_start, columns, mirror, coupling_start, couplings, blocks, d
                     data[m, c, r] = data[q, r, c]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _assemble(
     row_start,
     columns,

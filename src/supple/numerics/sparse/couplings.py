@@ -47,7 +47,7 @@ class Couplings:
         _add_product(self.rows, self.columns, self.blocks, x, out)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _add_product(rows, columns, blocks, x, out):
     for t in range(len(rows)):
         i, j = rows[t], columns[t]

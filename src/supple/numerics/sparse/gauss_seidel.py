@@ -12,7 +12,7 @@ import numpy as np
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(error_model="numpy")
+@njit
 def _update_group(k, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted):
     g = 12 * groups[k]
     total = np.zeros(12)
@@ -28,14 +28,14 @@ def _update_group(k, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted
         restricted[g + m] = total[m]
 
 
-@njit(parallel=True, error_model="numpy")
+@njit(parallel=True)
 def update(alpha, groups, start, fields, p, Ap, w, x, r, y, restricted):
     """x += alpha p, r -= alpha Ap, y -= alpha w, restricted <- Z^T r."""
     for k in prange(len(groups)):
         _update_group(k, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
 
 
-@njit(error_model="numpy")
+@njit
 def _backward_group(k, groups, start, row_start, columns, blocks, inverse, fields, coefficients, r, y, s, t, Ut, sums):
     n = len(r)
     g = 12 * groups[k]
@@ -63,7 +63,7 @@ def _backward_group(k, groups, start, row_start, columns, blocks, inverse, field
     sums[k] = total
 
 
-@njit(parallel=True, error_model="numpy")
+@njit(parallel=True)
 def backward(colors, groups, start, row_start, columns, blocks, inverse, fields, coefficients, r, y, s, t, Ut, sums):
     """s <- S^-1 r with y = (D + L)^-1 r, t <- s + Z coefficients, Ut <- U t, and each group's share of r . s."""
     for c in range(len(colors) - 2, -1, -1):
@@ -73,7 +73,7 @@ def backward(colors, groups, start, row_start, columns, blocks, inverse, fields,
             )
 
 
-@njit(error_model="numpy")
+@njit
 def _forward_group(k, beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap, w, sums):
     total = 0.0
     for i in range(start[k], start[k + 1]):
@@ -103,7 +103,7 @@ def _forward_group(k, beta, start, row_start, columns, blocks, diagonal, inverse
     sums[k] = total
 
 
-@njit(parallel=True, error_model="numpy")
+@njit(parallel=True)
 def forward(colors, beta, start, row_start, columns, blocks, diagonal, inverse, t, Ut, p, Up, Ap, w, sums):
     """p <- t + beta p and Up <- Ut + beta Up; Ap, w <- (D + L)^-1 A p, and each group's share of p . Ap."""
     for c in range(len(colors) - 1):

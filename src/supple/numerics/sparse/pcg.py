@@ -85,7 +85,7 @@ def conjugate_gradients(
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
 
 
-@njit(error_model="numpy")
+@njit
 def _inner(a, b):
     total = 0.0
     for i in range(len(a)):
@@ -93,14 +93,14 @@ def _inner(a, b):
     return total
 
 
-@njit(error_model="numpy")
+@njit
 def _add(factor, a, out):
     for i in range(len(a)):
         for k in range(3):
             out[i, k] += factor * a[i, k]
 
 
-@njit(error_model="numpy")
+@njit
 def _inverse(a):
     """Of a small positive definite matrix, by elimination."""
     n = len(a)
@@ -119,14 +119,14 @@ def _inverse(a):
     return out
 
 
-@njit(error_model="numpy")
+@njit
 def _coarse_solution(restricted, coarse, first, coefficients):
     for k in range(len(restricted)):
         coefficients[k] = restricted[k]
     solve(coarse, first, coefficients)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _solve(
     order,
     lower,

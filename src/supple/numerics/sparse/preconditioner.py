@@ -151,7 +151,7 @@ def two_level(pattern: BlockRows, points: NDArray[np.float64], group_start: NDAr
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _envelope(row_start, columns, group_of, groups):
     """(g,) the first group that each group is coupled with."""
     first = np.arange(groups).astype(np.int32)
@@ -161,7 +161,7 @@ def _envelope(row_start, columns, group_of, groups):
     return first
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _invert_diagonal(source, data, diagonal, out):
     """Copy the diagonal blocks, and invert them."""
     for i in range(len(source)):
@@ -189,7 +189,7 @@ def _invert_diagonal(source, data, diagonal, out):
         out[i, 1, 2] = out[i, 2, 1] = (b * c - a * e) / det
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _project_matrix(row_start, columns, data, group_start, fields, coarse):
     """coarse <- Z^T A Z, the lower triangle of blocks and the diagonal ones."""
     groups = len(group_start) - 1

@@ -15,7 +15,7 @@ SIZE = 12
 _DEPENDENT = 1e-11
 
 
-@njit(error_model="numpy")
+@njit
 def _factor_diagonal(block, diagonal):
     """Cholesky factor of a 12x12 block in place, its diagonal inverted; dependent directions get the inverse 0."""
     for c in range(SIZE):
@@ -32,7 +32,7 @@ def _factor_diagonal(block, diagonal):
             block[c, r] = 0.0
 
 
-@njit(error_model="numpy")
+@njit
 def _solve_right(block, factor):
     """block <- block L^-T for a factored diagonal block L."""
     for r in range(SIZE):
@@ -43,7 +43,7 @@ def _solve_right(block, factor):
             block[r, c] = value * factor[c, c]
 
 
-@njit(error_model="numpy")
+@njit
 def _subtract_product(target, left, right_transposed):
     for r in range(SIZE):
         for k in range(SIZE):
@@ -52,7 +52,7 @@ def _subtract_product(target, left, right_transposed):
                 target[r, c] -= value * right_transposed[k, c]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def factorize(matrix, first):
     """Factor in place: A = L L^T.
 
@@ -82,7 +82,7 @@ def factorize(matrix, first):
                         matrix[k, i, c, r] = block[r, c]
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"}, error_model="numpy")
+@njit(cache=True, fastmath={"reassoc", "contract"})
 def solve(factor, first, b):
     """b <- A^-1 b for a factored matrix; b : (12 n,).
 

@@ -80,7 +80,7 @@ class SweepOrder:
                 _take(triangle.source, data, triangle.blocks)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _colors(row_start, columns, group_start, group_of):
     """(g,) for each group in turn the first color that no group has that it is coupled with."""
     groups = len(group_start) - 1
@@ -99,7 +99,7 @@ def _colors(row_start, columns, group_start, group_of):
     return colors
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _triangles(row_start, columns, group_start, groups):
     """Rows and starts of groups in the order of `groups`, and both triangles: starts, columns, sources."""
     n = len(row_start) - 1
@@ -136,7 +136,7 @@ def _triangles(row_start, columns, group_start, groups):
     return rows, start, (lower_start, lower[0], lower[1]), (upper_start, upper[0], upper[1])
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _take(source, data, out):
     for k in prange(len(source)):
         for r in range(3):

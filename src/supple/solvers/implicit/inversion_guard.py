@@ -136,7 +136,7 @@ def _are_positive(system: System, x: NDArray[np.float64]) -> NDArray[np.bool_]:
     return positive
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(parallel=True, cache=True)
 def keeps_volume(x, tets, Dm_inv, guarded):
     """Whether J = det(Ds Dm^-1) > 0 in every guarded tet, in rounded numbers: a step is taken only where this holds."""
     bad = 0

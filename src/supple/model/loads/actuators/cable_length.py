@@ -71,7 +71,7 @@ class CableLength(Coordinate):
         return Couplings(self.vertices[i], self.vertices[j], blocks)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _spans(weights, offsets, own, lengths, directions):
     """Not by matrix products, which take longer to begin than to compute for so few vertices."""
     before = np.zeros(3)

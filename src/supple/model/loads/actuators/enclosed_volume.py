@@ -57,7 +57,7 @@ class EnclosedVolume(Coordinate):
         return Couplings(self.vertices[rows], self.vertices[columns], blocks)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _measure(x, triangles, volume):
     """Set volume (1,).
 
@@ -71,7 +71,7 @@ def _measure(x, triangles, volume):
     volume[0] = total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _differentiate(x, triangles, volume, gradient):
     """`_measure`, and set gradient (v, 3): a third of minus the area vector of each triangle at each of its corners."""
     gradient[:] = 0.0
@@ -87,7 +87,7 @@ def _differentiate(x, triangles, volume, gradient):
     volume[0] = total
 
 
-@njit(error_model="numpy")
+@njit
 def _third_of_area(x, triangles, t):
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     u0, u1, u2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]

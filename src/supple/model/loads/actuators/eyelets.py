@@ -24,7 +24,7 @@ from supple.runtime.kernel_cache import njit
 CREEP = 1e-3
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def turn_at(directions, e):
     """The angle by which eyelet e turns a cable with spans along the unit vectors (s, 3) [rad]."""
     cosine = 0.0
@@ -33,7 +33,7 @@ def turn_at(directions, e):
     return np.arccos(min(max(cosine, -1.0), 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def limits(tension, angle, friction):
     """The largest f towards the winch and away from it, for the tension on the side of the winch [N]."""
     return -tension * np.expm1(-friction * angle), tension * np.expm1(friction * angle)

@@ -7,7 +7,7 @@ from supple.runtime.kernel_cache import njit
 _LEAF = 4
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def triangle_boxes(x, triangles):
     """Lowest and highest corners, each (t, 3)."""
     low, high = np.empty((len(triangles), 3)), np.empty((len(triangles), 3))
@@ -18,7 +18,7 @@ def triangle_boxes(x, triangles):
     return low, high
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def build_tree(low, high):
     """A tree over boxes, split in the middle of the longest side.
 
@@ -61,7 +61,7 @@ def build_tree(low, high):
     return order, nodes[:used], node_low[:used], node_high[:used]
 
 
-@njit(error_model="numpy")
+@njit
 def boxes_meet(low_a, high_a, low_b, high_b, i, j):
     """Whether two closed boxes meet."""
     return (
@@ -74,7 +74,7 @@ def boxes_meet(low_a, high_a, low_b, high_b, i, j):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def boxes_apart(low_a, high_a, low_b, high_b, i, j):
     """Squared distance of two boxes."""
     total = 0.0

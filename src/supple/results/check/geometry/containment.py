@@ -11,7 +11,7 @@ from supple.runtime.kernel_cache import njit
 _MOST_TRIES = 64
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _crossings(x, p, q, triangles, rows):
     """How many triangles the segment from point p to point q crosses; -1 where it meets a side or a corner of one.
 

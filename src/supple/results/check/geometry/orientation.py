@@ -25,7 +25,7 @@ _BOUND_DOT = 8.0 * _EPSILON
 _TINY = 1e-200
 
 
-@njit(cache=True, error_model="numpy", nogil=False)
+@njit(cache=True, nogil=False)
 def volume_sign(x, a, b, c, d):
     """Sign of det[x_b - x_a, x_c - x_a, x_d - x_a]: 1 for a positive tetrahedron, 0 for four points in a plane."""
     bx, by, bz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
@@ -49,7 +49,7 @@ def volume_sign(x, a, b, c, d):
     return _exact_volume_sign(x, a, b, c, d)
 
 
-@njit(error_model="numpy", nogil=False)
+@njit(nogil=False)
 def _exact_volume_sign(x, a, b, c, d):
     for k in range(3):
         if not (in_range(x[a, k]) and in_range(x[b, k]) and in_range(x[c, k]) and in_range(x[d, k])):
@@ -69,7 +69,7 @@ def _exact_volume_sign(x, a, b, c, d):
     return sign_of(h, n)
 
 
-@njit(cache=True, error_model="numpy", nogil=False)
+@njit(cache=True, nogil=False)
 def area_sign(x, a, b, c, i, j):
     """Sign of the area of the triangle a, b, c as seen on the plane of the coordinates i and j."""
     bi, bj, ci, cj = x[b, i] - x[a, i], x[b, j] - x[a, j], x[c, i] - x[a, i], x[c, j] - x[a, j]
@@ -91,7 +91,7 @@ def area_sign(x, a, b, c, i, j):
     return sign_of(h, n)
 
 
-@njit(error_model="numpy", nogil=False)
+@njit(nogil=False)
 def plane_side(x, a, point, normal):
     """Sign of (x_a - point) . normal: 1 on the side that the normal points to."""
     dot = size = 0.0
@@ -116,7 +116,7 @@ def plane_side(x, a, point, normal):
     return sign_of(h, n)
 
 
-@njit(cache=True, error_model="numpy", nogil=False)
+@njit(cache=True, nogil=False)
 def volume_signs(x, tets):
     """(m,) `volume_sign` of every tet (m, 4)."""
     out = np.empty(len(tets), dtype=np.int8)
@@ -125,7 +125,7 @@ def volume_signs(x, tets):
     return out
 
 
-@njit(cache=True, error_model="numpy", nogil=False)
+@njit(cache=True, nogil=False)
 def plane_sides(x, rows, point, normal):
     """(k,) `plane_side` of the points in `rows`."""
     out = np.empty(len(rows), dtype=np.int8)

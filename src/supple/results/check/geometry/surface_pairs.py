@@ -8,7 +8,7 @@ from supple.results.check.geometry.triangle_pairs import triangles_meet
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _counts(a, b, owners, allowed, ignored, total):
     """Whether a pair of triangles is looked at: its owners may touch each other, and it is not ignored itself."""
     if not allowed[owners[a], owners[b]]:
@@ -20,7 +20,7 @@ def _counts(a, b, owners, allowed, ignored, total):
     return not (k < len(ignored) and ignored[k] == key)
 
 
-@njit(error_model="numpy")
+@njit
 def _push(stack, top, i, j):
     if top == len(stack):
         larger = np.empty((2 * len(stack), 2), dtype=np.int64)
@@ -30,7 +30,7 @@ def _push(stack, top, i, j):
     return stack, top + 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def meeting_pairs(x, triangles, owners, allowed, ignored, low, high, order, nodes, node_low, node_high, out):
     """How many pairs of triangles meet; the first ones are written to out (k, 2).
 
@@ -74,7 +74,7 @@ def meeting_pairs(x, triangles, owners, allowed, ignored, low, high, order, node
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def closest_pair(x, triangles, owners, allowed, ignored, low, high, order, nodes, node_low, node_high, best):
     """The squared distance of the closest triangles without a common corner, and which they are; -1 where none is
     closer than sqrt(best). Parameters as of `meeting_pairs`."""
@@ -119,7 +119,7 @@ def closest_pair(x, triangles, owners, allowed, ignored, low, high, order, nodes
     return best, first, second
 
 
-@njit(error_model="numpy")
+@njit
 def _neighbours(s, t):
     for i in range(3):
         for j in range(3):

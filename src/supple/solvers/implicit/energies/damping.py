@@ -142,12 +142,12 @@ class Damping(Potential):
         return volumes, self.viscosity.mu, self.viscosity.lam, self.rate.factor, self.rate.reference
 
 
-@njit(error_model="numpy")
+@njit
 def _symmetric_part(M):
     return (M[0], M[4], M[8], 0.5 * (M[5] + M[7]), 0.5 * (M[2] + M[6]), 0.5 * (M[1] + M[3]))
 
 
-@njit(error_model="numpy")
+@njit
 def _stress(F, reference, e, factor, mu, lam):
     """The viscous second Piola-Kirchhoff stress of tet e, and its strain rate times that, halved and divided by c."""
     E = green_strain(F)
@@ -164,12 +164,12 @@ def _stress(F, reference, e, factor, mu, lam):
     return S, 0.5 * power / factor
 
 
-@njit(error_model="numpy")
+@njit
 def _full(S):
     return (S[0], S[5], S[4], S[5], S[1], S[3], S[4], S[3], S[2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _strains(x, v, tets, Dm_inv, rates, out):
     for e in range(len(tets)):
         B = load_mat(Dm_inv, e)
@@ -182,14 +182,14 @@ def _strains(x, v, tets, Dm_inv, rates, out):
             out[e, k] = E[k]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _energies(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
     for e in prange(len(tets)):
         F = deformation_gradient(x, tets, Dm_inv, e)
         out[e] = volumes[e] * _stress(F, reference, e, factor, mu[e], lam[e])[1]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _gradients(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
     for e in prange(len(tets)):
         B = load_mat(Dm_inv, e)
@@ -198,7 +198,7 @@ def _gradients(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
         put_gradient(mat_mul(F, S), B, volumes[e], out, e)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _hessians(x, tets, Dm_inv, volumes, mu, lam, factor, reference, project, out):
     """d^2 D / dx_p dx_q = c V (dE/dx_p) C (dE/dx_q) + V (g_p . S g_q) I, with shape gradients g.
 

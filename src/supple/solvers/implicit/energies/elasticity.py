@@ -205,7 +205,7 @@ def _law_elasticity(system: System, material: TetMaterial, own: NDArray[np.bool_
     return LawElasticity(elements, tuple(flowing)) if elements or flowing else None
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def gather_gradients(start, incidence, gradients, out):
     """Add every tet's gradient (m, 4, 3) to its nodes' rows of out (n, 3), in the order of the tets."""
     for i in prange(len(start) - 1):

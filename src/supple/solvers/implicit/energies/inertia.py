@@ -39,7 +39,7 @@ class Inertia(Potential):
         _add_hessian(self.masses, self.scale, out.vertices)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _energy(x, masses, predicted, scale):
     total = 0.0
     for i in range(len(x)):
@@ -49,14 +49,14 @@ def _energy(x, masses, predicted, scale):
     return 0.5 * total / scale
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _add_gradient(x, masses, predicted, scale, out):
     for i in range(len(x)):
         for k in range(3):
             out[i, k] += masses[i] / scale * (x[i, k] - predicted[i, k])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _add_hessian(masses, scale, out):
     for i in range(len(masses)):
         for k in range(3):

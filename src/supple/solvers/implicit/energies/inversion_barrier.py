@@ -91,13 +91,13 @@ def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset:
     return InversionBarrier(elasticity, np.where(wanted, kappa * elasticity.system.rest_volumes, 0.0), onset)
 
 
-@njit(error_model="numpy")
+@njit
 def _volume_ratio(x, tets, Dm_inv, e):
     """J of tet e."""
     return det(edge_matrix(x, tets, e)) * det(load_mat(Dm_inv, e))
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _energies(x, tets, Dm_inv, stiffness, onset, out):
     for e in prange(len(tets)):
         out[e] = 0.0
@@ -105,7 +105,7 @@ def _energies(x, tets, Dm_inv, stiffness, onset, out):
             out[e] = stiffness[e] * barrier_derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)[0]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _gradients(x, tets, Dm_inv, stiffness, onset, out):
     for e in prange(len(tets)):
         _, first, _ = barrier_derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)
@@ -115,7 +115,7 @@ def _gradients(x, tets, Dm_inv, stiffness, onset, out):
         put_gradient(P, load_mat(Dm_inv, e), 1.0, out, e)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _hessians(x, tets, Dm_inv, stiffness, onset, project, out):
     """For nodes p and q with shape gradients g and h: b'' (C g)(C h)^T + b' [F (g x h)]_x, C the cofactors of F."""
     for e in prange(len(tets)):
@@ -139,13 +139,13 @@ def _hessians(x, tets, Dm_inv, stiffness, onset, project, out):
                         out[e, 3 * p + i, 3 * q + j] += stiffness[e] * value
 
 
-@njit(error_model="numpy")
+@njit
 def _cofactors(F):
     """d J / d F, nine numbers."""
     a, b, c = cross(F[3:6], F[6:]), cross(F[6:], F[:3]), cross(F[:3], F[3:6])
     return (a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _times(A, v):
     return (dot(A[:3], v), dot(A[3:6], v), dot(A[6:], v))

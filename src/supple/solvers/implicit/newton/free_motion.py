@@ -78,7 +78,7 @@ class FreeMotion:
             _correct(self.piece, self.masses, self.totals, gradient, scale, direction)
 
 
-@njit(error_model="numpy")
+@njit
 def _root(parent, k):
     while parent[k] != k:
         parent[k] = parent[parent[k]]
@@ -86,7 +86,7 @@ def _root(parent, k):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _unite(rows, columns, piece, parent):
     """Join the pieces of coupled vertices. The last one stands for everything that is held; the larger root wins."""
     held = len(parent) - 1
@@ -98,7 +98,7 @@ def _unite(rows, columns, piece, parent):
         parent[min(a, b)] = max(a, b)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _numbered(parent, piece, masses):
     """The number of each vertex's joined piece, or -1, and the masses of the joined pieces."""
     held = len(parent) - 1
@@ -120,7 +120,7 @@ def _numbered(parent, piece, masses):
     return joined, totals
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _correct(piece, masses, totals, gradient, scale, direction):
     shift = np.zeros((len(totals), 3))
     for v in range(len(piece)):

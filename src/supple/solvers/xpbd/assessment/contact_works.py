@@ -27,7 +27,7 @@ def contact_works(forces: FrameForces, points: EmbeddedPoints, x: np.ndarray, be
     return {"contact": float(works[0]), "friction": float(works[1])}
 
 
-@njit(error_model="numpy")
+@njit
 def _displacement(i, moved):
     """That of point i."""
     start, vertices, weights, x, begun = moved
@@ -38,7 +38,7 @@ def _displacement(i, moved):
     return (a, b, c)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _add_rows(owners, vertices, weights, normals, forces, moved, works):
     """Add the works of forces (k, 3) on points (k, 4) of surfaces, of which the first have owners."""
     for k in range(len(forces)):
@@ -50,14 +50,14 @@ def _add_rows(owners, vertices, weights, normals, forces, moved, works):
         _add(row(forces, k), row(normals, k), (x, y, z), works)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _add_vertices(points, places, forces, moved, works):
     """Add the works of forces (k, 3) on points (k,), with normals in the first columns of `places`."""
     for k in range(len(points)):
         _add(row(forces, k), row(places, k), _displacement(points[k], moved), works)
 
 
-@njit(error_model="numpy")
+@njit
 def _add(force, normal, way, works):
     along = dot(force, normal) * dot(normal, way)
     works[0] += along

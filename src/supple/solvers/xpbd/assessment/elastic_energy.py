@@ -102,7 +102,7 @@ def _sums(values: NDArray[np.float64], starts: NDArray[np.intp]) -> NDArray[np.f
     return np.array([values[low:high].sum() for low, high in zip(starts, ends, strict=True)])
 
 
-@njit(error_model="numpy")
+@njit
 def _energies_of_block(points, tets, data, hard, out, low, high):
     for t in range(low, high):
         a, b, d, e = tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3]
@@ -139,7 +139,7 @@ def _energies_of_tets(points, tets, data, hard, out):
         _energies_of_block(points, tets, data, hard, out, low, min(low + BLOCK, len(tets)))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _energies_of_edges(points, edges, springs, hard, out):
     for k in range(len(edges)):
         i, j = edges[k, 0], edges[k, 1]

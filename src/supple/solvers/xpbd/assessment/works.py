@@ -137,7 +137,7 @@ class Works:
             add_works(self.by_name, {"pins": sign * kinetic})
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _work(forces, rows, points, begun):
     """Of forces (k, 3) on the vertices `rows` (k,), over their displacements since `begun` (n, 3)."""
     total = 0.0
@@ -148,7 +148,7 @@ def _work(forces, rows, points, begun):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _work_of_impulses(points, masses, impulses, begun, h):
     """Of changes of velocities (n, 3) of vertices that can move, over their displacements since `begun` in h."""
     total = 0.0

@@ -178,7 +178,7 @@ def _add_works(forces, parts, h, begun, impulses, works):
         begun[p] = parts[p]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _stop_slips(points, rows, h2, spans, friction, before, moved, forces):
     """Friction at the eyelets of a cable, one after the other from the winch, with lengths linear in `moved`.
 

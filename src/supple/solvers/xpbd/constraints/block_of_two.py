@@ -6,7 +6,7 @@ from supple.solvers.xpbd.sweeps.groups import WIDTH
 from supple.solvers.xpbd.sweeps.lanes import nine, put_twelve, twelve
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def deformation_of(x, b):
     """F and dJ/dF of a tet, 9 entries each by rows, and J; x and b as of `block_of_two`."""
     x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
@@ -24,7 +24,7 @@ def deformation_of(x, b):
     return (f00, f01, f02, f10, f11, f12, f20, f21, f22), (c00, c01, c02, c10, c11, c12, c20, c21, c22), J
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def stress_of_step(f, c, J, material, k, step):
     """The first Piola stress of a step, times V [J]: 9 entries by rows; see `deformation_of` and `block_of_two`."""
     f00, f01, f02, f10, f11, f12, f20, f21, f22 = f
@@ -43,7 +43,7 @@ def stress_of_step(f, c, J, material, k, step):
     return s00, s01, s02, s10, s11, s12, s20, s21, s22
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def block_of_two(x, w, b, material, k, h2):
     """The corners of a tet after the projection of C_D and C_H.
 
@@ -59,7 +59,7 @@ def block_of_two(x, w, b, material, k, h2):
     return moved_by_stress(x, w, b, stress_of_step(f, c, J, material, k, step), step)
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def moved_by_stress(x, w, b, s, step):
     """The corners after the impulses of a stress s, times V, over a step [s^2]; see `stress_of_step`."""
     x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
@@ -99,7 +99,7 @@ def moved_by_stress(x, w, b, s, step):
     )
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(forceinline=True)
 def constants_of_tet(data, g, i):
     """The material, the diagonal k and the inverse masses of the tet in lane i of group g, as of `block_of_two`."""
     return (
@@ -109,7 +109,7 @@ def constants_of_tet(data, g, i):
     )
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def project_blocks_of_two(X, data, g, h):
     """`block_of_two` of group g, as `Sweep` needs it.
 

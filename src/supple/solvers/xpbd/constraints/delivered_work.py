@@ -82,7 +82,7 @@ class DeliveredWork:
         return sums
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@njit(cache=True, fastmath=FLAGS)
 def _works(before, after, corners, counts, active, data, pointers, h2, out):
     """Sweep over `before` as `Sweep` does: even chunks, then odd ones."""
     X, Y, sums = np.zeros((12, WIDTH)), np.zeros((12, WIDTH)), np.zeros((3, WIDTH))
@@ -102,14 +102,14 @@ def _works(before, after, corners, counts, active, data, pointers, h2, out):
                             out[g, j] += sums[j, lane]
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(forceinline=True)
 def _gather(x, corners, lane, out):
     for c in range(4):
         for j in range(3):
             out[3 * c + j, lane] = x[corners[c], j]
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def _works_of_group(X, Y, data, g, h2, sums):
     """Project the tets in the columns of X, and set what each adds to the sums, with its positions Y afterwards."""
     for i in range(WIDTH):

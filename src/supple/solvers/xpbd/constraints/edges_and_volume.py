@@ -25,7 +25,7 @@ from supple.solvers.xpbd.sweeps.ordering import Layout
 from supple.solvers.xpbd.sweeps.sweep import Sweep
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def project_length(x, w, rest, alpha):
     """The ends (6 coordinates) of an edge after its projection; alpha : compliance / h^2 [1/kg]."""
     x0, y0, z0, x1, y1, z1 = x
@@ -37,7 +37,7 @@ def project_length(x, w, rest, alpha):
     return x0 + a * dx, y0 + a * dy, z0 + a * dz, x1 - b * dx, y1 - b * dy, z1 - b * dz
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def project_determinant(x, w, rest, alpha):
     """The corners (12 coordinates) of a tet after the projection of its determinant; alpha : 36 compliance / h^2."""
     ax, ay, az, bx, by, bz, dx, dy, dz, ex, ey, ez = x
@@ -74,7 +74,7 @@ def project_determinant(x, w, rest, alpha):
     )
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def _project_edges(X, data, g, h):
     """The rows of `data`: rest length, compliance, 2 inverse masses."""
     for i in range(WIDTH):
@@ -83,7 +83,7 @@ def _project_edges(X, data, g, h):
         put_six(X, i, project_length(six(X, i), w, data[g, 0, i], alpha))
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def _project_volumes(X, data, g, h):
     """The rows of `data`: determinant at rest, its compliance, 4 inverse masses."""
     for i in range(WIDTH):

@@ -77,7 +77,7 @@ def stitch_constraints(
     return [constraints for constraints in made if constraints.count]
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def project_spring(x, w, rest, alpha, t, slope):
     """The 9 coordinates of a vertex and of the ends of an edge, after the projection of the spring between them.
 
@@ -106,7 +106,7 @@ def project_spring(x, w, rest, alpha, t, slope):
     )
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def _project_springs(X, data, g, h):
     """The rows of `data`: rest length, compliance, and t, slope and w of `project_spring`."""
     for i in range(WIDTH):

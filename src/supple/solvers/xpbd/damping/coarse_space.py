@@ -110,7 +110,7 @@ class CoarseMatrix:
         _solve(self._groups.blocks, self._offsets, self._blocks, self._first, b)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def frames_of_groups(start, rows, motion, offsets, frames):
     """The rotation (g, 3, 3) of each group from where the scene places it: the polar factor of sum x offset^T."""
     for g in range(len(start) - 1):
@@ -142,7 +142,7 @@ def frames_of_groups(start, rows, motion, offsets, frames):
                 frames[g, i, j] = U[3 * i] * V[3 * j] + U[3 * i + 1] * V[3 * j + 1] + U[3 * i + 2] * V[3 * j + 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _add_masses(rows, masses, blocks, offsets, body_of, group_of, fields, out, first):
     for i in rows:
         g = group_of[i]
@@ -156,7 +156,7 @@ def _add_masses(rows, masses, blocks, offsets, body_of, group_of, fields, out, f
                     block[3 * p + r, 3 * q + r] += value
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _add_elements(vertices, matrices, blocks, offsets, body_of, group_of, fields, out, first):
     corners = vertices.shape[1]
     for e in range(len(vertices)):
@@ -182,7 +182,7 @@ def _add_elements(vertices, matrices, blocks, offsets, body_of, group_of, fields
                                 block[3 * p + r, 3 * q + s] += w * matrices[e, 3 * a + r, 3 * c + s]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _solve(blocks, offsets, factors, first, b):
     for body in range(len(blocks) - 1):
         low, high = blocks[body], blocks[body + 1]

@@ -9,7 +9,7 @@ import numpy as np
 from supple.runtime.kernel_cache import njit
 
 
-@njit(error_model="numpy")
+@njit
 def _turn(frame, a):
     return (
         frame[0, 0] * a[0] + frame[0, 1] * a[1] + frame[0, 2] * a[2],
@@ -18,7 +18,7 @@ def _turn(frame, a):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def _turn_back(frame, x, y, z):
     return (
         frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z,
@@ -27,7 +27,7 @@ def _turn_back(frame, x, y, z):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def place(points, velocities, anchor_velocities, h, motion):
     """Velocities, and the positions in the middle of the last substep, at which a rotation has no rate of strain."""
     n = len(velocities)
@@ -38,7 +38,7 @@ def place(points, velocities, anchor_velocities, h, motion):
             motion[i, 3 + j] = v
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def extrapolate(start, rows, fields, frames, motion, forces, local_forces, local_velocities, ratio):
     """f <- R f_1, and v <- v + ratio (v - R v_1) in `motion`."""
     for g in range(len(frames)):
@@ -50,7 +50,7 @@ def extrapolate(start, rows, fields, frames, motion, forces, local_forces, local
                 motion[rows[k], 3 + j] = now + ratio * (now - v[j])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def forget(start, rows, blocks, fast, velocities, forces, motion):
     """Begin from f = 0 and v_e = v_0 in the bodies that are `fast` (b,)."""
     for b in range(len(blocks) - 1):
@@ -61,7 +61,7 @@ def forget(start, rows, blocks, fast, velocities, forces, motion):
                     motion[rows[k], 3 + j] = velocities[rows[k], j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def restrict(start, rows, fields, frames, H, forces, viscous, coarse):
     """coarse <- Z^T r with r = -H (f + K v)."""
     coarse[:] = 0.0
@@ -76,7 +76,7 @@ def restrict(start, rows, fields, frames, H, forces, viscous, coarse):
                     coarse[12 * g + 3 * a + j] -= H * fields[k, a] * local[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def correct(start, rows, fields, frames, blocks, H, masses, placed, forces, viscous, coarse, motion, products):
     """z <- P^-1 r with r = -H (f + K v) in `motion`, and r . z and z . M z of each group.
 
@@ -110,7 +110,7 @@ def correct(start, rows, fields, frames, blocks, H, masses, placed, forces, visc
             products[g, 0], products[g, 1] = rz, zMz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def step(start, rows, blocks, H, longest, masses, motion, products, powers, forces):
     """f += alpha M z / H with alpha = r . z / z . (M + H K) z of each body, at most `longest`.
 
@@ -131,7 +131,7 @@ def step(start, rows, blocks, H, longest, masses, motion, products, powers, forc
                 forces[k, j] += factor * motion[rows[k], 3 + j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def keep(start, rows, fields, frames, velocities, forces, local_forces, local_velocities):
     """f_1 <- R^T f, v_1 <- R^T v."""
     for g in range(len(frames)):
@@ -143,7 +143,7 @@ def keep(start, rows, fields, frames, velocities, forces, local_forces, local_ve
                 local_forces[k, j], local_velocities[k, j] = f[j], v[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def push(rows, points, forces, h):
     """x += h^2 w f."""
     for k in range(len(rows)):

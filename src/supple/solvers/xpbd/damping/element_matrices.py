@@ -20,7 +20,7 @@ def matrices_of_springs(points, vertices, constants, h):
     return out
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _fill_tets(points, vertices, constants, h, out):
     for e in prange(len(vertices)):
         c = constants[e]
@@ -38,7 +38,7 @@ def _fill_tets(points, vertices, constants, h, out):
                 out[e, j, k] = f[j]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def _fill_springs(points, vertices, constants, h, out):
     for e in prange(len(vertices)):
         t, stiffness, slope, tau = constants[e, 0], constants[e, 1], constants[e, 2], constants[e, 3]

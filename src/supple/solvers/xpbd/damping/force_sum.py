@@ -70,14 +70,14 @@ class ForceSum:
 @cache
 def _sum_of(forces: Any, corners: int) -> Any:
     chunk = kernel_with(_sum_chunk, forces.py_func.__qualname__, forces=forces, CORNERS=corners)
-    compiled = njit(fastmath=FLAGS, error_model="numpy")(chunk)
+    compiled = njit(fastmath=FLAGS)(chunk)
     return njit(cache=True, parallel=True, rows=0)(kernel_with(_sum, forces.py_func.__qualname__, _sum_chunk=compiled))
 
 
 @cache
 def _powers_of(powers: Any, corners: int) -> Any:
     chunk = kernel_with(_power_chunk, powers.py_func.__qualname__, powers=powers, CORNERS=corners)
-    compiled = njit(fastmath=FLAGS, error_model="numpy")(chunk)
+    compiled = njit(fastmath=FLAGS)(chunk)
     return njit(cache=True, parallel=True, rows=0)(
         kernel_with(_powers, powers.py_func.__qualname__, _power_chunk=compiled)
     )
@@ -91,7 +91,7 @@ if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sum_chunk
     def powers(X, V, k, data, g, h): ...
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(forceinline=True)
 def _gather(motion, corners, g, count, n_corners, X, V):
     """Positions and velocities of the corners of group g, one element in each column of X and V."""
     for lane in range(count):

@@ -13,7 +13,7 @@ from supple.solvers.xpbd.sweeps.groups import WIDTH
 from supple.solvers.xpbd.sweeps.lanes import nine, put_nine, put_twelve, twelve
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def _gradient(x, b):
     """The 9 entries of sum_i x_i b_i^T, of 12 coordinates x and the shape gradients b_1, b_2, b_3."""
     x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
@@ -34,7 +34,7 @@ def _gradient(x, b):
     )
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def _cofactors(F):
     """dJ/dF, row by row."""
     f00, f01, f02, f10, f11, f12, f20, f21, f22 = F
@@ -51,7 +51,7 @@ def _cofactors(F):
     )
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def _rates(F, G, C):
     """D = sym(F^T F') as 00, 11, 22 and twice 01, 02, 12, and J' = dJ/dF : F', with G = F' and C = dJ/dF."""
     f00, f01, f02, f10, f11, f12, f20, f21, f22 = F
@@ -68,7 +68,7 @@ def _rates(F, G, C):
     )
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def viscous_power_of_tet(x, v, b, shear, bulk):
     """Forces times velocities of `viscous_tet` [W]: 2 shear |dev D|^2 + bulk (dJ/dF : F')^2."""
     F = _gradient(x, b)
@@ -79,7 +79,7 @@ def viscous_power_of_tet(x, v, b, shear, bulk):
     return shear * squares + bulk * (rate * rate)
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def viscous_tet(x, v, b, shear, bulk):
     """The forces (12) that balance the viscous stress of a tet, means of the diagonal entries (4) of
     their matrix [kg/s], and the square of the rates of the stretches [1/s^2].
@@ -159,7 +159,7 @@ def viscous_tet(x, v, b, shear, bulk):
     )
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def _length_and_rate(x, v, t):
     """Of a spring from a vertex to the place t of an edge: d (3), d . d' and d . d; see `viscous_spring`."""
     x0, y0, z0, x1, y1, z1, x2, y2, z2 = x
@@ -171,7 +171,7 @@ def _length_and_rate(x, v, t):
     return (dx, dy, dz), dx * ex + dy * ey + dz * ez, squared
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def viscous_spring(x, v, t, viscosity):
     """The forces (9) of a spring from a vertex to the place t of an edge, mean diagonal entries (3) of the matrix,
     and the square of the rate of its length [1/s^2].
@@ -206,21 +206,21 @@ def viscous_spring(x, v, t, viscosity):
     )
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def viscous_power_of_spring(x, v, t, viscosity):
     """Forces times velocities of `viscous_spring` [W]: viscosity (d . d' / |d|)^2."""
     _, product, squared = _length_and_rate(x, v, t)
     return viscosity * product * product / squared if squared > 0.0 else 0.0
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def softened(stiffness, slope, h):
     """The part of a stiffness whose rates substeps of h [s] do not suppress; see `elements`."""
     factor = 1.0 + h * h * stiffness * slope
     return stiffness / (factor * factor)
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def forces_of_tets(X, V, k, data, g, h):
     """`viscous_tet` of group g in the columns of X and V, which then holds the forces, and of k for the rest.
 
@@ -236,7 +236,7 @@ def forces_of_tets(X, V, k, data, g, h):
         k[0, i], k[1, i], k[2, i], k[3, i], k[4, i] = f[12], f[13], f[14], f[15], f[16]
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def forces_of_springs(X, V, k, data, g, h):
     """`viscous_spring` in the same way. The rows of `data`: t, stiffness, slope, tau."""
     for i in range(WIDTH):
@@ -248,7 +248,7 @@ def forces_of_springs(X, V, k, data, g, h):
         k[0, i], k[1, i], k[2, i], k[3, i] = f[9], f[10], f[11], f[12]
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def powers_of_tets(X, V, k, data, g, h):
     """`viscous_power_of_tet` of group g in the first row of k."""
     for i in range(WIDTH):
@@ -257,7 +257,7 @@ def powers_of_tets(X, V, k, data, g, h):
         k[0, i] = viscous_power_of_tet(twelve(X, i), twelve(V, i), nine(data[g], i), tau * data[g, 9, i], bulk)
 
 
-@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+@njit(fastmath=FLAGS, forceinline=True)
 def powers_of_springs(X, V, k, data, g, h):
     """`viscous_power_of_spring` in the same way."""
     for i in range(WIDTH):

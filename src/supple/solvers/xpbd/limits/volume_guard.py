@@ -79,7 +79,7 @@ def _edges(points, a, b, d, e):
     )  # fmt: skip
 
 
-@njit(error_model="numpy")
+@njit
 def _measure_block(points, tets, scale, bounds, share, out, low, high):
     below = 0
     for t in range(low, high):
@@ -106,7 +106,7 @@ def _set_bounds(J, guarded, bounds):
         bounds[t] = min(J[t], max(ONSET, KEEP * J[t])) if guarded[t] else -np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _project(points, tets, scale, bounds):
     m = len(tets)
     for turn in range(2):

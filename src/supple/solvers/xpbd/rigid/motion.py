@@ -90,7 +90,7 @@ def solve_symmetric(S, v):
     return solve((S[0], S[3], S[5]), (S[3], S[1], S[4]), (S[5], S[4], S[2]), v)
 
 
-@njit(error_model="numpy")
+@njit
 def half_turn(S, L):
     """The unit quaternion (w, q) with 2 w S q + 2 q x (S q) = L; see the module."""
     spin = solve_symmetric(S, L)
@@ -135,7 +135,7 @@ def half_turn(S, L):
     return math.sqrt(1.0 - dot(q, q)), q
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def advance(points, previous, velocities, control, h):
     ends = np.empty((4, 3))
     for b in range(len(control)):
@@ -174,7 +174,7 @@ def advance(points, previous, velocities, control, h):
                 velocities[i, j] = mean[j] + (ends[k, j] - shift[j]) / h + more[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def keep_momenta(before, x, velocities, control):
     """Add rotations to the velocities so that sum r x v is about the places x what it was about those `before`."""
     for b in range(len(control)):

@@ -66,7 +66,7 @@ class Sweep:
 @cache
 def _sweep_of(project: Any, corners: int) -> Any:
     name = project.py_func.__qualname__
-    chunk = njit(fastmath=FLAGS, error_model="numpy")(kernel_with(_sweep_chunk, name, project=project, CORNERS=corners))
+    chunk = njit(fastmath=FLAGS)(kernel_with(_sweep_chunk, name, project=project, CORNERS=corners))
     return njit(cache=True, parallel=True, rows=0)(kernel_with(_sweep, name, _sweep_chunk=chunk))
 
 

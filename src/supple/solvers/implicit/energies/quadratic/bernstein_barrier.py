@@ -86,7 +86,7 @@ class BernsteinBarrier(Potential):
             hessian.patches.append(Couplings(rows, columns, blocks[:, _FIRST, _SECOND].reshape(-1, 3, 3)))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _energies(ratios, stiffness, onset, out):
     for e in range(len(ratios)):
         out[e] = 0.0
@@ -94,14 +94,14 @@ def _energies(ratios, stiffness, onset, out):
             out[e] += stiffness[e] * barrier_derivatives(ratios[e, k], onset)[0]
 
 
-@njit(error_model="numpy")
+@njit
 def _cross(u, v, out):
     out[0] = u[1] * v[2] - u[2] * v[1]
     out[1] = u[2] * v[0] - u[0] * v[2]
     out[2] = u[0] * v[1] - u[1] * v[0]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _derivatives(x, nodes, ratios, rest, stiffness, onset, g, second, curved, forces, blocks):
     """Gradients (m, 10, 3) and, if `second`, the blocks (m, 10, 10, 3, 3) of nodes n <= m; without the second
     derivatives of coefficients unless `curved`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from supple.runtime.kernel_cache import njit, prange
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def place_virtual_tets(F, out):
     """The corners (m, 4, 3) of virtual tets: the first at zero, the others the columns of F (m, 3, 3)."""
     for e in prange(len(F)):
@@ -15,7 +15,7 @@ def place_virtual_tets(F, out):
                 out[e, j + 1, i] = F[e, i, j]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def element_forces(gradients, forces, out):
     """(k, 10, 3) sums over an element's points of the forces (k s, 4, 3) on the corners of their virtual tets, with the
     gradients (k, s, 10, 3) of the shape functions as weights."""
@@ -30,7 +30,7 @@ def element_forces(gradients, forces, out):
                 out[e, a, i] = total
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def add_by_vertex(start, entries, forces, out):
     """Add forces (m, 3) to the vertices' rows of out: those of vertex v are entries[start[v] : start[v + 1]]."""
     for v in prange(len(start) - 1):
@@ -39,7 +39,7 @@ def add_by_vertex(start, entries, forces, out):
                 out[v, i] += forces[entries[p], i]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def element_blocks(gradients, hessians, out):
     """(k, 10, 10, 3, 3) blocks of nodes a <= b of each element, from the Hessians (k s, 12, 12) of virtual tets."""
     for e in prange(len(gradients)):
@@ -71,7 +71,7 @@ def element_blocks(gradients, hessians, out):
                         out[e, a, b, 2, j] += h0 * c2 + h1 * d2 + h2 * f2
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True)
 def sum_pairs(start, entries, blocks, out):
     """Sum the blocks (m, 3, 3) of each pair of vertices; an entry is 2 m, or 2 m + 1 where the transpose is meant."""
     for p in prange(len(start) - 1):

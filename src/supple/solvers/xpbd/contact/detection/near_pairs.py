@@ -22,7 +22,7 @@ from supple.runtime.kernel_cache import njit
 MORE, SOME = 1.25, 50
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(forceinline=True)
 def _relative(ways, i, j, most):
     """The larger of `most` and the squares of how far i has moved relative to j: at the beginning, and at the end."""
     begin = end = 0.0
@@ -32,7 +32,7 @@ def _relative(ways, i, j, most):
     return max(most, begin, end)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def set_ways(points, reference, begun, x, ways):
     """Write how far points (k,) are from their references when the substep begins and ends to ways (n, 6)."""
     for i in points:
@@ -41,7 +41,7 @@ def set_ways(points, reference, begun, x, ways):
             ways[i, 3 + k] = x[i, k] - reference[i, k]
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(forceinline=True)
 def _triangle_apart(ways, triangles, t, p, free):
     """Whether point p moves by less than `free` [m] relative to the corners of triangle t."""
     if not free > 0.0:
@@ -50,7 +50,7 @@ def _triangle_apart(ways, triangles, t, p, free):
     return _relative(ways, p, c, _relative(ways, p, b, _relative(ways, p, a, 0.0))) < free * free
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(forceinline=True)
 def _edges_apart(ways, ends, e, f, free):
     """The same of two edges."""
     if not free > 0.0:
@@ -60,7 +60,7 @@ def _edges_apart(ways, ends, e, f, free):
     return _relative(ways, b, d, _relative(ways, b, c, moved)) < free * free
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def near_points(ways, lists, triangles, distances, margin, forces, depth, entered):
     """Those of the lists of `find_contacts` that count in a substep.
 
@@ -106,7 +106,7 @@ def near_points(ways, lists, triangles, distances, margin, forces, depth, entere
     return (n, out_points, out_ranges, out_starts, out_rows, out_listed), near[:count]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def near_edges(ways, pairs, ends, distances, margin, forces):
     """The numbers of the pairs of edges that may come as near as the margin [m] or hold a force.
 
@@ -123,7 +123,7 @@ def near_edges(ways, pairs, ends, distances, margin, forces):
     return out[:count].copy()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def measure(x, lists, triangles, of_points, pairs, ends, of_edges):
     """Write the distances of all listed points and triangles, and of all pairs of edges, at x (n, 3) [m]."""
     n_active, points, run_ranges, run_starts, _, listed = lists
@@ -135,7 +135,7 @@ def measure(x, lists, triangles, of_points, pairs, ends, of_edges):
         of_edges[i] = math.sqrt(edge_edge_square(x, ends, first[i], second[i]))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def taking_part(n, lists, triangles, pairs, ends):
     """(n,) the points that take part in any pair."""
     taking = np.zeros(n, dtype=np.bool_)

@@ -36,7 +36,7 @@ class PreparedRows(NamedTuple):
     numbers: NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def prepare_rows(chosen, movers, rows):
     """Prepare the chosen rows; see `solve_rows`."""
     count, vertices, weights, normals = len(chosen), rows[0], rows[1], rows[2]

@@ -22,7 +22,7 @@ SHARE, MOBILITY, ARM, LEVER, TURN = 16, 17, 18, 21, 24
 PER_BODY, RIGID_COLUMNS = 11, 38
 
 
-@njit(error_model="numpy")
+@njit
 def _turned(J, b, m):
     """J m of body b."""
     return (
@@ -32,7 +32,7 @@ def _turned(J, b, m):
     )
 
 
-@njit(error_model="numpy")
+@njit
 def join_points(bodies, numbers, movers, vertices, weights):
     """Sum up the points (4,) of a row, where they are rigid or held; returns whether they are on two bodies at most."""
     count, couple = 0, 1.0
@@ -59,7 +59,7 @@ def join_points(bodies, numbers, movers, vertices, weights):
     return True
 
 
-@njit(error_model="numpy")
+@njit
 def prepare_bodies(bodies, numbers, w, J):
     """Set what remains the same in all passes of a substep, after `join_points`."""
     for k in range(2):
@@ -76,13 +76,13 @@ def prepare_bodies(bodies, numbers, w, J):
             numbers[SOFTNESS + j] += s
 
 
-@njit(error_model="numpy")
+@njit
 def begin_bodies(numbers, x_prev, vertices, weights):
     """Begin a pass, at the beginning of the substep x_prev (n, 3) without twists [m]."""
     set_three(numbers, PLACE, _combined(x_prev, vertices, weights))
 
 
-@njit(error_model="numpy")
+@njit
 def _combined(x, vertices, weights):
     at = (0.0, 0.0, 0.0)
     for i in range(4):
@@ -91,7 +91,7 @@ def _combined(x, vertices, weights):
     return at
 
 
-@njit(error_model="numpy")
+@njit
 def place_of_bodies(bodies, numbers, twists):
     """The relative place at the beginning of the substep, with the shifts of this pass so far [m]."""
     at = three(numbers, PLACE)
@@ -102,7 +102,7 @@ def place_of_bodies(bodies, numbers, twists):
     return at
 
 
-@njit(error_model="numpy")
+@njit
 def shift_bodies(bodies, numbers, movers, d):
     """`impulses.shift_both` of the row, by the shift d [kg m]."""
     twists, u = movers.twists, (0.0, 0.0, 0.0)
@@ -126,7 +126,7 @@ def shift_bodies(bodies, numbers, movers, d):
                 twists[b, 3 + a] -= turn[a]
 
 
-@njit(error_model="numpy")
+@njit
 def begin_sweeps(bodies, numbers, x, before, J, vertices, weights, n):
     """Begin the sweeps of a pass.
 
@@ -150,7 +150,7 @@ def begin_sweeps(bodies, numbers, x, before, J, vertices, weights, n):
     set_three(numbers, ANSWER, answer)
 
 
-@njit(error_model="numpy")
+@njit
 def slip_of_bodies(bodies, numbers, twists):
     """The relative motion over the substep [m]."""
     x, y, z = three(numbers, SLIP)
@@ -165,13 +165,13 @@ def slip_of_bodies(bodies, numbers, twists):
     return (x, y, z)
 
 
-@njit(error_model="numpy")
+@njit
 def answer_of(numbers):
     """How the slip changes by a unit push [1/kg]."""
     return three(numbers, ANSWER)
 
 
-@njit(error_model="numpy")
+@njit
 def softness_along(numbers, t):
     """The square of the vector t (3,), times the change of the relative place along it by a unit impulse along it."""
     xx, yy, zz = three(numbers, SOFTNESS)
@@ -182,7 +182,7 @@ def softness_along(numbers, t):
     return dot((x, y, z), t)
 
 
-@njit(error_model="numpy")
+@njit
 def push_bodies(bodies, numbers, twists, J, n, more, d):
     """Move the bodies by the impulse more n + d [kg m], d along the surface."""
     for j in range(2):

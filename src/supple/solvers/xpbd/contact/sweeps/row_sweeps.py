@@ -34,7 +34,7 @@ from supple.solvers.xpbd.contact.sweeps.vertex_rows import begin_vertices, push_
 REMAINS = 0.3
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def solve_rows(x, x_prev, predicted, begun, movers, chosen, rows, prepared, h, limit, sweeps, depth):
     """Sweep over the chosen rows, in place.
 
@@ -147,7 +147,7 @@ def _remove_overlaps(x, x_prev, predicted, begun, movers, chosen, rows, prepared
     return smallest
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def note_shares(x_prev, predicted, points, rows, h):
     """Set which share of its force each row keeps: the part of a push that did not stop an approach.
 
@@ -173,7 +173,7 @@ def note_shares(x_prev, predicted, points, rows, h):
             shares[e] = share * kept_share(h2 * _fastest(rates, vertices, weights, e))
 
 
-@njit(error_model="numpy")
+@njit
 def _solve_rigid(bodies, numbers, k, moved, n, total, gap, friction, pushes, holds):
     """Solve row k, between rigid bodies, with their twists and J."""
     twists, J = moved
@@ -192,7 +192,7 @@ def _solve_rigid(bodies, numbers, k, moved, n, total, gap, friction, pushes, hol
     push_bodies(bodies, numbers, twists, J, n, more, d)
 
 
-@njit(error_model="numpy")
+@njit
 def _solve_vertices(numbers, k, x, vertices, weights, n, total, gap, friction, pushes, holds):
     """Solve row k, which moves vertices alone."""
     slip = slip_of_vertices(numbers, x, vertices, weights)
@@ -205,7 +205,7 @@ def _solve_vertices(numbers, k, x, vertices, weights, n, total, gap, friction, p
     push_vertices(numbers, x, vertices, (more * n[0] + d[0], more * n[1] + d[1], more * n[2] + d[2]))
 
 
-@njit(error_model="numpy")
+@njit
 def _solve_both(places, e, k, n, total, offset, gap, friction, pushes, holds):
     """Solve row k, which moves vertices and a rigid body."""
     x, x_prev, movers, vertices, weights = places
@@ -225,7 +225,7 @@ def _solve_both(places, e, k, n, total, offset, gap, friction, pushes, holds):
     apply_impulse(x, x_prev, movers, vertices, weights, e, d)
 
 
-@njit(error_model="numpy")
+@njit
 def _more_friction(slip, n, push, friction, total, k, holds):
     """Set the tangential impulse of row k, which answers with `total` [1/kg] along the slip; returns its change."""
     held = row(holds, k)

@@ -13,7 +13,7 @@ SHARES, MASSES, PLACE, ARMS, TURN = 0, 4, 8, 11, 23
 VERTEX_COLUMNS = 29
 
 
-@njit(error_model="numpy")
+@njit
 def prepare_vertices(numbers, inverse_masses, vertices, weights):
     """Set what remains the same in all passes of a substep, of the points (4,) of a row."""
     for i in range(4):
@@ -21,7 +21,7 @@ def prepare_vertices(numbers, inverse_masses, vertices, weights):
         numbers[SHARES + i] = weights[i] * inverse_masses[vertices[i]]
 
 
-@njit(error_model="numpy")
+@njit
 def begin_vertices(numbers, x_prev, vertices, weights):
     """Begin the sweeps of a pass at the beginning of the substep x_prev (n, 3) [m]; returns r_prev."""
     place, center, held = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False
@@ -51,7 +51,7 @@ def begin_vertices(numbers, x_prev, vertices, weights):
     return place
 
 
-@njit(error_model="numpy")
+@njit
 def slip_of_vertices(numbers, x, vertices, weights):
     """The relative motion over the substep, at its end x (n, 3) [m]."""
     slip = three(numbers, PLACE)
@@ -62,7 +62,7 @@ def slip_of_vertices(numbers, x, vertices, weights):
     return slip
 
 
-@njit(error_model="numpy")
+@njit
 def push_vertices(numbers, x, vertices, d):
     """Displace the points by the impulse d [kg m], with both momenta conserved."""
     m = cross(d, three(numbers, PLACE))
