@@ -17,9 +17,7 @@ IMPORT_NAMES = {
     "fast-simplification": "fast_simplification",
     "imageio-ffmpeg": "imageio_ffmpeg",
     "lazy-loader": "lazy_loader",
-    "mapbox-earcut": "mapbox_earcut",
     "pillow": "PIL",
-    "pydantic-core": "pydantic_core",
     "pyyaml": "yaml",
     "usd-core": "pxr",
 }

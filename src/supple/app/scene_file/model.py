@@ -5,9 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
-
-UNKNOWN_KEY = "unknown_key"
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -18,6 +15,14 @@ Name = Annotated[str, Field(min_length=1, max_length=100)]
 Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 Index = Annotated[int, Field(ge=0, lt=2**31)]
 FilePath = Annotated[str, Field(min_length=1, max_length=1000)]
+
+
+class UnknownKeyError(ValueError):
+    """A key that is not one of the known ones."""
+
+    def __init__(self, key: str, known: list[str]) -> None:
+        super().__init__(f"unknown key {key}")
+        self.key, self.known = key, known
 
 
 class Model(BaseModel):
@@ -35,8 +40,7 @@ class Model(BaseModel):
         if isinstance(data, dict):
             for key in data:
                 if key not in cls.model_fields:
-                    context = {"key": key, "known": list(cls.model_fields)}
-                    raise PydanticCustomError(UNKNOWN_KEY, "unknown key {key}", context)
+                    raise UnknownKeyError(key, list(cls.model_fields))
         return data
 
     @model_validator(mode="after")

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from supple.app.scene_file.model import UNKNOWN_KEY
+from supple.app.scene_file.model import UnknownKeyError
 from supple.app.scene_file.yaml_reader import Key, YamlDocument, printable
 from supple.errors import SceneError
 
@@ -41,8 +41,9 @@ def _keys_in(data: Any, loc: Sequence[int | str]) -> tuple[tuple[Key, ...], str 
 
 def _describe(keys: tuple[Key, ...], absent: str | None, item: Any) -> tuple[tuple[Key, ...], str]:
     kind, context, value = item["type"], item.get("ctx", {}), item.get("input")
-    if kind == UNKNOWN_KEY:
-        return (*keys, context["key"]), f"unknown key; {suggestion(context['key'], context['known'])}"
+    error = context.get("error")
+    if isinstance(error, UnknownKeyError):
+        return (*keys, error.key), f"unknown key; {suggestion(error.key, error.known)}"
     if kind == "missing":
         return keys, f"the key `{absent}` is missing; add it"
     if kind == "union_tag_not_found":

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import mapbox_earcut
+from collections import deque
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -92,14 +93,34 @@ def _with_concave_cut(
 def ear_clipped(polygon: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.int64] | None:
     """Triangles (k - 2, 3) of a simple, nearly flat polygon (k, 3); None where it crosses itself.
 
-    Source: ear clipping (Meisters 1975), by mapbox-earcut.
+    Source: ear clipping (Meisters 1975). A cut changes which corners are ears only beside it.
     """
     drop = int(np.abs(normal).argmax())
-    plane = polygon[:, [(drop + 1) % 3, (drop + 2) % 3]]
+    axes = [(drop + 1) % 3, (drop + 2) % 3]
+    plane = polygon[:, axes if normal[drop] > 0.0 else axes[::-1]]  # counter-clockwise
     plane = plane / (np.abs(plane).max() or 1.0)  # products of coordinates must not overflow
-    flat = mapbox_earcut.triangulate_float64(plane, np.array([len(plane)], dtype=np.uint32))
-    triangles = flat.reshape(-1, 3).astype(np.int64)
-    if len(triangles) != len(polygon) - 2:
-        return None
-    a, b, c = polygon[triangles].transpose(1, 0, 2)
-    return triangles[:, ::-1] if (np.cross(b - a, c - a) @ normal).sum() < 0.0 else triangles
+    count = len(plane)
+    corners = np.arange(count)
+    before, after = np.roll(corners, 1), np.roll(corners, -1)
+    into, out = plane - plane[before], plane[after] - plane
+    hollow = plane[into[:, 0] * out[:, 1] <= into[:, 1] * out[:, 0]]  # only these corners can be in an ear
+    waiting, triangles, cut = deque(corners.tolist()), [], set()
+    while waiting and len(triangles) < count - 2:
+        k = waiting.popleft()
+        ear = [before[k], k, after[k]]
+        if k not in cut and _is_ear(plane[ear], hollow):
+            triangles.append(ear)
+            cut.add(k)
+            after[before[k]], before[after[k]] = after[k], before[k]
+            waiting += (int(before[k]), int(after[k]))
+    return np.array(triangles) if len(triangles) == count - 2 else None
+
+
+def _is_ear(ear: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    """Whether three corners (3, 2) turn left, and none of the others (n, 2) at another place is in their triangle."""
+    edges = np.roll(ear, -1, axis=0) - ear
+    if edges[0, 0] * edges[1, 1] <= edges[0, 1] * edges[1, 0]:
+        return False
+    apart = others[:, None] - ear
+    within = (edges[:, 0] * apart[..., 1] >= edges[:, 1] * apart[..., 0]).all(axis=1)
+    return not (within & apart.any(axis=2).all(axis=1)).any()
