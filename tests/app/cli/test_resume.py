@@ -106,13 +106,14 @@ def test_signals_of_a_process(folder, number):
     arguments = [sys.executable, "-m", "supple", "run", "scene.yaml", "--steps", "1000000", "-q"]
     # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
     heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
-    process = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
     deadline = time.monotonic() + 120
     while not (folder / "out" / "recording.vtkhdf").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
     process.send_signal(number)
-    err = process.communicate(timeout=120)[1]
-    assert process.returncode == ExitCode.INTERRUPTED
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, out) == (ExitCode.INTERRUPTED, "")
+    assert "interrupted" in err
     assert "Traceback" not in err
     frames = len(positions())
     assert main(["resume", "out", "-q", "--steps", str(frames + 2)]) == ExitCode.OK

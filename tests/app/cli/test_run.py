@@ -1,10 +1,6 @@
 """`supple run`: outputs and exit codes."""
 
 import os
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -187,25 +183,6 @@ def test_dt_may_be_a_fraction(folder):
     assert main(["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--steps", "2", "--dt", "1/30"]) == ExitCode.OK
     with read_recording("out/recording.vtkhdf") as recording:
         assert recording.times.tolist() == [0.0, 1 / 30, 2 / 30]
-
-
-@pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent otherwise elsewhere")
-def test_ctrl_c_of_a_process(folder):
-    arguments = [sys.executable, "-m", "supple", "run", "scene.yaml", "--steps", "1000000", "-q"]
-    # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
-    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
-    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
-    deadline = time.monotonic() + 120
-    while not (folder / "out" / "recording.vtkhdf").exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    time.sleep(0.2)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, "")
-    assert "interrupted" in err
-    assert "Traceback" not in err
-    with read_recording("out/recording.vtkhdf") as recording:
-        assert recording.times[-1] == pytest.approx((len(recording) - 1) / 60)
 
 
 def test_strict_fails_where_a_frame_did_not_converge(folder, capfd):

@@ -64,10 +64,8 @@ def test_two_frames_converge_and_every_claim_is_measured(name, kind):
     assert not all(claim.holds for claim in claims), "two frames are too few for all claims"
 
 
-def test_the_box_turns_over_when_it_should_and_not_by_other_equations(monkeypatch):
-    frames, claims = run(DEMOS["dzhanibekov"], "xpbd")
-    assert len(frames) == 600
-    assert all(claim.holds for claim in claims), claims
+def test_the_box_does_not_turn_over_by_other_equations(monkeypatch):
+    """`test_docs_programs.py` runs the whole demo, with the true ones."""
     true = dzhanibekov.spin_by_euler
     monkeypatch.setattr(dzhanibekov, "spin_by_euler", lambda inertia, times: true(inertia * [1.0, 1.0, 1.1], times))
     assert not run(DEMOS["dzhanibekov"], "xpbd", steps=320)[1][0].holds

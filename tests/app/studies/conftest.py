@@ -10,6 +10,7 @@ import time
 import pytest
 
 import supple as sp
+from supple.app.studies.workers import SUPERVISOR
 
 FALL_STEPS, FALL_DT = 10, 0.01
 
@@ -48,13 +49,14 @@ def cluster(tmp_path_factory):
     failures = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
     environment = os.environ | failures | {"PYTHONPATH": os.pathsep.join(sys.path)}
 
-    def start(module, *options):
-        command = [sys.executable, "-m", f"distributed.cli.{module}", "--scheduler-file", str(contact), *options]
+    def start(*command):
+        command = [*command, "--scheduler-file", str(contact), "--no-dashboard"]
         return subprocess.Popen(command, env=environment, stdout=log, stderr=log, cwd=folder)
 
-    started = [start("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")]
-    options = ("--nworkers", "2", "--nthreads", "1", "--memory-limit", "2GB", "--no-dashboard")
-    started.append(start("dask_worker", *options, "--local-directory", str(folder)))
+    scheduler = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    started = [start(*scheduler, "--host", "127.0.0.1", "--port", "0")]
+    options = "--nworkers 2 --nthreads 1 --memory-limit 2GB --local-directory"
+    started.append(start(*SUPERVISOR, *options.split(), str(folder)))
     while not contact.exists():
         assert started[0].poll() is None
         time.sleep(0.05)

@@ -189,7 +189,7 @@ def killing(marks: Path, victims: str):
             file.write("x")
         if case == 3 and (victims == "always" or mark.stat().st_size == 1):
             if victims == "supervisor too":
-                os.kill(os.getppid(), signal.SIGKILL)
+                os.kill(os.getsid(0), signal.SIGKILL)
             os.kill(os.getpid(), signal.SIGKILL)
         cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
         return sp.Scene([cube], gravity=(0, -1.0 * case, 0))

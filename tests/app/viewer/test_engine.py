@@ -184,30 +184,25 @@ def test_a_local_function_cannot_be_sent_and_the_message_names_the_remedy():
         Engine(small_source(obstacles=[floor]))
 
 
-def test_a_killed_process_is_reported_and_nothing_blocks():
-    engine = Engine(small_source())
-    os.kill(engine._process.pid, signal.SIGKILL)
+def test_a_killed_process_is_reported_and_nothing_blocks(fresh):
+    os.kill(fresh._process.pid, signal.SIGKILL)
     end = time.monotonic() + TIMEOUT
-    while engine.alive and time.monotonic() < end:
+    while fresh.alive and time.monotonic() < end:
         time.sleep(0.01)
-    assert engine.send(Play()) == 0
-    while engine.error is None and time.monotonic() < end:
+    assert fresh.send(Play()) == 0
+    while fresh.error is None and time.monotonic() < end:
         time.sleep(0.01)
-    assert "unexpectedly" in engine.error
-    assert engine.latest() is not None
+    assert "unexpectedly" in fresh.error
+    assert fresh.latest() is not None
     with pytest.raises(TimeoutError, match="unexpectedly"):
-        engine.wait_for(10**9, TIMEOUT)
+        fresh.wait_for(10**9, TIMEOUT)
     # It is started again from its source.
-    engine.restart()
-    assert engine.error is None
-    first = engine.latest()
+    fresh.restart()
+    assert fresh.error is None
+    first = fresh.latest()
     assert (first.frame, first.paused) == (0, True)
-    number = engine.send(Step(2))
-    end = time.monotonic() + TIMEOUT
-    while engine.latest().frame < 2 and time.monotonic() < end:
-        time.sleep(0.01)
-    assert (engine.latest().frame, engine.latest().applied) == (2, number)
-    engine.close()
+    number = fresh.send(Step(2))
+    assert until(fresh, lambda s: s.frame == 2, "2 steps").applied == number
 
 
 def test_a_process_that_reads_an_unguarded_program_ends_at_once(monkeypatch):

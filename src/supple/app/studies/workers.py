@@ -42,53 +42,25 @@ class Workers(ABC):
 
 
 class LocalWorkers(Workers):
-    """Workers on this machine. Each has an equal share of the cores and of the memory.
+    """Workers on this machine, under one supervisor. Each has an equal share of the cores and of the memory.
 
     Parameters
     ----------
-    count : number of processes; budget : memory of all together [bytes], None where it is unknown
+    count : number of workers; budget : memory of all together [bytes], None where it is unknown
     logs : folder for what the workers print
     """
 
     def __init__(self, client: Any, count: int, budget: int | None, scratch: Path, logs: Path) -> None:
         self.client = client
-        self._logs, self._scratch = logs, scratch
-        self._limit = budget // count if budget is not None else 0
-        self._threads = max(1, (os.cpu_count() or 1) // count)
-        self._processes: list[subprocess.Popen] = []
-        try:
-            for number in range(count):
-                self._processes.append(self._start(number))
-        except BaseException:
-            self.close()
-            raise
-
-    def able(self, bytes_needed: int) -> None:
-        return None  # all have the same limit, and `local_workers` made it large enough
-
-    def tend(self) -> None:
-        for number, process in enumerate(self._processes):
-            if process.poll() is not None:
-                self._processes[number] = self._start(number)
-
-    def close(self) -> None:
-        """End the workers at once."""
-        for process in self._processes:
-            process.terminate()
-        for process in self._processes:
-            try:
-                process.wait(timeout=10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-
-    def _start(self, number: int) -> subprocess.Popen:
-        threads = str(self._threads)
-        environment = os.environ | {
+        self._log = logs / "workers.log"
+        options = f"--nworkers {count} --nthreads 1 --memory-limit {budget // count if budget is not None else 0}"
+        options += " --no-dashboard --death-timeout 60 --local-directory"
+        self._command = [*SUPERVISOR, client.scheduler.address, *options.split(), str(scratch)]
+        self._environment = os.environ | {
             # The worker must find the same packages, and the module of a function, as this process.
             "PYTHONPATH": os.pathsep.join(os.path.abspath(entry) for entry in sys.path),
             "PYTHONIOENCODING": "utf-8",
-            **dict.fromkeys(_THREADS, threads),
+            **dict.fromkeys(_THREADS, str(max(1, (os.cpu_count() or 1) // count))),
             # A case has most of its memory in arrays of its own. The scheduler cannot move these to the disk, and a
             # pause would never end.
             "DASK_DISTRIBUTED__WORKER__MEMORY__TARGET": "False",
@@ -96,12 +68,29 @@ class LocalWorkers(Workers):
             "DASK_DISTRIBUTED__WORKER__MEMORY__PAUSE": "False",
             "DASK_DISTRIBUTED__WORKER__MEMORY__TERMINATE": str(_TERMINATE),
         }
-        command = [sys.executable, "-m", "distributed.cli.dask_worker", self.client.scheduler.address]
-        options = f"--nworkers 1 --nthreads 1 --memory-limit {self._limit} --no-dashboard --death-timeout 60"
-        with (self._logs / f"worker-{number + 1}.log").open("ab") as log:
+        self._process = self._started()
+
+    def able(self, bytes_needed: int) -> None:
+        return None  # all have the same limit, and `local_workers` made it large enough
+
+    def tend(self) -> None:
+        if self._process.poll() is not None:
+            self._process = self._started()
+
+    def close(self) -> None:
+        """End the workers at once."""
+        self._process.terminate()
+        try:
+            self._process.wait(timeout=10.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _started(self) -> subprocess.Popen:
+        with self._log.open("ab") as log:
             return subprocess.Popen(
-                [*command, *options.split(), "--local-directory", str(self._scratch)],
-                env=environment,
+                self._command,
+                env=self._environment,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -112,6 +101,16 @@ class LocalWorkers(Workers):
 
 
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
+# Workers are forks of a process that has all modules: a new one starts at once.
+_FORKING = """\
+import dask, distributed.cli.dask_worker, distributed.utils
+dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"})
+distributed.utils.get_mp_context().set_forkserver_preload(["supple.app.studies.run_case", "distributed"])
+distributed.cli.dask_worker.main()
+"""
+_FORKS = sys.platform == "linux"
+SUPERVISOR = [sys.executable, *(("-c", _FORKING) if _FORKS else ("-m", "distributed.cli.dask_worker"))]
+"""The command of what `distributed` starts workers with, and starts them again; its options follow."""
 
 
 class ClusterWorkers(Workers):
