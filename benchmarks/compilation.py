@@ -38,59 +38,40 @@ def first_frame(name: str) -> None:
     next(iter(sp.simulate(scene, solver, dt, 1)))
 
 
-class Compilations(event.Listener):
-    """Seconds of every compilation, without those of the functions that it calls, and of the passes."""
+class Clock(event.Listener):
+    """Seconds of every compilation, or of every pass, without those within it (`own`) and with them (`whole`)."""
 
     def __init__(self) -> None:
         self.open: list[list[Any]] = []
         self.own: Counter[str] = Counter()
         self.whole: Counter[str] = Counter()
         self.count: Counter[str] = Counter()
-        self.signatures: dict[str, list[str]] = {}
+        self.signatures: dict[str, list[str]] = {}  # of kernels
 
     def on_start(self, event):
-        """Begin to count for a function."""
+        """Begin to count."""
         self.open.append([time.process_time(), 0.0])
 
     def on_end(self, event):
-        """Count the time, and take it from what the caller's compilation took itself."""
+        """Count the time, and take it from that around it."""
         started, inner = self.open.pop()
         seconds = time.process_time() - started
         if self.open:
             self.open[-1][1] += seconds
-        function = event.data["dispatcher"].py_func
-        module = function.__module__.removeprefix("supple.")
-        name = f"{module}:{function.__name__}"
+        name = event.data.get("name")
+        if name is None:
+            function = event.data["dispatcher"].py_func
+            name = f"{function.__module__.removeprefix('supple.')}:{function.__name__}"
+            if not self.open:
+                self.signatures.setdefault(name, []).append(str(event.data["args"]))
         self.own[name] += seconds - inner
         self.whole[name] += seconds
         self.count[name] += 1
-        if not self.open:
-            self.signatures.setdefault(name, []).append(str(event.data["args"]))
-
-
-class Passes(event.Listener):
-    """Seconds in each pass, without those of passes within."""
-
-    def __init__(self) -> None:
-        self.open: list[list[Any]] = []
-        self.own: Counter[str] = Counter()
-
-    def on_start(self, event):
-        """Begin a pass."""
-        self.open.append([time.process_time(), 0.0])
-
-    def on_end(self, event):
-        """End a pass."""
-        started, inner = self.open.pop()
-        seconds = time.process_time() - started
-        if self.open:
-            self.open[-1][1] += seconds
-        self.own[event.data["name"]] += seconds - inner
 
 
 def report(name: str, rows: int | None) -> None:
     """Compile what the first frame of a scene needs, and print where the time went."""
-    compilations, passes = Compilations(), Passes()
+    compilations, passes = Clock(), Clock()
     event.register("numba:compile", compilations)
     event.register("numba:run_pass", passes)
     first_frame(name)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from types import FunctionType
 from typing import Any
@@ -11,6 +13,7 @@ import numba
 from numba.core import compiler, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.registry import CPUDispatcher
+from numba.core.targetconfig import ConfigStack
 
 
 class Flags(compiler.Flags):
@@ -21,7 +24,7 @@ class Flags(compiler.Flags):
     """
 
     # What functions inherit, see `numba.core.cpu.CPUTargetOptions.finalize`.
-    _INHERITED = ("nrt", "fastmath", "error_model", "forceinline")
+    INHERITED = ("nrt", "fastmath", "error_model", "forceinline")
 
     def __hash__(self) -> int:
         return 0  # Numba's own is the same for all flags, too: it sorts their names
@@ -30,7 +33,7 @@ class Flags(compiler.Flags):
         if not isinstance(other, Flags):
             return super().__eq__(other)
         return self._values == other._values or all(
-            getattr(self, name) == getattr(other, name) for name in self._INHERITED
+            getattr(self, name) == getattr(other, name) for name in self.INHERITED
         )
 
 
@@ -70,6 +73,38 @@ class _LinkedCompiler(compiler.Compiler):
             self.state.library = _LinkedLibrary(self.state.targetctx.codegen(), "inner function")
 
 
+_OPERATIONS: dict[tuple[Any, ...], tuple[Any, Any]] = {}  # signature and implementation of operations on numbers
+
+
+@contextmanager
+def _known_operations(context: Any) -> Iterator[None]:
+    """Meanwhile the types of an operation on numbers, such as a product of two floats, are found once.
+
+    Numba asks every implementation of the operation at every use; there are 30 times as many uses as operations.
+    """
+    resolve = context.resolve_function_type
+
+    def resolve_once(function: Any, args: Any, kws: Any) -> Any:
+        numbers = all(isinstance(each, (types.Number, types.Boolean)) for each in args)
+        if kws or not numbers or function.__class__ is not types.Function:
+            return resolve(function, args, kws)
+        flags = ConfigStack().top()
+        key = (function, args, *(str(getattr(flags, name)) for name in Flags.INHERITED))
+        if key not in _OPERATIONS:
+            signature = resolve(function, args, kws)
+            if signature is None:
+                return None
+            _OPERATIONS[key] = signature, function.get_impl_key(signature)
+        signature, function._impl_keys[signature.args] = _OPERATIONS[key]
+        return signature
+
+    context.resolve_function_type = resolve_once
+    try:
+        yield
+    finally:
+        context.resolve_function_type = resolve
+
+
 class KernelCompiler(compiler.Compiler):
     """Compiles functions that are called from Python, with inner functions of this module linked into them.
 
@@ -80,7 +115,8 @@ class KernelCompiler(compiler.Compiler):
         collects = gc.isenabled()
         gc.disable()
         try:
-            result = super().compile_extra(func)
+            with _known_operations(self.state.typingctx):
+                result = super().compile_extra(func)
         finally:
             if collects:
                 gc.enable()
