@@ -4,6 +4,7 @@ import ast
 import re
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pyte
 OWN = {"supple", "tests", "benchmarks", "trials"}
 
 
+@cache
 def imported_packages(folder):
     """Import name of each package outside the standard library, and one place that imports it."""
     found = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import shutil
 import subprocess
 import sys
@@ -37,7 +38,9 @@ def draw(folder: Path, *options: str, imports: str = "") -> list[str]:
     (folder / "conftest.py").write_bytes((TESTS / "conftest.py").read_bytes())
     (folder / "test_draws.py").write_text(imports + DRAWS, encoding="utf-8")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib", *options]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    command += ["-p", "_hypothesis_pytestplugin"]
+    environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # the others take a second to import
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     drawn = (folder / "drawn.txt").read_text(encoding="utf-8").splitlines()
     assert len(set(drawn)) > 40

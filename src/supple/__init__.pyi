@@ -47,7 +47,7 @@ from .results.recording.recorder import Recorder as Recorder
 from .scene import obstacles as obstacles
 from .scene.actuators.cable import Cable as Cable
 from .scene.actuators.cavity import Cavity as Cavity
-from .scene.actuators.gas import Gas as Gas
+from .scene.actuators.cavity import Gas as Gas
 from .scene.actuators.muscle import Muscle as Muscle
 from .scene.body import Body as Body
 from .scene.contact_pairs import ContactPair as ContactPair
@@ -80,9 +80,9 @@ from .scene.scene import Scene as Scene
 from .scene.selection import InBox as InBox
 from .scene.sensors import ForceSensor as ForceSensor
 from .scene.sensors import Taxels as Taxels
-from .scene.stitches.vertex_edge import VertexEdgeStitch as VertexEdgeStitch
+from .scene.stitches.springs import VertexEdgeStitch as VertexEdgeStitch
+from .scene.stitches.springs import VertexVertexStitch as VertexVertexStitch
 from .scene.stitches.vertex_triangle import SoftVertexTriangleStitch as SoftVertexTriangleStitch
-from .scene.stitches.vertex_vertex import VertexVertexStitch as VertexVertexStitch
 from .simulate import simulate as simulate
 from .solvers.implicit.contact.settings import IPCContact as IPCContact
 from .solvers.implicit.solver import Implicit as Implicit

@@ -9,7 +9,7 @@ from supple.errors import SceneError, SolverError
 from supple.materials.flows.internal import at_rest, count_of
 from supple.model.state import State
 from supple.model.system import build_system
-from supple.results.check.elastic_energy import elastic_energy
+from supple.results.check.stored_energies import elastic_energy
 from supple.results.checkpoint.file import Checkpoint, RunFacts, read_checkpoint, write_checkpoint
 from supple.results.export.exporter import export
 from supple.solvers.implicit.energies.elasticity import elasticity_of

@@ -9,7 +9,7 @@ from tests.derivatives import differences, gradient_of, hessian_product
 import supple as sp
 from supple.errors import SceneError, SolverError
 from supple.model.system import build_system
-from supple.results.check.elastic_energy import elastic_energy
+from supple.results.check.stored_energies import elastic_energy
 from supple.solvers.implicit.energies.elasticity import elasticity_of
 
 MOONEY = sp.MooneyRivlin(c10=1e5, c01=3e4, bulk=4e6)

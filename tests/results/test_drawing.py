@@ -9,10 +9,9 @@ import supple as sp
 from supple.mesh.surface import SurfaceMesh
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
-from supple.results.view.creases import split_at_creases, vertex_normals
 from supple.results.view.floor_shadow import FloorShadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame, view_of
-from supple.results.view.surfaces import body_surface, obstacle_surfaces
+from supple.results.view.surfaces import body_surface, obstacle_surfaces, split_at_creases, vertex_normals
 from supple.simulate import simulate
 
 

@@ -50,7 +50,7 @@ for attempt in range(children):
     if child == 0:
         record_without_end(path)
         os._exit(1)
-    wanted = chance.choice([0, 1, 2, 4, 5, 8, 12])
+    wanted = (0, 1, 2, 4, 5, 8, 12)[attempt % 7]
     while wanted and not (path.exists() and len(read_recording(path)) >= wanted):
         time.sleep(0.0002)
     time.sleep(chance.uniform(0.0, 0.01))
@@ -73,7 +73,7 @@ def test_the_recording_of_a_killed_writer_holds_every_complete_frame(tmp_path, t
     vtk, to_numpy = tools.vtk()
     rest = recorded[1][0].system.rest_positions[:27]
     counts = []
-    for path in _kill(tmp_path, 28):
+    for path in _kill(tmp_path, 14):
         with read_recording(path) as recording:
             counts.append(len(recording))
             for frame in (recording[0], recording[-1], recording[len(recording) // 2]):
@@ -94,7 +94,7 @@ def test_the_recording_of_a_killed_writer_holds_every_complete_frame(tmp_path, t
         reader.SetStep(counts[-1] - 1)
         reader.Update()
         np.testing.assert_array_equal(to_numpy(reader.GetOutput().GetPoints().GetData()), last)
-    assert len(counts) > 14
+    assert len(counts) > 7
     assert max(counts) > 8  # some files were copied to larger ones twice
 
 

@@ -9,9 +9,8 @@ from tests.recordings import replace_array, set_in_scene
 
 import supple as sp
 from supple.results.export.exporter import export
-from supple.results.view.creases import split_at_creases
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
-from supple.results.view.surfaces import body_surface
+from supple.results.view.surfaces import body_surface, split_at_creases
 from supple.scene.joints.conditions import Function
 from supple.scene.joints.joint import axes_along
 

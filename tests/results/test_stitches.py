@@ -7,7 +7,7 @@ import pytest
 import supple as sp
 from supple.model.system import initial_state
 from supple.results.plots import plot_recording
-from supple.results.view.layers.stitches import StitchView
+from supple.results.view.layers.connections import StitchView
 from supple.results.view.page import write_page
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 

@@ -10,7 +10,7 @@ import pytest
 from numba.core import types
 
 from supple.app.cli.commands.warm import import_kernels
-from supple.results.compile_bar import CompileBar
+from supple.results.progress import CompileBar
 from supple.runtime import kernel_count, kernel_list
 from supple.runtime.kernel_cache import KERNELS
 from supple.runtime.kernel_list import as_json, from_json, kernels_of_scenes, text_of, write_list

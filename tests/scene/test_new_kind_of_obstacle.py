@@ -19,7 +19,7 @@ from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.kinds.forms import POSITIVE
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
-from supple.results.view.layers.obstacles import ObstacleView
+from supple.results.view.layers.surfaces import ObstacleView
 from supple.results.view.surfaces import obstacle_surfaces
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.polyhedra import hull, round_ball

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.mesh.primitives import gummy_bear as bear
-from supple.mesh.primitives.curved import of_order
+from supple.mesh.primitives.filling import of_order, tets_between_layers
 from supple.mesh.primitives.gummy_bear import gummy_bear_surface
 from supple.mesh.primitives.isosurface_stuffing import stuff
-from supple.mesh.primitives.layers import tets_between_layers
 from supple.mesh.primitives.sizes import check_torus, counts, fits, lengths, not_too_many, positive
 from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
 from supple.mesh.surface import SurfaceMesh

@@ -8,7 +8,7 @@ from supple.app.viewer.engine.measurement.contact_points import contact_points
 from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import build_system
-from supple.results.readings.tet_values import QUANTITIES, tet_values
+from supple.results.readings.tet_readings import QUANTITIES, tet_values
 
 
 def cube_system(material, **parts):

@@ -18,7 +18,7 @@ from supple.app.cli.exit_codes import ExitCode
 from supple.app.cli.interrupts import ended_as_by_ctrl_c
 from supple.app.cli.print_error import print_error
 from supple.errors import SuppleError
-from supple.results.compile_bar import CompileBar
+from supple.results.progress import CompileBar
 
 app = App(
     name="supple",

@@ -13,7 +13,7 @@ from supple.mesh.skin import Embedding
 from supple.mesh.tetmesh import TetMesh
 from supple.results.recording.scene import RecordedObstacle
 from supple.results.recording.skinned_surface import SkinnedSurface
-from supple.results.view.bounds import View
+from supple.results.view.camera import View
 from supple.results.view.model import Model, ModelBody, Moment
 
 

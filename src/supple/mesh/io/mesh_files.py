@@ -14,12 +14,12 @@ from supple.errors import MeshError
 from supple.mesh.checked_arrays import vertex_array
 from supple.mesh.io import abaqus, obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.cells import CellSoup, FormatError, MeshFile, tets_of
-from supple.mesh.io.file_contents import file_contents
 from supple.mesh.io.libraries.meshio import read_msh, write_msh
 from supple.mesh.io.libraries.trimesh import read_glb
 from supple.mesh.io.libraries.usd import USD_SUFFIXES, read_usd, write_usd
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
+from supple.mesh.io.text import file_contents
 from supple.mesh.merge import merge_map
 from supple.mesh.topology import has_vertex_twice, repeats_another, without_unused
 from supple.runtime.replacing import whole_files

@@ -122,5 +122,5 @@ def _is_ear(ear: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
     if edges[0, 0] * edges[1, 1] <= edges[0, 1] * edges[1, 0]:
         return False
     apart = others[:, None] - ear
-    within = (edges[:, 0] * apart[..., 1] >= edges[:, 1] * apart[..., 0]).all(axis=1)
-    return not (within & apart.any(axis=2).all(axis=1)).any()
+    within = (edges[:, 0] * apart[..., 1] >= edges[:, 1] * apart[..., 0]).all(axis=-1)
+    return not (within & apart.any(axis=-1).all(axis=-1)).any()

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.mesh.io.file_contents import file_contents
+from supple.mesh.io.text import file_contents
 
 _COMMENT = re.compile(rb"#[^\n]*")
 _WHOLE_NUMBER = re.compile(r"[+-]?[0-9]+")

@@ -10,18 +10,15 @@ import numpy as np
 
 from supple.results.check.checks.budgets import Balance, Energy, Momentum, Spin
 from supple.results.check.checks.contact import Containment, Distance, Intersection, Obstacles
-from supple.results.check.checks.joints import Joints
+from supple.results.check.checks.joints import Joints, Welds
 from supple.results.check.checks.plain_values import CONSTANTS, Converged, Finite, Sequence
 from supple.results.check.checks.records import Records
-from supple.results.check.checks.rigidity import Rigidity
-from supple.results.check.checks.tets import Inversion, RestShape, Volume
-from supple.results.check.checks.welds import Welds
+from supple.results.check.checks.tets import Inversion, RestShape, Rigidity, Volume
 from supple.results.check.checks.works import Works
-from supple.results.check.frame_check import FrameCheck
+from supple.results.check.frame_check import FrameCheck, skipped
 from supple.results.check.report import CheckReport, CheckResult
 from supple.results.check.settings import CheckSettings
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.check.tally import skipped
 from supple.results.recording.reader import Recording, opened
 
 CHECKS: tuple[type[FrameCheck], ...] = (

@@ -11,16 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
-from supple.results.check.actuator_works import ActuatorState, actuator_states
-from supple.results.check.elastic_energy import elastic_energy
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.results.check.geometry.orientation import volume_signs
 from supple.results.check.geometry.surface_pairs import meeting_pairs
-from supple.results.check.load_forces import add_muscle_forces, load_forces
-from supple.results.check.seams import seam_keys
-from supple.results.check.stitch_energy import stitch_energy
-from supple.results.check.surfaces import Surfaces
+from supple.results.check.load_forces import ActuatorState, actuator_states, add_muscle_forces, load_forces
+from supple.results.check.stored_energies import elastic_energy, stitch_energy
+from supple.results.check.surfaces import Surfaces, seam_keys
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
 

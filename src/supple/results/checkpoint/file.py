@@ -18,8 +18,7 @@ from supple.errors import OutputError
 from supple.materials.flows.internal import COLUMNS
 from supple.model.state import State
 from supple.results.checkpoint.memories import MEMORIES
-from supple.results.checkpoint.typed import Known, check
-from supple.results.checkpoint.values import decoded, described, encoded, restored
+from supple.results.checkpoint.values import Known, check, decoded, described, encoded, restored
 from supple.runtime.replacing import whole_file
 
 _FORMAT = b"supple checkpoint 1\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from supple.errors import OutputError
-from supple.results.export.film import Film
+from supple.results.export.video import Film
 from supple.results.recording.reader import Recording, opened
 from supple.results.recording.recorder import SUFFIXES as RECORDING_SUFFIXES
 from supple.runtime.replacing import refuse_to_replace

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.recording.reader import Recording
-from supple.results.view.creases import vertex_normals
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.model import Moment
-from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of
+from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 from supple.runtime.replacing import whole_file
 
 logger = logging.getLogger(__name__)

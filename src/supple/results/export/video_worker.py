@@ -13,16 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SuppleError
-from supple.results.export.film import COLORS, Film
+from supple.results.export.video import COLORS, Film
 from supple.results.recording.reader import Recording, read_recording
 from supple.results.view.camera import eye_of
-from supple.results.view.color_scale import Limits, Range
-from supple.results.view.creases import vertex_normals
-from supple.results.view.fields import Field
+from supple.results.view.fields import Field, Limits, Range
 from supple.results.view.floor_shadow import FloorShadow, floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.model import Model, Moment
-from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of
+from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
 _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}

@@ -18,12 +18,34 @@ from supple.materials.elastic_tets.stress import (
     volume_ratios,
     von_mises,
 )
-from supple.materials.flows.internal import DISSIPATED, FLOW, checked
+from supple.materials.flows.internal import DISSIPATED, FLOW, NEVER_FLOWED, checked
 from supple.materials.laws.hencky import HENCKY
 from supple.materials.per_tet import LawTets
 from supple.numerics.svd3 import principal_stretches
 from supple.results.readings.by_body import BodyRows, TetField
 from supple.runtime.displayed import DisplayedFrame
+
+QUANTITIES = ("J", "von_mises", "energy")
+
+
+@np.errstate(all="ignore")
+def tet_values(
+    laws: TetLaws, positions: NDArray[np.float64], quantity: str, internal: NDArray[np.float64] = NEVER_FLOWED
+) -> NDArray[np.float64]:
+    """(m,) of every tet: "J" [-], "von_mises" stress [Pa], or "energy" density per rest volume [J/m^3].
+
+    internal : of the state, see `State`
+
+    NaN where the tet has no law, or holds something rigid and a stress is asked for.
+    """
+    x = np.ascontiguousarray(positions)
+    F = mean_deformation_gradients(laws, x)
+    if quantity == "J":
+        return volume_ratios(laws, x, F)
+    if quantity == "energy":
+        return energy_densities(laws, x, F, internal)
+    return von_mises(cauchy_of_tets(laws, x, first_piolas(laws, x, F, internal), F, internal))
+
 
 _OF_RIGID = "is rigid: it has no strain and no stress of its own"
 _NO_LAW = "has no known elastic law, so it has no {}; give it an elastic material such as StableNeoHookean"

@@ -1,6 +1,7 @@
 """What a recording keeps of the solver's details: one series of fixed size for each field that `SolverDetails` keeps.
 
 A number is one value, with NaN for None. A mapping is one row for each of its names, in an order that the header gives.
+A sensor is one series too.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.model.state import SolverDetails
+from supple.results.readings.sensor_readings import numbers_shape
 from supple.results.recording.file import Series
+from supple.scene.scene import Scene
 
 
 def _kinds() -> dict[str, type[SolverDetails]]:
@@ -100,3 +103,32 @@ def _field_like(name: str, value: Any) -> RecordedField:
         rows = [np.asarray(row) for row in value.values()]
         return RecordedField(name, "<f8", tuple(value), rows[0].shape if rows else ())
     return RecordedField(name, "<i8" if isinstance(value, (int, np.integer)) else "<f8")
+
+
+@dataclass(frozen=True)
+class RecordedSensor:
+    """One sensor.
+
+    Attributes
+    ----------
+    number : in the scene; name : of the sensor
+    shape : of its numbers; see `numbers` of the readings
+    """
+
+    number: int
+    name: str
+    shape: tuple[int, ...]
+
+    @property
+    def is_grid(self) -> bool:
+        """Whether the sensor is a grid of taxels."""
+        return len(self.shape) == 3
+
+    @property
+    def series(self) -> Series:
+        return Series(f"supple/frames/sensors/{self.number}", 1, self.shape)
+
+
+def recorded_sensors(scene: Scene) -> tuple[RecordedSensor, ...]:
+    """The sensors of a scene."""
+    return tuple(RecordedSensor(k, sensor.name, numbers_shape(sensor)) for k, sensor in enumerate(scene.sensors))

@@ -13,13 +13,10 @@ from supple.model.state import Status
 from supple.model.system import BodyRange, System
 from supple.results.frame import Frame
 from supple.results.readings.fields import Field
-from supple.results.recording.actions.actuators import cables_of, cavities_of
-from supple.results.recording.actions.joints import joints_of
-from supple.results.recording.actions.stitches import recorded_stitches
-from supple.results.recording.details import RecordedDetails
+from supple.results.recording.actions import cables_of, cavities_of, joints_of, recorded_stitches
+from supple.results.recording.details import RecordedDetails, recorded_sensors
 from supple.results.recording.physics import recorded_physics, recorded_welds, untouching_pairs
 from supple.results.recording.scene import QuadraticRows, RecordedBody, RecordedObstacle, RecordedScene
-from supple.results.recording.sensors import recorded_sensors
 from supple.results.recording.skinned_surface import SkinnedSurface
 from supple.scene.rigid.rigid_body import RigidBody
 

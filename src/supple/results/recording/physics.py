@@ -22,7 +22,7 @@ from supple.materials.own.formula_law import FormulaLaw
 from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, Law, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.model.system import System
-from supple.results.checkpoint.typed import Rows
+from supple.results.checkpoint.values import Rows
 from supple.scene.contact_pairs import pair_table
 from supple.scene.joints.axis_joint import AxisJoint
 

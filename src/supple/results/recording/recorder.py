@@ -20,11 +20,10 @@ from supple.model.state import Status
 from supple.model.system import System
 from supple.results.frame import Frame
 from supple.results.readings.fields import Field, checked_fields, cost
-from supple.results.recording.details import RecordedDetails
+from supple.results.recording.details import RecordedDetails, RecordedSensor, recorded_sensors
 from supple.results.recording.file import TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.results.recording.from_system import recorded_scene, write_grid
 from supple.results.recording.scene import RecordedScene, write_scene
-from supple.results.recording.sensors import RecordedSensor, recorded_sensors
 from supple.runtime.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
 
 logger = logging.getLogger(__name__)

@@ -21,15 +21,17 @@ from supple.materials.own.formula import Formula
 from supple.mesh.surface import SurfaceMesh
 from supple.model.loads.applied import LoadPattern
 from supple.model.state import Status
-from supple.results.checkpoint.typed import Known, Rows, Sizes, check
-from supple.results.checkpoint.values import decoded, encoded
-from supple.results.recording.actions.actuators import RecordedCable, RecordedCavity
-from supple.results.recording.actions.joints import RecordedJoint
-from supple.results.recording.actions.stitches import RecordedStitches, StitchLaws
+from supple.results.checkpoint.values import Known, Rows, Sizes, check, decoded, encoded
+from supple.results.recording.actions import (
+    RecordedCable,
+    RecordedCavity,
+    RecordedJoint,
+    RecordedStitches,
+    StitchLaws,
+)
 from supple.results.recording.checked_hdf5 import CheckedFile
-from supple.results.recording.details import RecordedDetails, RecordedField
+from supple.results.recording.details import RecordedDetails, RecordedField, RecordedSensor
 from supple.results.recording.physics import RecordedLaw, RecordedPhysics, RecordedWeld
-from supple.results.recording.sensors import RecordedSensor
 from supple.results.recording.skinned_surface import SkinnedSurface
 from supple.scene.joints.conditions import Conditions, Function
 from supple.scene.obstacles.obstacle import Obstacle

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.skin import mixed
-from supple.results.checkpoint.typed import Rows
+from supple.results.checkpoint.values import Rows
 
 
 @dataclass(frozen=True, eq=False)

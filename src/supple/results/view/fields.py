@@ -1,7 +1,8 @@
-"""Fields on tets for coloring."""
+"""Fields that color bodies: J, von Mises stress and energy density; and their color scales."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.deformation import determinants
-from supple.results.readings.tet_values import tet_values
+from supple.results.readings.tet_readings import tet_values
 from supple.results.view.model import Moment
 
 
@@ -66,3 +67,68 @@ FIELDS = {
         Field("energy", "energy density", "J/m^3", None, energy_density),
     )
 }
+
+
+BINS = 16  # colors of a scale; each is one mesh on the page, because a mesh has one color
+NOT_KNOWN_COLOR = (150, 152, 158)
+# A scale grows immediately, and shrinks only where less than this share of it is used: otherwise its ends flicker.
+_SHRINK_BELOW = 0.3
+
+
+def palette(field: Field) -> NDArray[np.uint8]:
+    """(BINS, 3) colors: from blue over white to red where the field has a center, otherwise from dark to bright."""
+    from matplotlib import colormaps
+
+    colors = colormaps["RdBu" if field.center is not None else "viridis"](np.linspace(0.0, 1.0, BINS))
+    return np.round(255.0 * np.asarray(colors)[:, :3]).astype(np.uint8)
+
+
+def bin_of(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.int64]:
+    """The color (0 to BINS - 1) of each value; BINS where it is not finite."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        place = np.floor((values - low) / (high - low) * BINS)
+    known = np.isfinite(values)
+    return np.where(known, np.clip(np.where(known, place, 0.0), 0, BINS - 1), BINS).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Range:
+    """How the ends of a scale are found.
+
+    Attributes
+    ----------
+    share : of the values within the scale; the others have the colors of its ends
+    fixed : (low, high) instead, or None
+    """
+
+    share: float = 0.98
+    fixed: tuple[float, float] | None = None
+
+
+class Limits:
+    """The ends of a scale: fixed, or round numbers that follow the displayed values in steps."""
+
+    def __init__(self, field: Field, ends: Range) -> None:
+        self.field, self.ends = field, ends
+        self._reach = 0.0
+
+    def follow(self, values: NDArray[np.float64]) -> tuple[float, float] | None:
+        """(low, high) for these values (m,); None where no value is known."""
+        center = self.field.center
+        finite = values[np.isfinite(values)]
+        if not len(finite):
+            return None
+        if self.ends.fixed is not None:
+            return self.ends.fixed
+        away = np.abs(finite - center) if center is not None else finite
+        needed = float(np.quantile(away, self.ends.share))
+        needed = round_up(max(needed, 0.02 if center is not None else 1e-9))
+        if needed > self._reach or needed < _SHRINK_BELOW * self._reach:
+            self._reach = needed
+        return (0.0, self._reach) if center is None else (center - self._reach, center + self._reach)
+
+
+def round_up(value: float) -> float:
+    """The next of 1, 2, 5, 10, 20, 50, ..."""
+    scale = 10.0 ** math.floor(math.log10(value))
+    return next(scale * step for step in (1.0, 2.0, 5.0, 10.0) if scale * step >= value * (1.0 - 1e-12))

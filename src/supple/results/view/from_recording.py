@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
-from supple.results.view.bounds import View
+from supple.results.view.camera import View
 from supple.results.view.model import Model, ModelBody, Moment
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from supple.results.view.color_scale import Range
+from supple.results.view.fields import Range
 
 SURFACES = ("skin", "wireframe", "tets", "exploded tets", "cut")
 COLOR_BY_BODY = "body"

@@ -11,19 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.results.view.camera import set_initial_camera
 from supple.results.view.fields import FIELDS, Field
+from supple.results.view.layers.arrows import ForceView, VelocityView
+from supple.results.view.layers.connections import PusherView, SpringView, StitchView
 from supple.results.view.layers.dots import Dots
-from supple.results.view.layers.forces import ForceView
-from supple.results.view.layers.ground import Ground
+from supple.results.view.layers.floor import Ground, ShadowView
 from supple.results.view.layers.joints import JointView
 from supple.results.view.layers.layer import Layer
-from supple.results.view.layers.obstacles import ObstacleView
 from supple.results.view.layers.section import Cut
-from supple.results.view.layers.shadow import ShadowView
-from supple.results.view.layers.skin import SkinView
-from supple.results.view.layers.springs import PusherView, SpringView
-from supple.results.view.layers.stitches import StitchView
+from supple.results.view.layers.surfaces import ObstacleView, SkinView
 from supple.results.view.layers.tets import TetView
-from supple.results.view.layers.velocities import VelocityView
 from supple.results.view.model import Model, Moment
 from supple.results.view.options import COLOR_BY_BODY, ViewOptions
 

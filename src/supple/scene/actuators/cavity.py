@@ -10,14 +10,46 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, Name, OneOf, Whole
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name, OneOf, Whole
 from supple.kinds.kind import Kind
 from supple.mesh.voids import enclosed_voids, is_closed, signed_volumes
-from supple.scene.actuators.gas import Gas
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Rows, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
 from supple.scene.rigid.rigid_body import RigidBody
+
+AMOUNT = OverTimeOf(bounds=POSITIVE)
+GAS_CONSTANT = 8.31446261815324  # [J/(mol K)], exact by definition
+
+
+@dataclass(frozen=True, eq=False)
+class Gas(Kind):
+    """An ideal gas: p V^gamma is constant for a constant amount, and p V0 = n R T in the volume V0 at the start.
+
+    Parameters
+    ----------
+    amount : n [mol]; a number, a `Curve`, or a function of time; None for the amount that has the pressure
+        `ambient` at the start.
+    temperature : T at the volume of the start [K].
+    gamma : 1 for constant temperature; the ratio of specific heats, 1.4 for air, where no heat is exchanged.
+    ambient : pressure outside of the body [Pa]; 0 in a vacuum.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or out of range.
+    """
+
+    kind: ClassVar[str] = "gas"
+
+    amount: Annotated[OverTime | None, AMOUNT] = None
+    temperature: Annotated[float, POSITIVE] = 293.15
+    gamma: Annotated[float, POSITIVE] = 1.0
+    ambient: Annotated[float, NON_NEGATIVE] = 101325.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.amount is None and self.ambient == 0.0:
+            raise SceneError("gas: ambient is 0, so that there is no gas at the start; give the amount")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """A rigid body: a solid with a mass, its placement and its initial velocity.
 
-What moves are its four control points, the vertices of one tet (see `control_points`). The energy
+What moves are its four control points, the vertices of one tet (see `ControlPoints`). The energy
 
     kappa V |F^T F - 1|^2
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,9 +28,44 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
-from supple.scene.rigid.control_points import control_points
 from supple.scene.rigid.mass_properties import MassProperties, of_solid, with_inertia, with_mass
 from supple.scene.rigid.pose import deformation_of
+
+_CORNERS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0]])
+
+
+class ControlPoints(NamedTuple):
+    """The control points, and the points of a surface as combinations of them.
+
+    An affine motion x = A X + t is that of four points, and every point of the body is a combination of them. They lie
+    at
+
+        c + S^(1/2) v_k,   v = (1, 1, 1), (1, -1, -1), (-1, -1, 1), (-1, 1, -1),
+
+    with the center c and the second moment per mass S, and each has a quarter of the mass. Since sum v_k = 0 and
+    sum v_k v_k^T = 4 1, their mass, center and second moment are the body's, and so are the kinetic energy, the
+    momentum and the angular momentum of every affine motion.
+
+    Source: Lan et al., "Affine Body Dynamics" (2022), section 3, with points instead of the coefficients A and t.
+
+    Attributes
+    ----------
+    mesh : one tet with the control points as its vertices
+    weights : (s, 4); each row sums to 1
+    """
+
+    mesh: TetMesh
+    weights: NDArray[np.float64]
+
+
+def control_points(properties: MassProperties, surface: NDArray[np.float64]) -> ControlPoints:
+    """The control points of a body, and the weights of points (s, 3) given in its own coordinates [m]."""
+    squares, axes = np.linalg.eigh(properties.second_moment / properties.mass)
+    lengths = np.sqrt(squares)
+    root, inverse = (axes * lengths) @ axes.T, (axes / lengths) @ axes.T
+    mesh = TetMesh(properties.center + _CORNERS @ root, [[0, 1, 2, 3]])
+    return ControlPoints(mesh, 0.25 + 0.25 * (surface - properties.center) @ inverse @ _CORNERS.T)
+
 
 # Positions that are given for the surface must be a rigid motion of it, up to round-off in what a user computed and the
 # orthogonality error of a solver.

@@ -14,7 +14,7 @@ import pytest
 import supple as sp
 from supple.app.viewer.protocol.commands import Watch
 from supple.app.viewer.protocol.snapshots import BodyDescription, Measures, SceneDescription, Snapshot, Timing
-from supple.results.recording.actions.stitches import no_stitches
+from supple.results.recording.actions import no_stitches
 from supple.results.recording.scene import RecordedObstacle
 
 TOKEN = "the-token-of-the-tests"

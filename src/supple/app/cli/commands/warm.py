@@ -35,8 +35,7 @@ def warm(
     processes
         Number of processes; without it, one for each core that this process may use.
     """
-    from supple.results.compile_bar import kernel_bar
-    from supple.results.progress import error_console
+    from supple.results.progress import error_console, kernel_bar
     from supple.runtime.kernel_list import compile_kernel, kernels_of_scenes
 
     known = kernels_of_scenes()

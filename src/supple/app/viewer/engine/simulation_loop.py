@@ -27,7 +27,7 @@ from supple.app.viewer.protocol.snapshots import Notice, Snapshot
 from supple.contact.mesh.obstacle_poses import ObstaclePoses
 from supple.errors import SuppleError
 from supple.model.state import State
-from supple.results.readings.tet_values import tet_values
+from supple.results.readings.tet_readings import tet_values
 
 logger = logging.getLogger(__name__)
 

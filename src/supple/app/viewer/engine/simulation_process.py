@@ -36,7 +36,7 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
     from supple.app.viewer.engine.scene.live_scene import LiveScene
     from supple.app.viewer.engine.simulation_loop import SimulationLoop
     from supple.app.viewer.protocol.outbox import ERROR, Outbox, packed
-    from supple.results.compile_bar import CompileBar
+    from supple.results.progress import CompileBar
 
     try:
         live = LiveScene(source)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from supple.app.viewer.protocol.parameters import Value
 from supple.model.diagnostics import Diagnostics
 from supple.results.readings.joint_readings import JointReading
-from supple.results.recording.actions.joints import RecordedJoint
-from supple.results.recording.actions.stitches import RecordedStitches
+from supple.results.recording.actions import RecordedJoint, RecordedStitches
 from supple.results.recording.scene import RecordedObstacle
 
 RIGID = "rigid"  # instead of a material

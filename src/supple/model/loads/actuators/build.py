@@ -15,8 +15,7 @@ from supple.model.loads.actuators.cable_length import CableLength
 from supple.model.loads.actuators.enclosed_volume import EnclosedVolume
 from supple.model.loads.actuators.laws import ElasticCable, GivenForce, GivenGas, GivenValue, Law
 from supple.scene.actuators.cable import Cable
-from supple.scene.actuators.cavity import Cavity
-from supple.scene.actuators.gas import AMOUNT, GAS_CONSTANT
+from supple.scene.actuators.cavity import AMOUNT, GAS_CONSTANT, Cavity
 from supple.scene.body import PlacedBody
 from supple.scene.loads.over_time import Curve, OverTime, script_of
 

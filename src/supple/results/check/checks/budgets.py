@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.check.elastic_energy import stiffness_scale
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.report import CheckResult
 from supple.results.check.snapshot import Scene, Snapshot
+from supple.results.check.stored_energies import stiffness_scale
 from supple.results.recording.reader import Recording
 
 # Motion slower than this share of a body's size per step, and energy of the same share, is round-off.

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from supple.results.check.elastic_energy import stiffness_scale
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.snapshot import Snapshot, edge_vectors
-from supple.results.check.stitch_energy import stitch_scale
+from supple.results.check.stored_energies import stiffness_scale, stitch_scale
 
 # Allowed difference, as a share of the natural size of each quantity; both sides are computed in double precision.
 _SAME = 1e-9

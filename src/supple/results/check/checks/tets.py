@@ -1,4 +1,4 @@
-"""Checks of the tetrahedra: at rest, in every frame, and of the volumes of the bodies."""
+"""Checks of the tetrahedra, at rest and in every frame; of the volumes of bodies; and of the shapes of rigid ones."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.materials.stable_neo_hookean import StableNeoHookean
-from supple.results.check.elastic_energy import growth_of
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.orientation import volume_signs
 from supple.results.check.snapshot import Snapshot, edge_vectors
+from supple.results.check.stored_energies import growth_of
 
 NEARLY_INCOMPRESSIBLE = 0.45
 GENEROUS_VOLUME_CHANGE = 0.5
@@ -100,3 +100,28 @@ class Volume(FrameCheck):
             rest = float(volumes @ growth_of(at.active, len(at.J))[1][body.tets]) if at.active else self._rest[k]
             change = abs(float(volumes @ at.J[body.tets]) / rest - 1.0)
             self.tally.see(at, change, not change <= self._limits[k], body.name)
+
+
+class Rigidity(FrameCheck):
+    """|F^T F - 1| of every rigid body, with F the least-squares fit x = F X + t of its surface's vertices."""
+
+    name = "rigidity"
+    good = "largest error |F^T F - 1| {worst}"
+    bad = "a rigid body is deformed by {worst}"
+
+    def begin(self) -> None:
+        rigid = [body for body in self.scene.recording.bodies if body.rigid]
+        if not rigid:
+            self.why_not = "the scene has no rigid body"
+        self._rest = [(body, body.points(self.scene.recording.rest_positions)) for body in rigid]
+
+    def see(self, at: Snapshot) -> None:
+        for body, rest in self._rest:
+            X = rest - rest.mean(axis=0)
+            x = body.points(at.positions)
+            x = x - x.mean(axis=0)
+            F = np.linalg.lstsq(X, x, rcond=None)[0].T
+            mirrored = bool(np.linalg.det(F) <= 0.0)
+            error = float(np.linalg.norm(F.T @ F - np.eye(3)))
+            failed = mirrored or not error <= self.settings.max_orthogonality_error
+            self.tally.see(at, error, failed, f"{body.name}, mirrored" if mirrored else body.name)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.recording.actions.joints import RecordedJoint
+from supple.results.recording.actions import RecordedJoint
 from supple.results.view.layers.layer import Layer, single
 from supple.results.view.model import Model, Moment
 

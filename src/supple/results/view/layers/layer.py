@@ -1,4 +1,4 @@
-"""The base class of layers, which draw one part of a moment."""
+"""The base class of layers, which draw one part of a moment, and numbers in the form that the browser uses."""
 
 from __future__ import annotations
 
@@ -34,3 +34,17 @@ class Layer(ABC):
 def single(values: NDArray[np.float64]) -> NDArray[np.float32]:
     """Values in the precision that the browser uses."""
     return np.ascontiguousarray(values, dtype=np.float32)
+
+
+def quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(w, x, y, z) of a rotation (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(R).as_quat()[[3, 0, 1, 2]]
+
+
+def turning_z_to(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(w, x, y, z) of a rotation of the z axis to `direction` (3,), a unit vector."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.align_vectors([direction], [[0.0, 0.0, 1.0]])[0].as_quat()[[3, 0, 1, 2]]

@@ -1,6 +1,6 @@
 """Rigid bodies: four control points each, which move as one solid.
 
-A rigid body is a tetrahedron of equal masses (see `supple.scene.rigid.control_points`). Within a substep the places x_n
+A rigid body is a tetrahedron of equal masses (see `supple.scene.rigid.rigid_body`). Within a substep the places x_n
 of its beginning are rigid, and everything that acts on the body changes the velocities v of its control points, whose
 momenta determine the end: see `motion`.
 """

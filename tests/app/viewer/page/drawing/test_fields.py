@@ -9,8 +9,7 @@ import supple as sp
 from supple.app.viewer.controls.view.legend import bar_html
 from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
-from supple.results.view.color_scale import BINS, Limits, Range, bin_of
-from supple.results.view.fields import FIELDS
+from supple.results.view.fields import BINS, FIELDS, Limits, Range, bin_of
 
 J, MISES, ENERGY = FIELDS.values()
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from supple.app.viewer.from_snapshot import MomentBuilder
-from supple.results.recording.actions.stitches import no_stitches
+from supple.results.recording.actions import no_stitches
 from supple.results.recording.scene import RecordedObstacle
 from supple.results.view.colors import body_color
 from supple.results.view.fields import FIELDS
+from supple.results.view.layers.connections import length_text
 from supple.results.view.layers.section import Cut, surface
-from supple.results.view.layers.springs import length_text
 from supple.results.view.layers.tets import exploded_facets
 from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.results.view.stage import Stage

@@ -8,7 +8,7 @@ from typing import Any
 from supple.app.viewer.controls.controller import sequential
 from supple.app.viewer.protocol.quantities import typed, written
 from supple.errors import CommandError
-from supple.results.view.color_scale import Range
+from supple.results.view.fields import Range
 from supple.results.view.stage import Stage
 
 _FIXED = "fixed"

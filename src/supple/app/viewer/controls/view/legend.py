@@ -5,9 +5,8 @@ from __future__ import annotations
 import html
 
 from supple.app.viewer.protocol.quantities import written
-from supple.results.view.color_scale import BINS, palette
-from supple.results.view.fields import Field
-from supple.results.view.layers.forces import COLOR
+from supple.results.view.fields import BINS, Field, palette
+from supple.results.view.layers.arrows import COLOR
 
 
 def bar_html(field: Field, ends: tuple[float, float] | None) -> str:

@@ -16,8 +16,7 @@ from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import BodyRange, System
 from supple.results.readings.joint_readings import joint_readings
-from supple.results.recording.actions.joints import joints_of
-from supple.results.recording.actions.stitches import recorded_stitches
+from supple.results.recording.actions import joints_of, recorded_stitches
 from supple.results.recording.scene import RecordedObstacle
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.solvers.xpbd.details import XPBDDetails

@@ -1,4 +1,4 @@
-"""Quadratic tets of the ready-made shapes, with the nodes of the surface on the true surface."""
+"""Tets of the ready-made shapes: between layers of a surface, and quadratic ones with curved sides."""
 
 from __future__ import annotations
 
@@ -43,3 +43,14 @@ def of_order(mesh: TetMesh, order: int, onto: Onto | None = None) -> TetMesh:
         back = straight.nodes[~good, 4:]
         curved[back] = straight.vertices[back]
     return TetMesh(curved, straight.nodes)
+
+
+def tets_between_layers(triangles: NDArray[np.integer], points: int, layers: int) -> NDArray[np.int64]:
+    """(3 t layers, 4) tets between layers + 1 copies of triangles (t, 3), of so many points each.
+
+    The quad between two columns is cut from the bottom of the lower-numbered one, so that neighbours agree.
+    """
+    a0, a1, a2 = np.sort(triangles.astype(np.int64), axis=1).T
+    b0, b1, b2 = a0 + points, a1 + points, a2 + points
+    layer = np.concatenate([np.column_stack(t) for t in ((a0, a1, a2, b2), (a0, a1, b1, b2), (a0, b0, b1, b2))])
+    return (layer[None] + points * np.arange(layers)[:, None, None]).reshape(-1, 4)

@@ -1,4 +1,4 @@
-"""Grabs of visitors, as springs with their length, and the pusher."""
+"""Springs of grabs with their length, the pusher, and a line for each stitch."""
 
 from __future__ import annotations
 
@@ -69,3 +69,19 @@ def length_text(meters: float) -> str:
     if meters >= 1.0:
         return f"{meters:.2f} m"
     return f"{100.0 * meters:.1f} cm" if meters >= 0.01 else f"{1000.0 * meters:.1f} mm"
+
+
+class StitchView(Layer):
+    """A line for each stitch."""
+
+    def __init__(self, scene: Any, moment: Moment) -> None:
+        self.nodes = []
+        if len(moment.stitch_segments):
+            handle = scene.add_line_segments(
+                "/stitches", single(moment.stitch_segments), (30, 30, 34), thickness=2.5, thickness_units="screen"
+            )
+            self.nodes = [handle]
+
+    def update(self, moment: Moment) -> None:
+        for handle in self.nodes:
+            handle.points = single(moment.stitch_segments)
