@@ -17,11 +17,13 @@ install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)
 .PHONY: demo test test-all fuzz soak bench blender lint format docs kernels dist lock clean
 .DELETE_ON_ERROR:
 
-# Both demos compile for a minute, once: first, on all cores.
+# Both demos compile for a minute, once: first, on all cores. A film needs OpenGL; without it, a line says what to install.
 demo: .venv/.base
 	$(BIN)/supple warm squash bears
 	$(BIN)/supple demo squash --overwrite --output out/squash
 	$(BIN)/supple demo bears --overwrite --output out/bears
+	-$(BIN)/supple picture out/bears --camera follow
+	-$(BIN)/supple export out/bears --to mp4 --output out/bears/film.mp4
 
 # Three processes on two cores: tests of the page and of other processes wait much of their time.
 test: .venv/.dev
@@ -80,7 +82,7 @@ lock: .venv/.dev
 	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
 	  --all-extras --group dev pyproject.toml -o requirements/dev.lock
 	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
-	  -c requirements/dev.lock pyproject.toml -o requirements/base.lock
+	  --extra video -c requirements/dev.lock pyproject.toml -o requirements/base.lock
 	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
 	  requirements/peers.in -o requirements/peers.lock
 

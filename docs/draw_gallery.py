@@ -17,12 +17,14 @@ from PIL import Image
 
 import supple as sp
 from supple.app.demos.registry import DEMOS
-from supple.results.export.video_worker import draw
+from supple.results.export.film import Film
+from supple.results.export.video_worker import Studio
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
 
 FOLDER = Path(__file__).parent
 PICTURES = FOLDER / "images" / "gallery"
 LIST = FOLDER / "gallery.json"
-SIZE = (400, 300)
+SIZE, SHARES = (400, 300), (0.0, 0.2, 0.5, 1.0)  # of each picture, and where in the film
 
 
 def draw_demo(name: str, folder: Path) -> dict[str, object]:
@@ -35,9 +37,11 @@ def draw_demo(name: str, folder: Path) -> dict[str, object]:
         pass
     seconds = time.perf_counter() - began
     with sp.read_recording(path) as recording:
-        frames = [recording[round(share * (len(recording) - 1))] for share in (0.0, 0.2, 0.5, 1.0)]
-        strip = np.concatenate(list(draw(recording, frames, SIZE)), axis=1)
-    image = Image.fromarray(strip).quantize(128, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        model = model_of_recording(recording)
+        moments = [moment_of_frame(model, recording[round(share * (len(recording) - 1))]) for share in SHARES]
+    studio = Studio(model, moments, Film(size=SIZE))
+    strip = np.concatenate([studio.picture(moment, 0.0) for moment in moments], axis=1)
+    image = Image.fromarray(strip).quantize(255, method=Image.Quantize.MAXCOVERAGE, kmeans=4, dither=Image.Dither.NONE)
     PICTURES.mkdir(exist_ok=True)
     image.save(PICTURES / f"{name}.png", optimize=True)
     claims = measurement.claims()

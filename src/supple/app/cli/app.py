@@ -44,6 +44,7 @@ COMMANDS = {
     "view": "supple.app.cli.commands.view:view",
     "mesh": "supple.app.cli.commands.mesh:mesh",
     "export": "supple.app.cli.commands.export:export",
+    "picture": "supple.app.cli.commands.picture:picture",
     "check": "supple.app.cli.commands.check:check",
     "plot": "supple.app.cli.commands.plot:plot",
     "fit": "supple.app.cli.commands.fit:fit",

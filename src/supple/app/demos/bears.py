@@ -23,7 +23,7 @@ LAYERS, PER_LAYER = 3, 4
 
 def scene() -> Scene:
     """Twelve bears, 10 cm tall, in three layers above the bottom of a round bowl."""
-    mesh = shapes.gummy_bear(height=HEIGHT, edge_length=0.009)
+    mesh = shapes.gummy_bear(height=HEIGHT, edge_length=0.013)
     skin = shapes.gummy_bear_surface(height=HEIGHT, resolution=40)
     material = StableNeoHookean(youngs=3e4, poisson=0.45, density=1100.0, damping=0.01)
     generator = np.random.default_rng(7)

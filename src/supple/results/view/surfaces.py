@@ -147,7 +147,8 @@ def boundary_surface(body: ModelBody) -> SoftSurface:
 def obstacle_surfaces(model: Model) -> list[RigidSurface]:
     """Those of the obstacles; a half-space is drawn as a square about the bodies.
 
-    Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not a floor.
+    Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not a floor. Of a room the
+    lower half is drawn, so that it looks like a bowl.
     """
     made, view = [], model.view
     for number, recorded in enumerate(model.obstacles):
@@ -158,6 +159,8 @@ def obstacle_surfaces(model: Model) -> list[RigidSurface]:
         triangles = triangles.astype(np.int32)
         if obstacle.is_room and _volume(vertices, triangles) < 0.0:
             triangles = triangles[:, ::-1].copy()
+        if obstacle.is_room:
+            vertices, triangles = _lower_half(vertices, triangles, view.up)
         solid, pose = obstacle.plane is None and not obstacle.is_room, _pose_of(number)
         made.append(
             RigidSurface(recorded.name, triangles, OBSTACLE_COLOR, vertices, pose, opacity, obstacle.is_room, solid)
@@ -167,6 +170,20 @@ def obstacle_surfaces(model: Model) -> list[RigidSurface]:
 
 def _pose_of(obstacle: int) -> Callable[[Moment], NDArray[np.float64]]:
     return lambda moment: moment.poses[obstacle]
+
+
+def _lower_half(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int32], up: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """What of a surface is below the middle of its height."""
+    from trimesh import Trimesh  # only where something is drawn
+    from trimesh.intersections import slice_faces_plane
+
+    heights = vertices @ up
+    middle = 0.5 * float(heights.min() + heights.max()) * up
+    points, below, _ = slice_faces_plane(vertices, triangles, plane_normal=-up, plane_origin=middle)
+    joined = Trimesh(points, below)  # both sides of an edge were cut by themselves
+    return np.asarray(joined.vertices, dtype=np.float64), np.asarray(joined.faces, dtype=np.int32)
 
 
 def _volume(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> float:

@@ -24,7 +24,6 @@ def export(
     view: str | None = None,
     color: str | None = None,
     shadows: bool | None = None,
-    time: float | None = None,
 ) -> None:
     """Write a recording in another program's format.
 
@@ -34,8 +33,8 @@ def export(
         The recording (.vtkhdf), or the folder of its run.
     to
         glb (Blender, three.js), obj (a folder, one file per frame), vtu (the last frame), vtkhdf (compressed, or
-        repaired after a kill), usd (extra: usd), mp4, gif or png (a film, or one picture; extra: video), html (a page),
-        csv (a table of the reports of all frames).
+        repaired after a kill), usd (extra: usd), mp4 or gif (a film; extra: video), png (see supple picture), html
+        (a page), csv (a table of the reports of all frames).
     output
         File or folder to write, with a suffix of the format; without it, beside the recording and under its name.
     size
@@ -52,8 +51,6 @@ def export(
         body (without it), or a field with a legend: J, von_mises or energy.
     shadows
         Whether bodies and obstacles cast soft shadows on floors: yes without it.
-    time
-        Of a picture (png), in seconds: the end without it.
     """
     from supple.results.export.exporter import export as write
 
@@ -65,7 +62,6 @@ def export(
         "view": view,
         "color": color,
         "shadows": shadows,
-        "time": time,
     }
     film = {key: value for key, value in given.items() if value is not None}
     print(write(recording_at(recording), to, output, **film))

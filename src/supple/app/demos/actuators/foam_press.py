@@ -45,7 +45,7 @@ def scene() -> Scene:
     foam = StableNeoHookean(youngs=YOUNGS, poisson=POISSON, damping=0.002, density=100.0)
     block = Body("foam", shapes.box((SIDE, HEIGHT, SIDE), (6, 3, 6)), foam, position=(0, 0.5 * HEIGHT + GAP, 0))
     down = Keyframes(times=[0.0, 1.0], displacements=[[0, 0, 0], [0, -PRESSED - 2 * GAP, 0]])
-    plate = Box(name="press", center=(0, HEIGHT + 2 * GAP + 0.01, 0), size=(2 * SIDE, 0.02, 2 * SIDE), motion=down)
+    plate = Box(name="press", center=(0, HEIGHT + 2 * GAP + 0.005, 0), size=(1.2 * SIDE, 0.01, 1.2 * SIDE), motion=down)
     top = ForceSensor("top", "foam", region=InBox((-1, HEIGHT + 0.5 * GAP, -1), (1, 1, 1)))
     return Scene([block], [HalfSpace(name="floor"), plate], sensors=[top], gravity=(0, 0, 0))
 

@@ -206,6 +206,7 @@ def test_a_room_is_drawn_open(server, fake):
     assert (bowl.side, bowl.opacity) == ("back", None)
     a, b, c = (np.asarray(bowl.vertices, dtype=np.float64)[bowl.faces[:, k]] for k in range(3))
     assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0  # faces outwards: only the inside of the far wall is drawn
+    assert bowl.vertices[:, 1].max() == pytest.approx(0.0, abs=1e-6)  # the lower half
 
 
 def test_the_colors_of_many_bodies_differ():
