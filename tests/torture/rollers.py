@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, torture
 
-from supple.app.demos.demo import Claim
-from supple.app.demos.motion_measures import volume
+from supple.app.demos.demo import Claim, volume
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh

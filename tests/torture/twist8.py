@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from tests.torture.watch import ContactMeasurement, Torture
 
-from supple.app.demos.demo import Claim, Demo
-from supple.app.demos.motion_measures import pin_error
+from supple.app.demos.demo import Claim, Demo, pin_error
 from supple.materials.neo_hookean import NeoHookean
 from supple.mesh import shapes
 from supple.results.frame import Frame

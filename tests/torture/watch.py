@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.app.demos.motion_measures import body_range
+from supple.app.demos.demo import Claim, Demo, Measurement, body_range
 from supple.model.state import Status
 from supple.results.frame import Frame
 from supple.scene.scene import Scene

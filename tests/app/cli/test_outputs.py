@@ -4,7 +4,7 @@ import pytest
 
 import supple as sp
 from supple.app.cli.app import main
-from supple.app.cli.exit_codes import ExitCode
+from supple.app.cli.exits import ExitCode
 
 SCENE = """\
 bodies:

@@ -5,8 +5,8 @@ import csv
 import pytest
 
 from supple.app.cli.app import main
-from supple.app.cli.exit_codes import ExitCode
-from supple.app.cli.study_progress import StudyBar, duration
+from supple.app.cli.commands.sweep import StudyBar, duration
+from supple.app.cli.exits import ExitCode
 from supple.app.studies.runner import StudyProgress
 
 SCENE = """\

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from supple.app.cli.app import main
-from supple.app.cli.exit_codes import ExitCode
+from supple.app.cli.exits import ExitCode
 
 SCENE = """\
 bodies:

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from supple.app.cli.app import main
-from supple.app.cli.exit_codes import ExitCode
+from supple.app.cli.exits import ExitCode
 from supple.app.demos import cantilever, quilt
 from supple.app.demos.actuators import pneunet
-from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.app.demos.motion_measures import stitch_lengths
+from supple.app.demos.demo import Claim, Demo, Measurement, stitch_lengths
 from supple.app.demos.registry import DEMOS, find_demo
 from supple.app.demos.rigid import dzhanibekov, gripper
 from supple.errors import SceneError, SolverError

@@ -8,9 +8,8 @@ import pytest
 
 import supple as sp
 from supple.app.studies.cases import Case, CaseResult, read_result, write_result
-from supple.app.studies.effects import main_effects, varying_factors
 from supple.app.studies.factors import Levels
-from supple.app.studies.plots import plot_one_factor, plot_two_factors
+from supple.app.studies.plots import main_effects, plot_one_factor, plot_two_factors, varying_factors
 from supple.app.studies.table import StudyTable
 
 

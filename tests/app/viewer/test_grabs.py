@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.engine.measurement.describe import describe, measures
+from supple.app.viewer.engine.describe import describe, measures
 from supple.app.viewer.engine.scene.changes import change, flattened
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.protocol import limits

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.engine.measurement.describe import measures
+from supple.app.viewer.engine.describe import measures
 from supple.app.viewer.engine.scene.changes import change
 from supple.app.viewer.engine.scene.grab_spring import SoftGrab
 from supple.app.viewer.engine.scene.live_scene import LiveScene

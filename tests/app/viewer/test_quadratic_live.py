@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.engine.measurement.describe import describe
+from supple.app.viewer.engine.describe import describe
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.protocol.live_source import LiveSource

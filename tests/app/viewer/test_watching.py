@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.engine import simulation_loop
-from supple.app.viewer.engine.measurement.readings import readings, strongest_forces
+from supple.app.viewer.engine.describe import readings, strongest_forces
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.step_watch import StepWatch
 from supple.app.viewer.protocol import commands

@@ -14,9 +14,8 @@ from cyclopts.exceptions import CycloptsError
 from supple import __version__
 from supple.app.cli.announcements import set_up_log
 from supple.app.cli.console import ShellConsole
-from supple.app.cli.exit_codes import ExitCode
+from supple.app.cli.exits import ExitCode, print_error
 from supple.app.cli.interrupts import ended_as_by_ctrl_c
-from supple.app.cli.print_error import print_error
 from supple.errors import SuppleError
 from supple.results.progress import CompileBar
 

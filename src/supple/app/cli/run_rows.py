@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from supple.app.runs.contents import RunPaths
-from supple.app.runs.facts import differences, versions
-from supple.app.runs.journal import Journal, Session, read_journal
+from supple.app.runs.journal import Journal, Session, differences, read_journal, versions
 from supple.errors import OutputError
 from supple.runtime.lock import is_locked
 

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from supple.app.cli.exit_codes import ExitCode
+from supple.app.cli.exits import ExitCode, print_error
 from supple.app.cli.interrupts import Interrupts
-from supple.app.cli.print_error import print_error
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.resume import resume
 from supple.app.runs.run_folder import RunFolder, SceneSource

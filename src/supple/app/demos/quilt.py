@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.app.demos.motion_measures import stitch_lengths
+from supple.app.demos.demo import Claim, Demo, Measurement, stitch_lengths
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.app.demos.motion_measures import height, spin_about, volume
+from supple.app.demos.demo import Claim, Demo, Measurement, height, spin_about, volume
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes

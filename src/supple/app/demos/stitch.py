@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.app.demos.motion_measures import stitch_lengths
+from supple.app.demos.demo import Claim, Demo, Measurement, stitch_lengths
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.numerics.geometry.triangle_tree import TriangleTree

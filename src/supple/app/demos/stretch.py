@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.app.demos.motion_measures import volume
+from supple.app.demos.demo import Claim, Demo, Measurement, volume
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.results.frame import Frame

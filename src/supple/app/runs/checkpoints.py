@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from supple.app.runs.facts import versions
+from supple.app.runs.journal import versions
 from supple.model.system import System, rebuilt_system
 from supple.results.checkpoint.file import Checkpoint, RunFacts
 from supple.results.checkpoint.scene_hash import scene_hash

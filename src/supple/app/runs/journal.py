@@ -3,18 +3,55 @@
 from __future__ import annotations
 
 import json
+import os
+import platform
 import sys
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numba
 from pydantic import TypeAdapter
 
-from supple.app.runs.facts import machine, versions
 from supple.errors import OutputError
 from supple.results.checkpoint.file import RunFacts
 from supple.runtime.replacing import whole_file
+
+# What may change the last bits of a result.
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pypardiso", "h5py", "tetgen")
+
+
+def versions() -> dict[str, str]:
+    """The versions of Supple, of Python, and of the installed packages that compute."""
+    from supple import __version__
+
+    found = {"supple": __version__, "python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def machine() -> dict[str, Any]:
+    """The machine, and how many threads this process has."""
+    return {
+        "name": platform.node(),
+        "platform": platform.platform(),
+        "processor": platform.processor() or platform.machine(),
+        "processors": os.cpu_count(),
+        "threads": numba.get_num_threads(),
+    }
+
+
+def differences(before: dict[str, str], now: dict[str, str]) -> str:
+    """Which versions differ, as text; empty where none does."""
+    names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
+    return ", ".join(f"{name} {before.get(name, '(none)')} -> {now.get(name, '(none)')}" for name in names)
+
 
 _FORMAT = 1
 
@@ -33,7 +70,7 @@ class Session:
     command : its arguments; begun, ended : time (`now`); ended is None while it works, and after it was killed
     first_frame, last_frame : indices of the frames that it began with and ended with
     outcome : "running", "finished", "interrupted", "stopped" (by the solver) or "failed"; message : the reason
-    versions, machine : see `facts`
+    versions, machine : see the functions
     """
 
     command: list[str] = field(default_factory=lambda: list(sys.argv))

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from supple.app.runs.checkpoints import frame_of
 from supple.app.runs.contents import RunPaths
-from supple.app.runs.facts import differences, versions
-from supple.app.runs.journal import Journal, read_journal
+from supple.app.runs.journal import Journal, differences, read_journal, versions
 from supple.app.runs.keeper import Keeper
 from supple.app.runs.run_folder import FolderSink
 from supple.errors import OutputError, SceneError

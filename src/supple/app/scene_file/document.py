@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
 
 from supple.app.scene_file.entries import spelling as spelling  # registers how values are written
 from supple.app.scene_file.entries.bodies import BodyModel
+from supple.app.scene_file.entries.families import SOLVERS, model_of_kind
 from supple.app.scene_file.entries.kinds import KindModel, entry_of
-from supple.app.scene_file.entries.solvers import SOLVERS, model_of_kind
 from supple.app.scene_file.fraction import number_or_fraction
 from supple.app.scene_file.model import Model, Vector
 from supple.kinds.kind import Kind

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,15 +16,17 @@ from pydantic import ValidationError
 from supple.app.scene_file.document import KINDS_OF_LISTS, OutputModel, SceneFileModel
 from supple.app.scene_file.entries.kinds import built
 from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES, MeshStore
-from supple.app.scene_file.from_surface import read_surface_scene
-from supple.app.scene_file.inputs import with_shared_inputs
 from supple.app.scene_file.mesh_sets import with_numbers
+from supple.app.scene_file.new_scenes import read_surface_scene
 from supple.app.scene_file.urdf.document import read_urdf
 from supple.app.scene_file.validation_errors import scene_error
 from supple.app.scene_file.yaml_reader import Key, YamlDocument, read_yaml
 from supple.errors import SceneError
 from supple.mesh.meshing.spelling import spelled_for
 from supple.scene.body import PlacedBody
+from supple.scene.inputs import MotorInput
+from supple.scene.joints.axis_joint import AxisJoint
+from supple.scene.joints.joint import Joint
 from supple.scene.located import LocatedError, at
 from supple.scene.scene import Scene
 from supple.solvers.solver import Solver
@@ -159,3 +161,27 @@ def _keys_of_message(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Ke
             if word in data:
                 return (*keys, word)
     return keys
+
+
+def with_shared_inputs(joints: Sequence[Joint]) -> list[Joint]:
+    """The joints with one input for each name.
+
+    Raises
+    ------
+    SceneError : where one begins at two values.
+    """
+    inputs: dict[str, MotorInput] = {}
+    found = []
+    for i, joint in enumerate(joints):
+        motor = joint.motor if isinstance(joint, AxisJoint) else None
+        if isinstance(joint, AxisJoint) and motor is not None and isinstance(motor.script, MotorInput):
+            one = inputs.setdefault(motor.script.name, motor.script)
+            if one.value != motor.script.value:
+                with at("joints", i, "motor"):
+                    raise SceneError(
+                        f"input {one.name!r} begins at {float(motor.script.value):g} here and at {float(one.value):g} "
+                        "in a joint above; give both one value, or each a name"
+                    )
+            joint = replace(joint, motor=motor.scripted(one))
+        found.append(joint)
+    return found

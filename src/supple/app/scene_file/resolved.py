@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from supple.app.scene_file.entries.solvers import model_of_kind
+from supple.app.scene_file.entries.families import model_of_kind
 from supple.app.scene_file.loader import Run
 from supple.app.scene_file.yaml_writer import yaml_text
 from supple.mesh.io.tetgen_family import SUFFIXES

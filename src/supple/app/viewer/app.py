@@ -13,11 +13,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from supple.app.viewer.controls.view.overlay import set_theme
 from supple.app.viewer.engine.engine import Engine
 from supple.app.viewer.live_page import LivePage
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.app.viewer.replay import Replay
-from supple.app.viewer.theme import set_theme
 from supple.results.recording.reader import read_recording
 from supple.results.view.gate import new_token
 from supple.results.view.server import gated_server, require_free_port

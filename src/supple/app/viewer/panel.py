@@ -7,10 +7,8 @@ from typing import Any
 
 from supple.app.viewer.controls.body_controls import BodyControls
 from supple.app.viewer.controls.controller import Controller, notify
-from supple.app.viewer.controls.measures import Measures
-from supple.app.viewer.controls.mouse import Mouse
-from supple.app.viewer.controls.mouse_controls import MouseControls
-from supple.app.viewer.controls.sensors import Sensors
+from supple.app.viewer.controls.measures import Measures, Sensors
+from supple.app.viewer.controls.mouse import Mouse, MouseControls
 from supple.app.viewer.controls.solver_controls import SolverControls
 from supple.app.viewer.controls.time_controls import TimeControls
 from supple.app.viewer.controls.upload_controls import UploadControls

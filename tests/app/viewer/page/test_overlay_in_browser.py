@@ -10,10 +10,10 @@ import pytest
 from tests.app.viewer.page.conftest import TOKEN, two_boxes
 
 from supple.app.viewer.app import configure_page
+from supple.app.viewer.controls.view.overlay import set_theme
 from supple.app.viewer.live_page import LivePage
 from supple.app.viewer.protocol.commands import Grab, Pause, Play, ReleaseGrab, Reset, SetParameter, Step
 from supple.app.viewer.protocol.snapshots import GrabState, Timing
-from supple.app.viewer.theme import set_theme
 from supple.results.view.server import gated_server
 
 WIDE = {"width": 1200, "height": 800}

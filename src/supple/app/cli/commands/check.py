@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.exit_codes import ExitCode
-from supple.app.cli.numbers import Steps
-from supple.app.cli.recordings import recording_at
+from supple.app.cli.arguments import Steps, recording_at
+from supple.app.cli.exits import ExitCode
 
 if TYPE_CHECKING:
     from supple.results.check.report import CheckReport

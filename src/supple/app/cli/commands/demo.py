@@ -7,10 +7,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.checkpoints import CheckpointEvery, Overwrite, interval
-from supple.app.cli.exit_codes import ExitCode
-from supple.app.cli.live import Open, Port
-from supple.app.cli.numbers import Steps
+from supple.app.cli.arguments import CheckpointEvery, Overwrite, Steps, interval
+from supple.app.cli.commands.view import Open, Port
+from supple.app.cli.exits import ExitCode
 
 
 def demo(
@@ -102,7 +101,7 @@ def demo(
     if solver is not None:
         chosen = chosen.on(solver)
     if live:
-        from supple.app.cli.live import serve_page
+        from supple.app.cli.commands.view import serve_page
         from supple.app.viewer.protocol.live_source import LiveSource
 
         serve_page(LiveSource(chosen.name, chosen.scene(), chosen.solver(solver), chosen.dt), port, open_)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from supple.app.cli.numbers import whole_number
+from supple.app.cli.arguments import whole_number
 from supple.errors import MeshError, MeshingError
 
 if TYPE_CHECKING:

@@ -32,8 +32,7 @@ def new(
     overwrite
         Replace the file where it exists.
     """
-    from supple.app.scene_file.from_surface import scene_of_surface
-    from supple.app.scene_file.template import new_scene
+    from supple.app.scene_file.new_scenes import new_scene, scene_of_surface
     from supple.mesh.io.mesh_files import SURFACE_READERS
     from supple.runtime.replacing import whole_file
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.numbers import Pixels, Seconds
-from supple.app.cli.recordings import recording_at
+from supple.app.cli.arguments import Pixels, Seconds, recording_at
 
 
 def picture(

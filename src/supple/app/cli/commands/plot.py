@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.recordings import recording_at
+from supple.app.cli.arguments import recording_at
 
 
 def plot(

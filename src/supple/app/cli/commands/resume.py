@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.numbers import Steps
+from supple.app.cli.arguments import Steps
 
 
 def resume(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.checkpoints import CheckpointEvery, Overwrite, interval
-from supple.app.cli.numbers import Seconds, Steps
+from supple.app.cli.arguments import CheckpointEvery, Overwrite, Seconds, Steps, interval
+
+if TYPE_CHECKING:
+    from supple.app.scene_file.loader import Run
 
 
 def run(
@@ -72,7 +74,7 @@ def run(
     from supple.app.cli.session import Products, run_session
     from supple.app.cli.trace import traces
     from supple.app.runs.run_folder import SceneSource
-    from supple.app.scene_file.entries.solvers import solver_of_kind
+    from supple.app.scene_file.entries.families import solver_of_kind
     from supple.app.scene_file.loader import load_run
     from supple.app.scene_file.resolved import resolved_scene
 
@@ -85,8 +87,6 @@ def run(
     with reading():
         described = load_run(scene)
     if separate:
-        from supple.app.cli.separation import moved_apart
-
         described = moved_apart(described)
     used = described.solver if solver is None else solver_of_kind(solver)
     dt, steps = described.dt if dt is None else dt, described.steps if steps is None else steps
@@ -105,3 +105,29 @@ def run(
         products=replace(products, page=page, plot=plot, compress=described.output.compress, fields=tuple(names)),
         source=SceneSource(origin, described.text, resolved_scene(described, solver=solver, dt=dt, steps=steps)),
     ).code
+
+
+def moved_apart(described: Run) -> Run:
+    """The run with its bodies moved apart; prints each move, also with --quiet.
+
+    Raises
+    ------
+    SceneError : where small translations do not separate the bodies.
+    """
+    from rich.markup import escape
+
+    from supple.app.cli.console import shell_console
+    from supple.contact.start.separation import separate
+
+    console = shell_console()
+    separation = separate(described.scene, initial_positions=described.initial_positions)
+    moves = [
+        "moved body {!r} by ({:.6g}, {:.6g}, {:.6g}) m".format(move.body, *(move.shift + 0.0))
+        for move in separation.moves
+    ]
+    for line in moves or ["nothing was moved: no surfaces intersect"]:
+        console.print(escape(line))
+    text = described.text
+    if moves and text is not None:
+        text = text.rstrip("\n") + "\n" + "".join(f"# supple run --separate {line}\n" for line in moves)
+    return replace(described, scene=separation.scene, initial_positions=separation.initial_positions, text=text)

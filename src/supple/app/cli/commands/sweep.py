@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Self
 
 from cyclopts import Parameter
 
-from supple.app.cli.numbers import Steps
+from supple.app.cli.arguments import Steps
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from supple.app.studies.runner import StudyProgress
 
 
 def sweep(
@@ -42,8 +48,7 @@ def sweep(
     quiet
         Print neither progress nor summary.
     """
-    from supple.app.cli.exit_codes import ExitCode
-    from supple.app.cli.study_progress import StudyBar
+    from supple.app.cli.exits import ExitCode
     from supple.app.studies.plots import plot_study
     from supple.app.studies.study import TABLE, ignore_progress
     from supple.app.studies.study_file import load_study
@@ -72,3 +77,58 @@ def sweep(
         if plots:
             console.print(f"plots  {escape(str(output / 'plots'))}")
     return ExitCode.FAILED if failed else ExitCode.OK
+
+
+class StudyBar:
+    """Cases done and failed, and the time left; used in a `with` block.
+
+    Where the output is not a terminal (a file, a pipe, CI), there is nothing before the command's summary.
+
+    Parameters
+    ----------
+    console : where to write; standard error by default.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        self._console = console
+        self._bar: Progress | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    def show(self, progress: StudyProgress) -> None:
+        """Show the state of the study."""
+        ended = progress.done + progress.failed
+        texts = {"failed": progress.failed, "left": duration(progress.seconds_left)}
+        if self._bar is None:
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+            console = self._console or Console(stderr=True)
+            if not console.is_terminal:
+                return
+            columns = (
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("cases  {task.fields[failed]} failed  {task.fields[left]} left"),
+            )
+            self._bar = Progress(*columns, console=console)
+            self._bar.start()
+            self._task = self._bar.add_task("", total=progress.cases, completed=ended, **texts)
+        self._bar.update(self._task, completed=ended, **texts)
+
+
+def duration(seconds: float | None) -> str:
+    """Hours, minutes and seconds, such as "2 h 05 min"; "?" where it is not known."""
+    if seconds is None:
+        return "?"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from supple.app.cli.live import Open, Port
-from supple.app.cli.recordings import recording_at
+from cyclopts import Parameter
+
+from supple.app.cli.arguments import recording_at, whole_number
+
+if TYPE_CHECKING:
+    from supple.app.viewer.protocol.live_source import LiveSource
+
+Port = Annotated[int | None, Parameter(name="--port", converter=whole_number)]
+Open = Annotated[bool, Parameter(name="--open")]
 
 SCENE_FILES = (".yaml", ".yml", ".urdf")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
@@ -36,7 +44,6 @@ def view(
     open_
         Open the page in a browser.
     """
-    from supple.app.cli.live import serve_page
 
     found = find_source(source)
     if found.suffix.lower() in RECORDINGS:
@@ -49,7 +56,7 @@ def view(
 
     from supple.app.cli.announcements import reading
     from supple.app.scene_file.confined import ConfinedMeshStore
-    from supple.app.scene_file.entries.solvers import solver_of_kind
+    from supple.app.scene_file.entries.families import solver_of_kind
     from supple.app.scene_file.loader import load_run
     from supple.app.viewer.protocol.live_source import LiveSource
 
@@ -76,3 +83,20 @@ def find_source(path: Path) -> Path:
     if path.suffix.lower() not in (*SCENE_FILES, *SURFACE_FILES, *RECORDINGS):
         raise OutputError(f"{path} is neither a scene file (.yaml), nor a surface, nor a recording (.vtkhdf)")
     return path
+
+
+def serve_page(source: LiveSource | Path, port: int | None, open_browser: bool) -> None:
+    """Serve a live scene, or the recording at a path, until Ctrl-C.
+
+    A given port must be free; without one, 8080 or the next free port above it is used.
+
+    Raises
+    ------
+    SuppleError : where the source cannot be shown, or the port cannot be used.
+    """
+    from supple.app.viewer.app import serve
+    from supple.errors import OutputError
+
+    if port is not None and not 0 <= port <= 65535:
+        raise OutputError(f"--port is {port}; give a number from 1 to 65535, or 0 for any free one")
+    serve(source, port, open_browser=open_browser)

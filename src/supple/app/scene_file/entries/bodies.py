@@ -10,14 +10,74 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from supple.app.scene_file.entries.materials import MaterialModel
+from supple.app.scene_file.entries.families import ElasticMaterialModel, MaterialModel
 from supple.app.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
-from supple.app.scene_file.entries.regions import RegionModel, with_regions
 from supple.app.scene_file.entries.shapes import ShapeModel
-from supple.app.scene_file.model import Count, Extents, Model, Name, NonNegative, Positive, Vector
+from supple.app.scene_file.model import Count, Extents, Index, Model, Name, NonNegative, Positive, Vector
+from supple.errors import SceneError
+from supple.materials.elastic_tets.regions import Regions
+from supple.materials.material import Hyperelastic, Material
+from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body, PlacedBody
 from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.selection import InBox
+
+
+class BoxOfMeshModel(Model):
+    """The tets whose center is inside an axis-aligned box, in the coordinates of the mesh: before `position`,
+    `rotation` and `copies`."""
+
+    low: Vector = Field(description="corner with the lowest coordinates [m]")
+    high: Vector = Field(description="corner with the highest coordinates [m]")
+
+
+class RegionModel(Model):
+    """Tets of a body with another elastic material than the body's."""
+
+    alternatives = ("box", "tets", "set", "give the tets of a region by either `box`, `tets` or `set`")
+
+    material: ElasticMaterialModel
+    box: BoxOfMeshModel | None = Field(default=None, description="all tets whose center is inside")
+    tets: list[Index] | None = Field(
+        default=None, min_length=1, description="instead of `box`: tet numbers of the mesh, from 0"
+    )
+    set: Name | None = Field(default=None, description="instead of `box`: a set of the mesh file (.inp or .msh)")
+
+    def select(self, mesh: TetMesh) -> NDArray[np.int64]:
+        """Numbers (k,) of the selected tets."""
+        if self.box is not None:
+            with at("box"):
+                centers = mesh.vertices[mesh.tets].mean(axis=1)
+                inside = InBox(self.box.low, self.box.high).select(centers)
+                if not len(inside):
+                    low, high = (np.round(corner, 6).tolist() for corner in (centers.min(axis=0), centers.max(axis=0)))
+                    raise SceneError(
+                        f"no tet has its center inside; in the mesh's coordinates, centers are from {low} to {high}"
+                    )
+                return inside.astype(np.int64)
+        chosen = np.array(self.tets)
+        if chosen.max() >= len(mesh.tets):
+            with at("tets"):
+                raise SceneError(f"names tet {chosen.max()}; the mesh has tets 0 to {len(mesh.tets) - 1}")
+        return chosen
+
+
+def with_regions(material: Material, regions: list[RegionModel], mesh: TetMesh, meshes: MeshStore) -> Material:
+    """The body's material, replaced in each tet by that of the last region that contains the tet.
+
+    Raises
+    ------
+    LocatedError : where a region is empty or not of this mesh, or the body's own material is not elastic.
+    """
+    if not isinstance(material, Hyperelastic):
+        raise SceneError(f"a body with regions needs an elastic material, which {type(material).__name__} is not")
+    index = np.zeros(len(mesh.tets), dtype=np.int64)
+    for k, region in enumerate(regions):
+        with at(k):
+            index[region.select(mesh)] = k + 1
+    return Regions(materials=[material, *(region.material.build(meshes) for region in regions)], index=index)
+
 
 MAX_COPIES = 10_000
 

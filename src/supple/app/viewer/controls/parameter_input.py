@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, sequential
-from supple.app.viewer.controls.pending import PendingValue
 from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
 from supple.app.viewer.protocol.commands import SetParameter
 from supple.app.viewer.protocol.parameters import PARAMETERS, Parameter, Value
@@ -79,3 +80,30 @@ class ParameterInput:
             # Within the lock: otherwise `show` could set an old value between the two.
             name, whose = self.parameter.name, self._whose()
             self._pending.requested(self._controller.send(client, lambda: SetParameter(name, value, whose)))
+
+
+# An input of a visitor is kept for this time, even after the simulation has executed its command [s], because a visitor
+# who moves a slider continues to move it.
+_KEEP_SECONDS = 1.0
+# A dropped command is never executed: its value is kept for this time [s].
+_LONGEST = 60.0
+
+
+class PendingValue:
+    """Tells whether an input keeps the value of a visitor instead of the value of the simulation.
+
+    During a long step the snapshots still contain the old value.
+    """
+
+    def __init__(self) -> None:
+        self._changed = -math.inf
+        self._number = 0
+
+    def requested(self, number: int) -> None:
+        """Store the number of the command that a visitor has sent."""
+        self._changed, self._number = time.monotonic(), number
+
+    def is_pending(self, applied: int) -> bool:
+        """Whether the value is kept, where the simulation has executed the commands up to `applied`."""
+        since = time.monotonic() - self._changed
+        return since < _KEEP_SECONDS or (applied < self._number and since < _LONGEST)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, sequential
-from supple.app.viewer.controls.parameter_input import ParameterInput
-from supple.app.viewer.controls.pending import PendingValue
+from supple.app.viewer.controls.parameter_input import ParameterInput, PendingValue
 from supple.app.viewer.protocol.commands import SetSolver
 from supple.app.viewer.protocol.parameters import PARAMETERS
 from supple.app.viewer.protocol.snapshots import Snapshot

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from supple.app.viewer.engine.contact_points import contact_points
+from supple.app.viewer.engine.describe import describe, measures, readings, strongest_forces
 from supple.app.viewer.engine.displayed_states import LONGEST_UNSEEN, between, within_step
-from supple.app.viewer.engine.measurement.contact_points import contact_points
-from supple.app.viewer.engine.measurement.describe import describe, measures
-from supple.app.viewer.engine.measurement.readings import readings, strongest_forces
 from supple.app.viewer.engine.pacing import Pacing
 from supple.app.viewer.engine.scene.changes import change
 from supple.app.viewer.engine.scene.live_scene import LiveScene

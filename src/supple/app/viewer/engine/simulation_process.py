@@ -9,8 +9,10 @@ import signal
 import threading
 from multiprocessing.connection import Connection
 
+from supple.app.viewer.engine.step_watch import StepWatch
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
+from supple.app.viewer.protocol.outbox import Outbox
 from supple.errors import SuppleError
 
 
@@ -32,7 +34,6 @@ def run_simulation(source: LiveSource, commands: Connection, snapshots: Connecti
 
 
 def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) -> None:
-    from supple.app.viewer.engine.pulse import report_long_steps
     from supple.app.viewer.engine.scene.live_scene import LiveScene
     from supple.app.viewer.engine.simulation_loop import SimulationLoop
     from supple.app.viewer.protocol.outbox import ERROR, Outbox, packed
@@ -64,3 +65,20 @@ def _read(commands: Connection, inbox: CommandQueue) -> None:
     inbox.close()
     # The loop may be within a long step, and its result is not needed.
     os._exit(0)
+
+
+# A step that takes longer is reported [s], as often.
+LONG = 0.5
+
+
+def report_long_steps(watch: StepWatch, outbox: Outbox) -> None:
+    """Send the progress of steps that take long, from another thread: the loop is within the step."""
+    tick = threading.Event()
+
+    def run() -> None:
+        while not tick.wait(LONG):
+            progress = watch.progress
+            if progress is not None and progress.seconds > LONG:
+                outbox.put_progress(progress)
+
+    threading.Thread(target=run, name="pulse", daemon=True).start()

@@ -5,8 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
-from supple.app.viewer.engine.compile_clock import CompileClock
+from numba.core import event
+
 from supple.app.viewer.protocol.snapshots import Progress
 from supple.errors import SolverError
 from supple.runtime.interruption import interruptible
@@ -65,3 +67,34 @@ class StepWatch:
         """Of the present computation so far [s]; 0 where there is none."""
         began = self._began
         return 0.0 if began is None else time.monotonic() - began
+
+
+class CompileClock(event.Listener):
+    """The total time [s] that Numba compiles, in any thread, since this object was created."""
+
+    def __init__(self) -> None:
+        self._depth = 0  # compilations are nested
+        self._began = self._before = 0.0
+        event.register("numba:compile", self)
+
+    def on_start(self, event: Any) -> None:
+        """Called by Numba."""
+        if self._depth == 0:
+            self._began = time.monotonic()
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        """Called by Numba."""
+        self._depth -= 1
+        if self._depth == 0:
+            self._before += time.monotonic() - self._began
+
+    @property
+    def running(self) -> bool:
+        """Whether Numba compiles now."""
+        return self._depth > 0
+
+    @property
+    def seconds(self) -> float:
+        """The total until now."""
+        return self._before + (time.monotonic() - self._began if self.running else 0.0)

@@ -16,11 +16,21 @@ from numpy.typing import NDArray
 
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.parameters import Value, find_parameter
-from supple.app.viewer.protocol.values import displayed, number, whole
-from supple.errors import CommandError, SceneError
-from supple.kinds.checks import check_name
-
-Point = tuple[float, float, float]
+from supple.app.viewer.protocol.values import (
+    Point,
+    check_mesh,
+    checked_index,
+    checked_length,
+    checked_name,
+    checked_point,
+    checked_shape,
+    checked_vertices,
+    checked_weights,
+    displayed,
+    number,
+    whole,
+)
+from supple.errors import CommandError
 
 
 @dataclass(frozen=True)
@@ -116,7 +126,7 @@ class SetParameter(Command):
         if self.body is not None:
             if parameter.owner != "body":
                 raise CommandError(f"{self.name} belongs to the {parameter.owner}; give no body")
-            _set(self, "body", _name(self.body, "body"))
+            _set(self, "body", checked_name(self.body, "body"))
 
 
 @dataclass(frozen=True)
@@ -165,8 +175,8 @@ class Grab(Command):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _set(self, "vertices", _vertices(self.vertices))
-        _set(self, "weights", _weights(self.weights, len(self.vertices)))
+        _set(self, "vertices", checked_vertices(self.vertices))
+        _set(self, "weights", checked_weights(self.weights, len(self.vertices)))
 
 
 @dataclass(frozen=True)
@@ -272,7 +282,7 @@ class AddMesh(Command):
     name: str = "mesh"
 
     def __post_init__(self) -> None:
-        _mesh_arrays(self.vertices, self.tets)
+        check_mesh(self.vertices, self.tets)
         super().__post_init__()
 
 
@@ -295,90 +305,25 @@ def _set(command: Command, name: str, value: object) -> None:
     object.__setattr__(command, name, value)
 
 
-def _point(value: object, what: str) -> Point:
-    values = _items(value, what, 3, 3)
-    x, y, z = (number(each, what, -limits.FARTHEST, limits.FARTHEST) for each in values)
-    return x, y, z
-
-
-def _items(value: object, what: str, least: int, most: int) -> list[object]:
-    if not isinstance(value, (tuple, list, np.ndarray)) or (isinstance(value, np.ndarray) and value.ndim != 1):
-        raise CommandError(f"{what} is {displayed(value)}; give a list")
-    if not least <= len(value) <= most:
-        raise CommandError(f"{what} has {len(value)} values; give {least if least == most else f'{least} to {most}'}")
-    return list(value)
-
-
-def _mesh_arrays(vertices: object, tets: object) -> None:
-    for array, width, kind, what in ((vertices, 3, "f", "vertices"), (tets, 4, "i", "tets")):
-        if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] != width or array.dtype.kind != kind:
-            raise CommandError(f"{what} must be an array of {width} numbers each")
-    assert isinstance(vertices, np.ndarray)
-    assert isinstance(tets, np.ndarray)
-    if not 1 <= len(tets) <= limits.MOST_TETS or not 4 <= len(vertices) <= 4 * len(tets):
-        raise CommandError(
-            f"{len(tets)} tets, {len(vertices)} vertices; a live page allows at most {limits.MOST_TETS} tets"
-        )
-    if not np.all(np.abs(vertices) <= limits.LARGEST_LENGTH) or tets.min() < 0 or tets.max() >= len(vertices):
-        raise CommandError("a vertex is too far away, or a tet refers to a vertex that does not exist")
-
-
-def _vertices(value: object) -> tuple[int, ...]:
-    vertices = tuple(whole(each, "vertices", 0, 2**31 - 1) for each in _items(value, "vertices", 1, 4))
-    if len(set(vertices)) != len(vertices):
-        raise CommandError(f"vertices {list(vertices)} contains a vertex twice; give each once")
-    return vertices
-
-
-def _weights(value: object, count: int) -> tuple[float, ...]:
-    weights = [number(each, "weights", -1e3, 1e3) for each in _items(value, "weights", count, count)]
-    total = sum(weights)
-    if total < 1e-3:
-        raise CommandError(f"weights {weights} sum to {total:g}; give barycentric coordinates")
-    return tuple(each / total for each in weights)
-
-
-def _index(value: object, what: str) -> int:
-    return whole(value, what, 0, 2**31 - 1)
-
-
-def _length(value: object, what: str) -> float:
-    return number(value, what, limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH)
-
-
-def _shape(value: object, what: str) -> str:
-    if value not in limits.SHAPES:
-        raise CommandError(f"there is no {what} {displayed(value)}; there are {', '.join(limits.SHAPES)}")
-    return str(value)
-
-
 def _parameter(value: object, what: str) -> Value:
     return find_parameter(what).checked(value)
 
 
-def _name(value: object, what: str) -> str:
-    try:
-        check_name(value, what)
-    except SceneError as error:
-        raise CommandError(str(error)) from None
-    return str(value)
-
-
 # By name of the field: equal names have equal meanings. Fields that are not here are checked by their own class.
 _CHECKS: dict[str, Callable[[Any, str], object]] = {
-    "body": _name,
-    "name": _name,
-    "grab": _index,
-    "vertex": _index,
-    "target": _point,
-    "center": _point,
-    "position": _point,
-    "radius": _length,
-    "size": _length,
+    "body": checked_name,
+    "name": checked_name,
+    "grab": checked_index,
+    "vertex": checked_index,
+    "target": checked_point,
+    "center": checked_point,
+    "position": checked_point,
+    "radius": checked_length,
+    "size": checked_length,
     "count": partial(whole, low=1, high=limits.MOST_STEPS),
     "resolution": partial(whole, low=limits.COARSEST, high=limits.FINEST),
     "stiffness": partial(number, low=limits.WEAKEST_GRAB, high=limits.STRONGEST_GRAB),
-    "shape": _shape,
+    "shape": checked_shape,
     "youngs": _parameter,
     "poisson": _parameter,
     "density": _parameter,

@@ -1,4 +1,4 @@
-"""Checks of numbers that came from outside, and how messages display any value from there."""
+"""Checks of values from outside, which raise `CommandError`, and how messages display any value from there."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import math
 
 import numpy as np
 
-from supple.errors import CommandError
+from supple.app.viewer.protocol import limits
+from supple.errors import CommandError, SceneError
+from supple.kinds.checks import check_name
+
+Point = tuple[float, float, float]
 
 
 def displayed(value: object) -> str:
@@ -34,3 +38,68 @@ def whole(value: object, what: str, low: int, high: int) -> int:
     if not low <= value <= high:
         raise CommandError(f"{what} is {displayed(value)}; it must be from {low} to {high}")
     return int(value)
+
+
+def checked_point(value: object, what: str) -> Point:
+    values = checked_items(value, what, 3, 3)
+    x, y, z = (number(each, what, -limits.FARTHEST, limits.FARTHEST) for each in values)
+    return x, y, z
+
+
+def checked_items(value: object, what: str, least: int, most: int) -> list[object]:
+    if not isinstance(value, (tuple, list, np.ndarray)) or (isinstance(value, np.ndarray) and value.ndim != 1):
+        raise CommandError(f"{what} is {displayed(value)}; give a list")
+    if not least <= len(value) <= most:
+        raise CommandError(f"{what} has {len(value)} values; give {least if least == most else f'{least} to {most}'}")
+    return list(value)
+
+
+def check_mesh(vertices: object, tets: object) -> None:
+    for array, width, kind, what in ((vertices, 3, "f", "vertices"), (tets, 4, "i", "tets")):
+        if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] != width or array.dtype.kind != kind:
+            raise CommandError(f"{what} must be an array of {width} numbers each")
+    assert isinstance(vertices, np.ndarray)
+    assert isinstance(tets, np.ndarray)
+    if not 1 <= len(tets) <= limits.MOST_TETS or not 4 <= len(vertices) <= 4 * len(tets):
+        raise CommandError(
+            f"{len(tets)} tets, {len(vertices)} vertices; a live page allows at most {limits.MOST_TETS} tets"
+        )
+    if not np.all(np.abs(vertices) <= limits.LARGEST_LENGTH) or tets.min() < 0 or tets.max() >= len(vertices):
+        raise CommandError("a vertex is too far away, or a tet refers to a vertex that does not exist")
+
+
+def checked_vertices(value: object) -> tuple[int, ...]:
+    vertices = tuple(whole(each, "vertices", 0, 2**31 - 1) for each in checked_items(value, "vertices", 1, 4))
+    if len(set(vertices)) != len(vertices):
+        raise CommandError(f"vertices {list(vertices)} contains a vertex twice; give each once")
+    return vertices
+
+
+def checked_weights(value: object, count: int) -> tuple[float, ...]:
+    weights = [number(each, "weights", -1e3, 1e3) for each in checked_items(value, "weights", count, count)]
+    total = sum(weights)
+    if total < 1e-3:
+        raise CommandError(f"weights {weights} sum to {total:g}; give barycentric coordinates")
+    return tuple(each / total for each in weights)
+
+
+def checked_index(value: object, what: str) -> int:
+    return whole(value, what, 0, 2**31 - 1)
+
+
+def checked_length(value: object, what: str) -> float:
+    return number(value, what, limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH)
+
+
+def checked_shape(value: object, what: str) -> str:
+    if value not in limits.SHAPES:
+        raise CommandError(f"there is no {what} {displayed(value)}; there are {', '.join(limits.SHAPES)}")
+    return str(value)
+
+
+def checked_name(value: object, what: str) -> str:
+    try:
+        check_name(value, what)
+    except SceneError as error:
+        raise CommandError(str(error)) from None
+    return str(value)

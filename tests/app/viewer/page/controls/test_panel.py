@@ -127,7 +127,7 @@ def test_inputs_follow_the_simulation_unless_a_value_is_pending(live, fake, visi
     received()
     displayed = lambda snapshot: until(lambda: live.panel._numbers_of is snapshot)  # noqa: E731
     # The command has not been executed yet: a step may be long.
-    monkeypatch.setattr("supple.app.viewer.controls.pending._KEEP_SECONDS", 0.0)
+    monkeypatch.setattr("supple.app.viewer.controls.parameter_input._KEEP_SECONDS", 0.0)
     displayed(fake.show())
     assert substeps.handle.value == 50
     # Now it has been executed, without effect.
@@ -136,7 +136,7 @@ def test_inputs_follow_the_simulation_unless_a_value_is_pending(live, fake, visi
 
 
 def test_a_selected_solver_is_pending_until_its_command_is_executed(live, fake, visitor, received, until, monkeypatch):
-    monkeypatch.setattr("supple.app.viewer.controls.pending._KEEP_SECONDS", 0.0)
+    monkeypatch.setattr("supple.app.viewer.controls.parameter_input._KEEP_SECONDS", 0.0)
     solver = live.panel.solver
     visitor.set(solver.kind, "implicit")
     assert received() == SetSolver("implicit")

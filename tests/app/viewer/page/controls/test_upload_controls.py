@@ -8,8 +8,8 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.controls import upload_controls
-from supple.app.viewer.controls.plain_markdown import plain
 from supple.app.viewer.controls.upload_controls import body_name, printable_name
+from supple.app.viewer.controls.view.overlay import plain
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import AddMesh
 from supple.errors import MeshError

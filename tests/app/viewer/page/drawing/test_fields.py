@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.controls.view.legend import bar_html
+from supple.app.viewer.controls.view.color_scale import bar_html
 from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
 from supple.results.view.fields import BINS, FIELDS, Limits, Range, bin_of

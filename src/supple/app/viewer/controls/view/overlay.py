@@ -1,4 +1,4 @@
-"""What is above the picture: the start, the state, the legend, and warnings.
+"""What is above the picture: the start, the state, the legend, and warnings; the theme, and texts in Markdown.
 
 They are parts of one HTML element of the panel, which a style sheet places above the picture. A button there is the
 label of a button of the panel: a click on it presses that one.
@@ -70,3 +70,13 @@ class Overlay:
 def button(text: str, handle: Any) -> str:
     """A button above the picture that presses a button of the panel."""
     return f'<label for="{handle._impl.uuid}">{html.escape(text)}</label>'
+
+
+def plain(text: str) -> str:
+    """Markdown that displays exactly this text. Browsers interpret HTML in Markdown, and names can contain anything."""
+    return "".join(c if c.isalnum() or c in " .,:;'()/-+=%" else f"&#{ord(c)};" for c in text)
+
+
+def set_theme(server: Any, dark: bool) -> None:
+    """Make the page bright or dark, for all its visitors, without links of viser."""
+    server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(36, 108, 168), dark_mode=dark)

@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.controls.view.color_range import ColorRange
-from supple.app.viewer.controls.view.legend import arrows_html, bar_html
-from supple.app.viewer.controls.view.overlay import Overlay
+from supple.app.viewer.controls.view.color_scale import ColorRange, arrows_html, bar_html
+from supple.app.viewer.controls.view.overlay import Overlay, set_theme
 from supple.app.viewer.controls.view.probe import Probe
-from supple.app.viewer.theme import set_theme
 from supple.results.view.camera import PRESETS, follow, look_from
 from supple.results.view.fields import FIELDS
 from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.engine.scene.grab_spring import GrabSpring, make_spring
+from supple.app.viewer.engine.scene.grab_spring import GrabSpring, grabbed, make_spring, workspace_for
 from supple.app.viewer.engine.scene.new_bodies import moved_apart
-from supple.app.viewer.engine.scene.pulls import grabbed, workspace_for
 from supple.app.viewer.engine.scene.setup import Setup, Start
 from supple.app.viewer.engine.scene.solvers import kind_of
 from supple.app.viewer.protocol.commands import Grab, MoveGrab

@@ -1,4 +1,4 @@
-"""Materials of a scene file, by `kind`."""
+"""Materials and solvers of a scene file, by `kind`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from supple.app.scene_file.entries import spelling as spelling  # registers how values are written
-from supple.app.scene_file.entries.kinds import KindModel, entry_of
+from supple.app.scene_file.entries.kinds import KindModel, entry_of, model_of
+from supple.app.scene_file.validation_errors import suggestion
+from supple.errors import SolverError
 from supple.kinds.kind import declared
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.hyperelastic.by_law import ByLaw
@@ -14,6 +16,9 @@ from supple.materials.j2_plastic import J2Plastic
 from supple.materials.material import Material
 from supple.materials.registry import UNRELAXED
 from supple.materials.viscoelastic import Viscoelastic
+from supple.solvers.implicit.solver import Implicit
+from supple.solvers.solver import Solver
+from supple.solvers.xpbd.solver import XPBD
 
 ELASTIC: tuple[type[Material], ...] = (*UNRELAXED, J2Plastic, Viscoelastic)
 MATERIALS: tuple[type[Material], ...] = (EdgesAndVolume, *ELASTIC)
@@ -31,3 +36,29 @@ def scene_file_line(material: ByLaw) -> str:
     values = {key: getattr(material, key) for key in declared(type(material)) if key not in skipped}
     texts = [f"{key}: {list(value) if isinstance(value, tuple) else float(value)}" for key, value in values.items()]
     return f"{{kind: {material.kind}, {', '.join(texts)}}}"
+
+
+SOLVERS: tuple[type[Solver], ...] = (XPBD, Implicit)
+
+
+def solver_of_kind(kind: str) -> Solver:
+    """The solver of that kind, with its default parameters.
+
+    Raises
+    ------
+    SolverError : where there is no such kind.
+    """
+    known = {solver.kind: solver for solver in SOLVERS}
+    if kind not in known:
+        raise SolverError(f"there is no solver {kind!r}; {suggestion(kind, known)}")
+    return known[kind]()
+
+
+def model_of_kind(kind: str) -> KindModel:
+    """The solver of that kind, with its default parameters, as a scene file describes it.
+
+    Raises
+    ------
+    SolverError : where there is no such kind.
+    """
+    return model_of(type(solver_of_kind(kind)), True).model_validate({"kind": kind})
