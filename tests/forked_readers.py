@@ -20,7 +20,7 @@ from pathlib import Path
 import meshio, trimesh
 with contextlib.suppress(ImportError):
     from pxr import Sdf, Tf, Usd, UsdGeom
-from supple.mesh.io import child_program
+from supple.mesh.io import in_child
 from supple.mesh.io.libraries import meshio, trimesh, usd
 
 for line in sys.stdin:
@@ -29,7 +29,7 @@ for line in sys.stdin:
     if child == 0:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         os.chdir(Path(path).parent)
-        os._exit(child_program.main(library, Path(path), int(memory), float(seconds), os.getppid()))
+        os._exit(in_child.main(library, Path(path), int(memory), float(seconds), os.getppid()))
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.scene.located import LocatedError
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 CUBE_TETS = [[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]]
@@ -228,3 +229,30 @@ def test_obstacle_poses_follow_functions_and_keyframes():
     np.testing.assert_allclose(lift.pose(1.5)[1], [0, 3, 0])
     with pytest.raises(sp.SceneError, match="shape"):
         sp.obstacles.Sphere(motion=lambda t: np.zeros((8, 3))).pose(0.0)
+
+
+def test_loads_are_of_every_kind(tmp_path):
+    """Forces and soft targets too, with errors where they are given; a scene file has them in its list as well."""
+    bodies = [body("a")]
+    loads = [sp.Force("a", [1], (0, 0, 2.0)), sp.Pressure("a", 3.0), sp.SoftTarget("a", [2], 5.0)]
+    scene = sp.Scene(bodies, forces=[sp.Force("a", [0], (0, 0, 1.0))], loads=loads)
+    assert [force.force[2] for force in scene.forces] == [1.0, 2.0]
+    assert (scene.loads, scene.soft_targets) == (tuple(loads[1:2]), tuple(loads[2:]))
+    with pytest.raises(LocatedError, match="vertex 999 does not exist") as caught:
+        sp.Scene(bodies, loads=[loads[1], sp.Force("a", [999], (0, 0, 1.0))])
+    assert caught.value.keys == ("loads", 1, "vertices")
+    with pytest.raises(sp.SceneError, match=r"loads\[0\] is a Pin; give a Load or Force or SoftTarget"):
+        sp.Scene(bodies, loads=[sp.Pin("a", [1])])
+    path = tmp_path / "scene.yaml"
+    path.write_text(
+        "bodies: [{name: a, shape: {kind: box}, material: {kind: arap, youngs: 1e4, poisson: 0.3}}]\n"
+        "loads:\n"
+        "  - {kind: pressure, body: a, pressure: 3}\n"
+        "  - {kind: soft_target, body: a, vertices: [2], stiffness: 5}\n"
+        "  - {kind: force, body: a, vertices: [1], force: [0, 0, 2]}\n"
+    )
+    scene = sp.load_scene(path)
+    assert [len(part) for part in (scene.loads, scene.forces, scene.soft_targets)] == [1, 1, 1]
+    path.write_text(path.read_text().replace("[1]", "[999]"))
+    with pytest.raises(sp.SceneError, match=r"scene.yaml:5: .*vertex 999 does not exist"):
+        sp.load_scene(path)

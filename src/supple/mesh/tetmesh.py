@@ -31,9 +31,9 @@ from supple.mesh.topology import (
     TET_FACETS,
     Components,
     connected_components,
-    facet_keys,
     has_vertex_twice,
     is_used,
+    tet_neighbours,
     unique_edges,
     without_unused,
 )
@@ -220,7 +220,7 @@ class TetMesh(Displayed):
     @cached_property
     def adjacency(self) -> NDArray[np.int32]:
         """Neighbour of each tet across the facet opposite each of its vertices (m, 4); -1 on the boundary."""
-        return frozen(_neighbours(self.tets, len(self.vertices)))
+        return frozen(tet_neighbours(self.tets, len(self.vertices)))
 
     @cached_property
     def surface(self) -> SurfaceMesh:
@@ -335,27 +335,3 @@ def _check_duplicates(tets: NDArray[np.int32], n_vertices: int) -> None:
         raise MeshError(
             f"TetMesh: tet {b} {tets[b].tolist()} has the same four vertices as tet {a}; remove one of them"
         )
-
-
-def _neighbours(tets: NDArray[np.int32], n_vertices: int) -> NDArray[np.int32]:
-    keys = np.concatenate([facet_keys(tets[:, facet], n_vertices) for facet in TET_FACETS])
-    # Position in `keys` is facet * m + tet.
-    order = np.argsort(keys, kind="stable")
-    ordered = keys[order]
-    same = ordered[1:] == ordered[:-1]
-    overlapping = same[1:] & same[:-1]
-    m = len(tets)
-    if overlapping.any():
-        k = int(np.flatnonzero(overlapping)[0])
-        facet, tet = divmod(int(order[k]), m)
-        owners = sorted(int(t) % m for t in order[k : k + 3])
-        corners = sorted(tets[tet, TET_FACETS[facet]].tolist())
-        raise MeshError(
-            f"TetMesh: tets {owners[0]}, {owners[1]} and {owners[2]} all share the facet {corners}; a facet can have "
-            "two tets at most, so some of them overlap: remove them or remesh"
-        )
-    first, second = order[:-1][same], order[1:][same]
-    neighbour = np.full(4 * m, -1, dtype=np.int32)
-    neighbour[first] = second % m
-    neighbour[second] = first % m
-    return np.ascontiguousarray(neighbour.reshape(4, m).T)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen
 
 # Facet k of a positive tet lies opposite its vertex k and is counter-clockwise seen from outside.
@@ -97,3 +98,33 @@ def connected_components(simplices: NDArray[np.int32], n_vertices: int) -> Compo
     # Vertices that no element uses would count as pieces of their own; renumber by the elements alone.
     used, labels = np.unique(of_vertex[simplices[:, 0]], return_inverse=True)
     return Components(len(used), frozen(labels.astype(np.int32)))
+
+
+def tet_neighbours(tets: NDArray[np.int32], n_vertices: int) -> NDArray[np.int32]:
+    """Neighbour (m, 4) of each tet across the facet opposite each of its vertices; -1 on the boundary.
+
+    Raises
+    ------
+    MeshError : where three tets or more share a facet.
+    """
+    keys = np.concatenate([facet_keys(tets[:, facet], n_vertices) for facet in TET_FACETS])
+    # Position in `keys` is facet * m + tet.
+    order = np.argsort(keys, kind="stable")
+    ordered = keys[order]
+    same = ordered[1:] == ordered[:-1]
+    overlapping = same[1:] & same[:-1]
+    m = len(tets)
+    if overlapping.any():
+        k = int(np.flatnonzero(overlapping)[0])
+        facet, tet = divmod(int(order[k]), m)
+        owners = sorted(int(t) % m for t in order[k : k + 3])
+        corners = sorted(tets[tet, TET_FACETS[facet]].tolist())
+        raise MeshError(
+            f"TetMesh: tets {owners[0]}, {owners[1]} and {owners[2]} all share the facet {corners}; a facet can have "
+            "two tets at most, so some of them overlap: remove them or remesh"
+        )
+    first, second = order[:-1][same], order[1:][same]
+    neighbour = np.full(4 * m, -1, dtype=np.int32)
+    neighbour[first] = second % m
+    neighbour[second] = first % m
+    return np.ascontiguousarray(neighbour.reshape(4, m).T)

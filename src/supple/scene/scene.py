@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,7 +47,7 @@ _PARTS = (
     ("soft_targets", SoftTarget),
     ("stitches", Stitch),
     ("contact_pairs", ContactPair),
-    ("loads", Load),
+    ("loads", Load | Force | SoftTarget),
     ("sensors", Sensor),
     ("joints", Joint),
     ("welds", Weld),
@@ -58,7 +58,7 @@ _PARTS = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene(Showable):
-    """Bodies, obstacles, pins, forces, soft targets and stitches under gravity.
+    """Bodies, obstacles, pins, loads and stitches under gravity.
 
     Parameters
     ----------
@@ -66,9 +66,10 @@ class Scene(Showable):
     obstacles : rigid things that bodies collide with. No two bodies or obstacles have the same name.
     pins : fixed or scripted vertices.
     gravity : (3,) acceleration [m/s^2].
-    forces : loads on vertices; soft_targets : springs to places.
+    forces, soft_targets : loads of these two kinds, which can also be given among `loads`.
+    loads : of every kind: `Force`, `SoftTarget`, tractions, pressures, forces per mass, wind, springs between points,
+        muscles, and growths. The scene keeps the first two in `forces` and `soft_targets`.
     stitches : joints of bodies with each other, and with triangle obstacles.
-    loads : tractions, pressures, forces per mass, springs between points, muscles, and growths.
     sensors : of contact on surfaces; no two have the same name.
     cavities : closed inner surfaces filled with gas or liquid; cables : through points of bodies. No two cavities and
         no two cables have the same name.
@@ -89,7 +90,7 @@ class Scene(Showable):
     soft_targets: Sequence[SoftTarget] = ()
     stitches: Sequence[Stitch] = ()
     contact_pairs: Sequence[ContactPair] = ()
-    loads: Sequence[Load] = ()
+    loads: Sequence[Load | Force | SoftTarget] = ()
     sensors: Sequence[Sensor] = ()
     joints: Sequence[Joint] = ()
     welds: Sequence[Weld] = ()
@@ -106,6 +107,11 @@ class Scene(Showable):
                 if not isinstance(item, kind):
                     raise SceneError(f"scene: {key}[{i}] is a {type(item).__name__}; give a {_name(kind)}")
             object.__setattr__(self, key, items)
+        # Where a part was given, for errors; unless it is among `loads`, its number is that in its own list.
+        given = {id(load): ("loads", i) for i, load in enumerate(self.loads)}
+        for key, kind in (("forces", Force), ("soft_targets", SoftTarget)):
+            object.__setattr__(self, key, (*getattr(self, key), *(one for one in self.loads if isinstance(one, kind))))
+        object.__setattr__(self, "loads", tuple(load for load in self.loads if isinstance(load, Load)))
         if not self.bodies:
             raise SceneError("scene: there is no body; give at least one")
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
@@ -124,10 +130,10 @@ class Scene(Showable):
         pinned = {body.name: np.zeros(len(body.points), dtype=bool) for body in self.bodies}
         for key in ("pins", "forces", "soft_targets"):
             for i, item in enumerate(getattr(self, key)):
-                with at(key, i):
+                with at(*given.get(id(item), (key, i))):
                     self._check_selection(item, pinned)
-        for i, load in enumerate(self.loads):
-            with at("loads", i):
+        for load in self.loads:
+            with at(*given[id(load)]):
                 load.check(self.bodies)
         for i, sensor in enumerate(self.sensors):
             with at("sensors", i):
@@ -302,8 +308,10 @@ def _check_own_name(kind: str, item: Cavity | Cable | Sensor, others: Sequence[C
         raise SceneError(f"{item.label}: another {kind} has this name; give each a name of its own")
 
 
-def _name(kind: type) -> str:
-    return "Body or RigidBody" if kind is PlacedBody else kind.__name__
+def _name(kind: Any) -> str:
+    if kind is PlacedBody:
+        return "Body or RigidBody"
+    return " or ".join(one.__name__ for one in get_args(kind) or (kind,))
 
 
 def _all_named(things: Sequence[Named], bodies: Sequence[str]) -> tuple[Named, ...]:

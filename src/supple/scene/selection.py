@@ -47,6 +47,32 @@ class InBox(Kind):
 Selection = ArrayLike | InBox
 
 
+def distinct_numbers(value: Any, what: str, thing: str, things: str, else_: str) -> NDArray[np.int64]:
+    """Numbers (k,) of vertices, triangles or tets, counted from 0.
+
+    Parameters
+    ----------
+    thing, things : what is numbered, in the singular and the plural; else_ : what may be given otherwise, for messages
+
+    Raises
+    ------
+    SceneError : where there is none, or they are not whole, negative, or not distinct.
+    """
+    try:
+        rows = np.atleast_1d(np.asarray(value))
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} is {value!r}; give numbers of {things}, {else_}") from None
+    if rows.ndim != 1 or rows.size == 0 or not np.issubdtype(rows.dtype, np.integer):
+        raise SceneError(f"{what} must be a non-empty list of whole numbers, {else_}")
+    if len(np.unique(rows)) != len(rows):
+        raise SceneError(f"{what} names a {thing} twice; name each once")
+    if rows.min() < 0:
+        raise SceneError(f"{what} holds {rows.min()}, which is negative; {things} are counted from 0")
+    if rows.max() > np.iinfo(np.int32).max:
+        raise SceneError(f"{what} holds {rows.max()}, which is more than any mesh has")
+    return rows.astype(np.int64)
+
+
 @dataclass(frozen=True)
 class Vertices(Form):
     """Numbers of vertices, or an `InBox`, checked as far as possible without their body.
@@ -61,19 +87,7 @@ class Vertices(Form):
     def checked(self, value: Any, what: str) -> NDArray[np.int32] | InBox:
         if isinstance(value, InBox):
             return value
-        try:
-            indices = np.atleast_1d(np.asarray(value))
-        except (TypeError, ValueError):
-            raise SceneError(f"{what} is {value!r}; give indices or an InBox") from None
-        if indices.ndim != 1 or indices.size == 0 or not np.issubdtype(indices.dtype, np.integer):
-            raise SceneError(f"{what} must be a non-empty list of whole numbers, or an InBox")
-        if len(np.unique(indices)) != len(indices):
-            raise SceneError(f"{what} names a vertex twice; name each once")
-        if indices.min() < 0:
-            raise SceneError(f"{what} holds {indices.min()}, which is negative; indices begin at 0")
-        if indices.max() > np.iinfo(np.int32).max:
-            raise SceneError(f"{what} holds {indices.max()}, which is more than any mesh has")
-        return indices.astype(np.int32)
+        return distinct_numbers(value, what, "vertex", "vertices", "or an InBox").astype(np.int32)
 
 
 class OnVertices(Kind):

@@ -75,7 +75,7 @@ KINDS_OF_LISTS: dict[str, Sequence[type[Kind]]] = {
     "obstacles": tuple(OBSTACLES.values()),
     "pins": (Pin,),
     "forces": (Force,),
-    "loads": tuple(LOADS),
+    "loads": (*LOADS, Force, SoftTarget),
     "cavities": (Cavity,),
     "cables": (Cable,),
     "sensors": SENSORS,

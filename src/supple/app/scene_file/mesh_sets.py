@@ -12,7 +12,7 @@ from supple.errors import SceneError
 from supple.mesh.sets import MeshSets
 from supple.scene.located import at
 
-_SELECTIONS = ("pins", "forces", "soft_targets", "welds")
+_SELECTIONS = ("pins", "forces", "soft_targets", "loads", "welds")
 
 
 def with_numbers(model: SceneFileModel, meshes: MeshStore) -> SceneFileModel:
@@ -25,15 +25,19 @@ def with_numbers(model: SceneFileModel, meshes: MeshStore) -> SceneFileModel:
     changes: dict[str, Any] = {}
     for key in _SELECTIONS:
         entries = getattr(model, key)
-        if any(entry.set is not None for entry in entries):
+        if any(_set(entry) is not None for entry in entries):
             changes[key] = [_selected(entry, model, meshes, (key, i)) for i, entry in enumerate(entries)]
     if any(region.set is not None for body in model.bodies for region in body.regions or ()):
         changes["bodies"] = [_body(body, meshes, i) for i, body in enumerate(model.bodies)]
     return model.model_copy(update=changes) if changes else model
 
 
+def _set(entry: Any) -> str | None:
+    return getattr(entry, "set", None)  # some loads have no vertices
+
+
 def _selected(entry: Any, model: SceneFileModel, meshes: MeshStore, place: tuple[str, int]) -> Any:
-    if entry.set is None:
+    if _set(entry) is None:
         return entry
     with at(*place, "set"):
         body = next((body for body in model.bodies if _is_of(entry.body, body)), None)

@@ -1,18 +1,25 @@
-"""Reading a file with a library that trusts it, in a child process with limits of memory and time."""
+"""Reading a file with a library that trusts it, in a child process with limits of memory and time.
+
+The child runs this module as its program.
+"""
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import subprocess
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 from textwrap import shorten
+from typing import Any
 
 import numpy as np
 
 from supple.mesh.io.cells import CellSoup, FormatError, MeshFile
+from supple.runtime.memory import end_with_parent, limit_process
 
 # What a library needs of memory: itself, and numbers of Python's for each byte of a text [bytes].
 _LEAST_MEMORY, _MEMORY_OF_A_BYTE = 2**31, 64
@@ -41,7 +48,7 @@ def _read(data: bytes, library: str, suffix: str) -> MeshFile:
         (folder / f"file{suffix}").write_bytes(data)
         memory = _LEAST_MEMORY + _MEMORY_OF_A_BYTE * len(data)
         seconds = _SECONDS + _SECONDS_OF_A_BYTE * len(data)
-        command = [sys.executable, "-P", "-m", "supple.mesh.io.child_program", library, str(folder / f"file{suffix}")]
+        command = [sys.executable, "-P", "-m", "supple.mesh.io.in_child", library, str(folder / f"file{suffix}")]
         environment = os.environ | {
             "PYTHONPATH": os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry),
             "OPENBLAS_NUM_THREADS": "1",  # each thread would reserve address space
@@ -73,3 +80,32 @@ def _read(data: bytes, library: str, suffix: str) -> MeshFile:
                 {each: arrays[f"{kind}_{k}"] for k, each in enumerate(answer["sets"][kind])} for kind in ("node", "tet")
             ]
         return MeshFile(soup, *sets)
+
+
+def main(library: str, path: Path, memory: int, seconds: float, parent: int) -> int:
+    """Read the file; beside it are then `answer.json` and the arrays. Returns 0, or 1 where the answer is an error."""
+    end_with_parent(parent)
+    limit_process(seconds, memory)
+    # NumPy warns where a text ends before the numbers that it should have.
+    warnings.simplefilter("error", DeprecationWarning)
+    answer: dict[str, Any] = {}
+    try:
+        found = importlib.import_module(f"supple.mesh.io.libraries.{library}").read_file(path)
+        named = {"node": found.node_sets, "tet": found.tet_sets}
+        sets = {f"{kind}_{k}": rows for kind, own in named.items() for k, rows in enumerate(own.values())}
+        np.savez(path.with_name("arrays.npz"), **found.soup._asdict(), **sets)
+        answer["sets"] = {kind: list(own) for kind, own in named.items()}
+    except FormatError as error:
+        answer = {"error": error.reason, "ours": True}
+    except MemoryError:
+        answer = {"error": f"it needs more than {memory >> 20} MiB"}
+    except OSError as error:  # of its own files: what it reads is there
+        answer = {"disk": error.strerror or str(error)}
+    except (Exception, SystemExit) as error:  # of any kind: the library trusts its file
+        answer = {"error": " ".join(f"{type(error).__name__}: {error}".split())}
+    path.with_name("answer.json").write_text(json.dumps(answer), "utf-8")
+    return 0 if "sets" in answer else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]), int(sys.argv[5])))

@@ -14,12 +14,12 @@ from supple.errors import SceneError
 from supple.kinds.forms import Form
 from supple.kinds.kind import Kind
 from supple.scene.body import PlacedBody
-from supple.scene.selection import InBox
+from supple.scene.selection import InBox, distinct_numbers
 from supple.scene.suggestion import suggestion
 
 
 class Load(Kind, ABC):
-    """The base class of loads; those on vertices alone are `Force`."""
+    """The base class of loads, but for those on vertices alone: `Force` and `SoftTarget`."""
 
     name: str | None
 
@@ -123,17 +123,7 @@ class Rows(Form):
     def checked(self, value: Any, what: str) -> Region:
         if isinstance(value, InBox) and self.boxes:
             return value
-        try:
-            rows = np.atleast_1d(np.asarray(value))
-        except (TypeError, ValueError):
-            raise SceneError(f"{what} is {value!r}; give numbers of {self.things}, an InBox, or None") from None
-        if rows.ndim != 1 or rows.size == 0 or not np.issubdtype(rows.dtype, np.integer):
-            raise SceneError(f"{what} must be a non-empty list of whole numbers, an InBox, or None")
-        if rows.min() < 0:
-            raise SceneError(f"{what} holds {rows.min()}, which is negative; {self.things} are counted from 0")
-        if len(np.unique(rows)) != len(rows):
-            raise SceneError(f"{what} names a {self.things[:-1]} twice; name each once")
-        return rows.astype(np.int64)
+        return distinct_numbers(value, what, self.things[:-1], self.things, "an InBox, or None")
 
 
 TRIANGLES, TETS = Rows("triangles"), Rows("tets")
