@@ -90,7 +90,7 @@ class Scene(Showable):
     soft_targets: Sequence[SoftTarget] = ()
     stitches: Sequence[Stitch] = ()
     contact_pairs: Sequence[ContactPair] = ()
-    loads: Sequence[Load | Force | SoftTarget] = ()
+    loads: Sequence[Any] = ()  # of `Load`, `Force` and `SoftTarget`; then of `Load` alone
     sensors: Sequence[Sensor] = ()
     joints: Sequence[Joint] = ()
     welds: Sequence[Weld] = ()

@@ -90,11 +90,6 @@ class Model:
         corners = self.rest_positions[self.tets]
         return np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).astype(np.float64, copy=False)
 
-    @cached_property
-    def rest_centers(self) -> NDArray[np.float64]:
-        """(m, 3) centers of the tets at rest [m]."""
-        return self.rest_positions[self.tets].sum(axis=1) / 4.0
-
 
 @dataclass(frozen=True, eq=False)
 class Facets:
