@@ -40,7 +40,7 @@ def test_a_surface_becomes_the_body_in_metres(tmp_path, capsys, factor, scale):
     body = scene.bodies[0]
     lowest = body.place(body.mesh.vertices)[:, 1].min()
     assert lowest == pytest.approx(0.1 * np.ptp(ball.vertices, axis=0).max(), rel=0.01), "above the floor"
-    assert len(scene.bodies[0].mesh.tets) == pytest.approx(5000, rel=0.1)
+    assert len(scene.bodies[0].mesh.tets) == pytest.approx(2000, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ def test_a_fine_surface_in_millimetres_away_from_the_origin(caplog):
         run = load_run("part.stl")
     (body,) = run.scene.bodies
     assert body.name == "part"
-    assert len(body.mesh.tets) == pytest.approx(5000, rel=0.1)
+    assert len(body.mesh.tets) == pytest.approx(2000, rel=0.1)
     assert body.mesh.volume == pytest.approx(BALL.volume, rel=0.02)
     assert body.skin is not None
     assert len(body.skin.triangles) == len(BALL.triangles)
@@ -36,7 +36,7 @@ def test_a_fine_surface_in_millimetres_away_from_the_origin(caplog):
     assert np.abs(0.5 * (low + high)[[0, 2]]).max() < 1e-3
     assert [type(obstacle).__name__ for obstacle in run.scene.obstacles] == ["HalfSpace"]
     said = [record.getMessage() for record in caplog.records]
-    assert any("taken to be in millimetres (scale: 0.001)" in text and "about 5,000 tets" in text for text in said)
+    assert any("taken to be in millimetres (scale: 0.001)" in text and "about 2,000 tets" in text for text in said)
     assert any(f"its {len(BALL.triangles)} triangles are drawn" in text for text in said)
     assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
 
@@ -51,7 +51,7 @@ def test_an_open_surface_is_closed():
     middle = BALL.vertices[BALL.triangles].mean(axis=1)
     sp.SurfaceMesh(BALL.vertices, BALL.triangles[middle[:, 1] < 0.045]).compact().save("part.stl")
     assert "repair: true" in load_run("part.stl").text
-    assert len(load_run("part.stl").scene.bodies[0].mesh.tets) == pytest.approx(5000, rel=0.1)
+    assert len(load_run("part.stl").scene.bodies[0].mesh.tets) == pytest.approx(2000, rel=0.1)
 
 
 def test_a_scene_without_a_size_has_no_more_tets_than_by_default(caplog):
@@ -59,7 +59,7 @@ def test_a_scene_without_a_size_has_no_more_tets_than_by_default(caplog):
     with open("a.yaml", "w", encoding="utf-8") as file:
         file.write("bodies: [{name: a, mesh: {file: part.stl}, material: {kind: arap, youngs: 1e5, poisson: 0.3}}]")
     (body,) = sp.load_scene("a.yaml").bodies
-    assert len(body.mesh.tets) == pytest.approx(5000, rel=0.1)
+    assert len(body.mesh.tets) == pytest.approx(2000, rel=0.1)
     assert body.skin is not None
 
 

@@ -10,7 +10,7 @@ from supple.app.viewer.controls.controller import Controller, notify, sequential
 from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
 from supple.app.viewer.controls.view.overlay import Overlay, button, plain
 from supple.app.viewer.protocol import limits
-from supple.app.viewer.protocol.commands import Command, Pause, Play, Reset, SetParameter, SetSpeed, Step
+from supple.app.viewer.protocol.commands import Command, Pause, Play, Reset, SetSpeed, Step
 from supple.app.viewer.protocol.snapshots import Progress, Snapshot
 from supple.errors import SuppleError
 
@@ -149,7 +149,10 @@ class Bottleneck(NamedTuple):
 
 
 def bottleneck(snapshot: Snapshot) -> Bottleneck | None:
-    """Why the simulation falls behind the requested speed; None where it does not."""
+    """Why the simulation falls behind the requested speed; None where it does not.
+
+    The remedy is slow motion: fewer substeps or iterations would make the result wrong.
+    """
     timing, scene = snapshot.timing, snapshot.description
     if snapshot.paused or timing.keeps_up:
         return None
@@ -160,9 +163,6 @@ def bottleneck(snapshot: Snapshot) -> Bottleneck | None:
     iterations = snapshot.measures.iterations
     if scene.solver == "xpbd":
         cause = f"{step}: {iterations} substeps of {scene.n_tets} tets, {snapshot.measures.contacts} contacts"
-        fewer = int(0.8 * iterations * allowed / timing.step_ms)
-        if 1 <= fewer < iterations and "substeps" in scene.values:
-            return Bottleneck(cause, f"Use {fewer} substep{'s' * (fewer > 1)}", SetParameter("substeps", fewer))
     else:
         contacts = snapshot.measures.contacts
         cause = f"{step}: {iterations} Newton iterations with {scene.n_tets} tets and {contacts} contacts"

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from supple.app.viewer import live_page
-from supple.app.viewer.protocol.commands import Play, SetParameter, SetSpeed, SetView
+from supple.app.viewer.protocol.commands import Play, SetSpeed, SetView
 from supple.app.viewer.protocol.snapshots import Progress, Reading, Timing
 
 
@@ -16,10 +16,10 @@ def test_the_page_names_the_bottleneck_and_has_a_remedy(live, fake, visitor, rec
     slow = Timing(40.0, 25.0, 0.42, keeps_up=False)
     fake.show(paused=False, timing=slow, measures=measures)
     until(lambda: "a step takes 40 ms of 17 ms: 20 substeps of 96 tets" in warning())
-    assert "Use 6 substeps" in warning()
+    assert "Slow motion 0.3" in warning()
     assert "0.42 of real time" in live.panel.time._message.content
     visitor.press(live.panel.time.remedy)
-    assert received() == SetParameter("substeps", 6)
+    assert received() == SetSpeed(0.3)
     implicit = replace(fake.snapshot.description, solver="implicit", values={"dt": 0.02}, revision=2)
     measures = replace(measures, iterations=9, contacts=7)
     fake.show(description=implicit, measures=measures)
