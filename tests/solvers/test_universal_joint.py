@@ -10,7 +10,7 @@ from supple.results.view.from_recording import model_of_recording, moment_of_fra
 from supple.results.view.layers.joints import joint_lines, joint_segments
 from supple.scene.rotation import rotation_matrix
 
-SOLVERS = {"xpbd": sp.XPBD(substeps=20), "implicit": sp.Implicit(contact=None, integrator="bdf2")}
+SOLVERS = {"xpbd": sp.XPBD(substeps=10), "implicit": sp.Implicit(contact=None, integrator="bdf2")}
 BOTH = pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 BEND = 0.6
 
@@ -94,7 +94,7 @@ def test_both_solvers_swing_alike():
     places = {"axis": (0, 1, 0), "second_axis": (0, 0, 1)}
     joints = [sp.UniversalJoint("a", point=(0, 0, 0), **places), sp.UniversalJoint("b", "a", point=(1, 0, 0), **places)]
     ends = []
-    for solver in (sp.XPBD(substeps=40), sp.Implicit(contact=None, integrator="bdf2")):
+    for solver in (sp.XPBD(substeps=10), sp.Implicit(contact=None, integrator="bdf2")):
         last = converged(sp.simulate(sp.Scene(bodies, joints=joints), solver, 0.005, 80))[-1]
         ends.append(last.poses["b"].translation)
     np.testing.assert_allclose(ends[0], ends[1], atol=0.02)

@@ -9,7 +9,6 @@ import pytest
 from supple.contact.additive_ccd import KEEP, ROUND_OFF, edge_edge_time, point_triangle_time
 from supple.runtime.kernel_cache import njit
 
-COUNT = 10_000
 POINT_TRIANGLE, EDGE_EDGE = 0, 1
 
 
@@ -29,7 +28,7 @@ def times(kind, x, way):
     return out
 
 
-def configurations(kind, count=COUNT):
+def configurations(kind, count):
     """Four points and their ways: random, coplanar, parallel, without area or length, nearly touching, sliding.
 
     Sizes are 1e-9 to 1e3 m, and the places up to 1e3 m from the origin, as far as the points remain distinct.
@@ -88,9 +87,10 @@ def errors(x, way):
     return 2.0 * ROUND_OFF * (np.abs(x).max(axis=(1, 2)) + np.abs(way).max(axis=(1, 2)))
 
 
+@pytest.mark.parametrize("count", [3000, pytest.param(10_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", [POINT_TRIANGLE, EDGE_EDGE])
-def test_every_pair_keeps_a_tenth_of_its_distance_and_no_step_is_needlessly_short(kind):
-    x, way, family = configurations(kind)
+def test_every_pair_keeps_a_tenth_of_its_distance_and_no_step_is_needlessly_short(kind, count):
+    x, way, family = configurations(kind, count)
     t = times(kind, x, way)
     start = distances(kind, x, way, np.zeros(len(x)))
     limited = t <= 1.0
@@ -109,7 +109,7 @@ def test_every_pair_keeps_a_tenth_of_its_distance_and_no_step_is_needlessly_shor
 @pytest.mark.parametrize("kind", [POINT_TRIANGLE, EDGE_EDGE])
 def test_steps_agree_with_the_library(kind):
     """Both keep a tenth of the distance. Where it falls to about that and grows again, one may stop, the other not."""
-    x, way, _ = configurations(kind, 3000)
+    x, way, _ = configurations(kind, 2000)
     start = distances(kind, x, way, np.zeros(len(x)))
     plain = start > 1e-6 * np.abs(x).max(axis=(1, 2))  # where round-off is no issue for the library either
     ccd = ipctk.AdditiveCCD()
@@ -119,7 +119,7 @@ def test_steps_agree_with_the_library(kind):
         hit, toi = detect(*(a / np.abs(a).max()), *((a + p) / np.abs(a).max()))
         expected.append(toi if hit else 1.0)
     found = np.minimum(times(kind, x[plain], way[plain]), 1.0)
-    assert len(found) > 1500
+    assert len(found) > 1000
     ratio = found / np.array(expected)
     assert (np.quantile(ratio, [0.01, 0.5, 0.99]) > [0.95, 0.99, 0.99]).all()
     assert (np.quantile(ratio, [0.01, 0.5, 0.99]) < [1.01, 1.01, 1.4]).all()

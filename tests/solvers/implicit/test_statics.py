@@ -102,7 +102,7 @@ def manufactured_errors(n):
 
 
 def test_manufactured_solution_converges_at_the_rates_of_linear_elements():
-    coarse, fine = manufactured_errors(10), manufactured_errors(20)
+    coarse, fine = manufactured_errors(8), manufactured_errors(16)
     assert np.log2(coarse[0] / fine[0]) >= 1.9
     assert np.log2(coarse[1] / fine[1]) >= 0.9
 
@@ -123,15 +123,20 @@ def cantilever(along, across):
     return -moved, frame.report.details.reaction_forces["pin 'wall' of body 'beam'"]
 
 
-def test_cantilever_approaches_timoshenko_from_below():
+@pytest.mark.parametrize(
+    ("cells", "share"),
+    [([(20, 2), (40, 4)], 0.7), pytest.param([(40, 4), (130, 15)], 0.97, marks=pytest.mark.slow)],
+)
+def test_cantilever_approaches_timoshenko_from_below(cells, share):
     timoshenko = 4.031e-4
     deflections = []
-    for along, across in ((20, 2), (40, 4), (130, 15)):
+    for along, across in cells:
         deflection, reaction = cantilever(along, across)
         deflections.append(deflection)
         assert np.allclose(reaction, (0, 0.01, 0), atol=1e-8)
-    assert deflections[0] < deflections[1] < deflections[2] < timoshenko
-    assert deflections[2] > 0.97 * timoshenko
+    print(deflections, timoshenko)
+    assert share * timoshenko < deflections[1]
+    assert deflections[0] < deflections[1] < timoshenko
 
 
 @pytest.mark.parametrize(

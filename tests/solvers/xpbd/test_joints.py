@@ -1,58 +1,21 @@
-"""Joints of rigid bodies in `XPBD`: pendulums, a gyroscope, a chain, limits, motors, reactions."""
+"""Joints of rigid bodies in `XPBD`: a chain, sliders, contact, starts and motors that are refused."""
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.spatial.transform import Rotation
-from scipy.special import ellipk
-from tests.scenes import G, bar, converged, gyroscope, hinge, rate_of_precession
+from tests.scenes import G, bar, converged, hinge
 
 import supple as sp
 
 MASS = 2.5
 
 
-def run(scene, steps, substeps=20, dt=1 / 60, *, violation=1e-4, contact=None, **more):
+def run(scene, steps, substeps=10, dt=1 / 60, *, violation=1e-4, contact=None, **more):
     frames = converged(
         sp.simulate(scene, sp.XPBD(substeps=substeps, contact=contact, sleep_after=None), dt, steps, **more)
     )
     assert max(max(one.violation for one in frame.report.joints.values()) for frame in frames) < violation
     return frames
-
-
-def test_a_compound_pendulum_has_its_period():
-    """Released at 60 degrees; the exact period is that of the elliptic integral."""
-    a = np.radians(60.0)
-    down = np.array([np.sin(a), -np.cos(a), 0.0])
-    body = bar(position=0.5 * down, rotation=(0, 0, a - np.pi / 2))
-    frames = run(sp.Scene([body], joints=[hinge()]), 35)
-    inertia = body.properties.inertia[2, 2] + 0.25 * MASS
-    quarter = np.sqrt(inertia / (MASS * G * 0.5)) * ellipk(np.sin(a / 2) ** 2)
-    sides = np.array([frame.poses["bar"].translation[0] for frame in frames])
-    at = np.flatnonzero(sides[1:] * sides[:-1] < 0.0)[0]
-    crossed = (at + 1 + sides[at] / (sides[at] - sides[at + 1])) / 60
-    assert crossed == pytest.approx(quarter, rel=0.002)
-    # At the bottom, the hinge carries the weight and the centripetal force.
-    rate2 = 2.0 * MASS * G * 0.5 * (1.0 - np.cos(a)) / inertia
-    assert frames[at].report.joints["hinge"].force[1] == pytest.approx(MASS * (G + rate2 * 0.5), rel=0.01)
-
-
-@pytest.mark.parametrize(("substeps", "drift"), [(10, 0.03), pytest.param(40, 0.008, marks=pytest.mark.slow)])
-def test_a_double_pendulum_keeps_its_energy(substeps, drift):
-    """Of first order in the substep."""
-    scene = sp.Scene(
-        [bar("a"), bar("b", position=(1.5, 0, 0))],
-        joints=[hinge("a"), hinge("b", "a", point=(1, 0, 0), name="elbow")],
-    )
-    frames = run(scene, 48, substeps)
-    energies = np.array([frame.report.kinetic_energy + frame.report.potential_energy for frame in frames])
-    assert np.ptp(energies) < drift * np.ptp([frame.report.kinetic_energy for frame in frames])
-
-
-def test_a_gyroscope_precesses():
-    scene, rate = gyroscope()
-    frames = run(scene, 30)
-    assert rate_of_precession(frames, 1 / 60, 1e-3) == pytest.approx(rate, rel=0.01)
 
 
 def chain(count, damping=2e-3):
@@ -90,60 +53,7 @@ def test_a_chain_hangs_in_its_catenary(count, steps, damping):
     assert frames[-1].report.joints["0"].force[1] == pytest.approx(weight / 2, rel=0.01)
 
 
-def test_joints_between_bodies_keep_momentum():
-    turning = np.array([0.0, 2.0, 3.0])
-    first = bar("a", angular_velocity=turning)
-    second = bar("b", position=(1.5, 0, 0), velocity=np.cross(turning, (0.5, 0, 0)))
-    for joint in (sp.BallJoint("a", "b", point=(1, 0, 0)), sp.FixedJoint("a", "b"), sp.SliderJoint("a", "b")):
-        frames = run(sp.Scene([first, second], joints=[joint], gravity=(0, 0, 0)), 12)
-        P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
-        assert np.abs(P - P[0]).max() < 1e-11 * np.linalg.norm(P[0])
-        assert np.abs(L - L[0]).max() < 1e-10 * np.linalg.norm(L[0])
-
-
-def test_what_the_fixed_joint_of_a_cantilever_carries():
-    clamp = run(sp.Scene([bar()], joints=[sp.FixedJoint("bar", point=(0, 0, 0), name="clamp")]), 3)[-1]
-    reading = clamp.report.joints["clamp"]
-    np.testing.assert_allclose(reading.force, [0, MASS * G, 0], atol=1e-4 * MASS * G)
-    np.testing.assert_allclose(reading.torque, [0, 0, MASS * G * 0.5], atol=1e-4 * MASS * G)
-    assert (reading.coordinate, reading.motor_force) == (None, None)
-
-
-LIMITS = (-0.5, 0.4)
 UP = (0, 0, np.pi / 2)
-
-
-@pytest.mark.parametrize(
-    ("values", "end"),
-    [
-        ({"motor": None}, LIMITS[0]),
-        ({"motor": sp.PositionMotor(0.2, stiffness=1e4, damping=1e3)}, 0.2),
-        ({"motor": sp.PositionMotor(0.2, stiffness=1e4, damping=1e2, max_force=10.0)}, LIMITS[0]),
-        ({"motor": sp.VelocityMotor(sp.Curve([0.0, 0.3], [0.0, 1.0]))}, LIMITS[1]),
-        ({"motor": sp.VelocityMotor(0.0, max_force=10.0)}, LIMITS[0]),
-        ({"motor": sp.VelocityMotor(0.0, max_force=13.0)}, 0.0),
-        ({"motor": sp.ForceMotor(lambda t: 20.0)}, LIMITS[1]),
-        ({"friction": 13.0}, 0.0),
-        ({"max_velocity": 0.2}, -0.2 * 0.75),
-        ({"max_velocity": 0.2, "motor": sp.VelocityMotor(5.0)}, 0.2 * 0.75),
-        # A rate of 12.26 / 40 rad/s after 20 ms.
-        ({"damping": 40.0}, -12.26 / 40.0 * (0.75 - 0.02)),
-    ],
-)
-def test_motors_reach_their_targets_and_never_exceed_their_maximum_and_limits_hold(values, end):
-    """The weight turns the hinge with 12.26 N m; a damped one goes with 12.26 / 40 rad/s."""
-    frames = run(sp.Scene([bar()], joints=[hinge(limits=LIMITS, **values)]), 45)
-    if "max_velocity" in values:
-        angles = np.array([0.0, *(frame.report.joints["hinge"].coordinate for frame in frames)])
-        assert np.abs(np.diff(angles)).max() < 0.2 / 60 + 1e-6
-    readings = [frame.report.joints["hinge"] for frame in frames]
-    assert readings[-1].coordinate == pytest.approx(end, abs=2e-2 if "damping" in values else 2e-3)
-    assert all(LIMITS[0] - 1e-5 < one.coordinate < LIMITS[1] + 1e-5 for one in readings)
-    if values.get("motor") is not None:
-        largest = values["motor"].max_force
-        assert max(abs(one.motor_force) for one in readings) <= (largest or np.inf) * (1 + 1e-12)
-        if largest == 10.0:  # on the way down
-            assert readings[5].motor_force == pytest.approx(10.0)
 
 
 def test_a_limit_holds_what_falls_on_a_bar():
@@ -171,23 +81,6 @@ def test_a_slider_lifts_a_bar_and_follows_turns_of_its_obstacle():
     assert reading.coordinate == pytest.approx(0.1 - MASS * G / 1e4, abs=1e-4)
     assert reading.motor_force == pytest.approx(MASS * G, rel=1e-3)
     np.testing.assert_allclose(last.poses["bar"].rotation[:, 0], [np.cos(1), 0, -np.sin(1)], atol=1e-4)
-
-
-def test_swing_and_twist_of_a_ball_are_limited_and_a_wheel_counts_its_turns():
-    ball = sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.5, twist_limits=(-0.2, 0.4), name="ball")
-    axle = sp.HingeJoint("wheel", point=(0.5, 3, 0), axis=(0, 1, 0), motor=sp.VelocityMotor(30.0), name="axle")
-    wheel = bar("wheel", position=(0.5, 3, 0))
-    frames = run(sp.Scene([bar(angular_velocity=(3, 0, 0)), wheel], joints=[ball, axle]), 40)
-    swings = np.array([frame.report.joints["ball"].coordinate for frame in frames])
-    assert swings.max() < 0.5 + 1e-4
-    assert swings[-1] == pytest.approx(0.5, abs=1e-4)
-    twists = [Rotation.from_matrix(frame.poses["bar"].rotation).as_quat() for frame in frames]
-    assert max(2.0 * np.arctan2(x, w) for x, _, _, w in twists) == pytest.approx(0.4, abs=1e-4)
-    angles = [frame.report.joints["axle"].coordinate for frame in frames]
-    np.testing.assert_allclose(angles, 0.5 * np.arange(1, 41), atol=1e-4)
-    assert frames[-1].state.hinge_angles == {"axle": angles[-1]}
-    rest = run(sp.Scene([bar(angular_velocity=(3, 0, 0)), wheel], joints=[ball, axle]), 1, start=frames[-2])
-    np.testing.assert_array_equal(rest[-1].state.positions, frames[-1].state.positions)
 
 
 def test_a_cradle_of_bars_hands_its_momentum_on():
@@ -228,7 +121,9 @@ def test_a_motor_that_nothing_can_move_is_named():
     assert "joint 'driven' is off by 100 % of the way of its motor" in frame.report.message
 
 
-@pytest.mark.parametrize(("solver", "refusal"), [(sp.XPBD(), "softened"), (sp.Implicit(), "iteration_limit")])
+@pytest.mark.parametrize(
+    ("solver", "refusal"), [(sp.XPBD(), "softened"), (sp.Implicit(max_substeps=4), "iteration_limit")]
+)
 def test_a_velocity_motor_at_the_limit_of_another_joint_needs_a_largest_force(solver, refusal):
     """The limit is reached in the first of two frames."""
     for force, status in ((20.0, "converged"), (None, refusal)):
@@ -278,5 +173,5 @@ def test_a_joint_that_spins_fast_holds_by_more_substeps():
         bar("b", position=(1.5, 0, 0), angular_velocity=(0, 0, -100.0), velocity=(0, 50.0, 0)),
     ]
     joints = [hinge("a", point=(0, 0, 0)), sp.BallJoint("a", "b", point=(1.0, 0, 0))]
-    frames = converged(sp.simulate(sp.Scene(bodies, joints=joints), sp.XPBD(), 1 / 60, 40))
+    frames = converged(sp.simulate(sp.Scene(bodies, joints=joints), sp.XPBD(), 1 / 60, 20))
     assert any(frame.report.details.repeats for frame in frames)

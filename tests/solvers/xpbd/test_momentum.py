@@ -53,20 +53,21 @@ def squashed(material, height, position, mesh=SPHERE):
 
 
 @pytest.mark.parametrize(
-    ("material", "height", "substeps"),
+    ("material", "height", "substeps", "seconds"),
     [
-        pytest.param(JELLY, 0.95, 80, id="neo-hookean .95", marks=pytest.mark.slow),
-        pytest.param(JELLY, 0.5, 20, id="neo-hookean .5", marks=pytest.mark.slow),
-        pytest.param(JELLY, 0.02, 5, id="neo-hookean pancake"),
-        pytest.param(CLASSIC, 0.95, 5, id="edges+volume .95", marks=pytest.mark.slow),
-        pytest.param(CLASSIC, 0.8, 40, id="edges+volume .8", marks=pytest.mark.slow),
-        pytest.param(CLASSIC, 0.5, 20, id="edges+volume .5", marks=pytest.mark.slow),
-        pytest.param(CLASSIC, 0.02, 20, id="edges+volume pancake", marks=pytest.mark.slow),
+        (JELLY, 0.02, 5, 10),
+        pytest.param(JELLY, 0.95, 80, 60, id="neo-hookean .95", marks=pytest.mark.slow),
+        pytest.param(JELLY, 0.5, 20, 60, id="neo-hookean .5", marks=pytest.mark.slow),
+        pytest.param(JELLY, 0.02, 5, 60, id="neo-hookean pancake", marks=pytest.mark.slow),
+        pytest.param(CLASSIC, 0.95, 5, 60, id="edges+volume .95", marks=pytest.mark.slow),
+        pytest.param(CLASSIC, 0.8, 40, 60, id="edges+volume .8", marks=pytest.mark.slow),
+        pytest.param(CLASSIC, 0.5, 20, 60, id="edges+volume .5", marks=pytest.mark.slow),
+        pytest.param(CLASSIC, 0.02, 20, 60, id="edges+volume pancake", marks=pytest.mark.slow),
     ],
 )
-def test_a_squashed_and_released_sphere_does_not_spin(material, height, substeps):
+def test_a_squashed_and_released_sphere_does_not_spin(material, height, substeps, seconds):
     scene, start = squashed(material, height, FAR)
-    system, _, state = run(scene, XPBD(substeps=substeps, contact=None), 3600, positions=start)
+    system, _, state = run(scene, XPBD(substeps=substeps, contact=None), 60 * seconds, positions=start)
     assert np.linalg.norm(spin(system, state)) <= 1e-9
     assert drift(system, state) <= 1e-10
     assert measure(system, state).min_det_F > 0.9, "the sphere has recovered"
@@ -80,7 +81,7 @@ def test_a_sphere_spins_without_momentum_restore():
 
 @pytest.mark.parametrize(
     ("substeps", "seed", "seconds"),
-    [pytest.param(5, None, 60, marks=pytest.mark.slow), pytest.param(20, 1, 20, marks=pytest.mark.slow), (80, 2, 3)],
+    [pytest.param(5, None, 60, marks=pytest.mark.slow), pytest.param(20, 1, 20, marks=pytest.mark.slow), (80, 2, 1)],
     ids=["5 substeps", "20", "80"],
 )
 def test_frictionless_plates_cause_no_spin(substeps, seed, seconds):
@@ -115,7 +116,7 @@ def test_frictionless_plates_cause_no_spin(substeps, seed, seconds):
 @pytest.mark.parametrize("position", [(0.0, 0.0, 0.0), FAR], ids=["origin", "far"])
 def test_a_free_spin_keeps_its_angular_momentum(position):
     body = sp.Body("ball", SPHERE, JELLY, position=position, angular_velocity=(1.0, 4.0, 2.8))
-    system, begin, state = run(sp.Scene(bodies=[body], gravity=(0, 0, 0)), XPBD(contact=None), 600)
+    system, begin, state = run(sp.Scene(bodies=[body], gravity=(0, 0, 0)), XPBD(contact=None), 300)
     first, _ = angular_momentum_and_inertia(system, begin)
     final, _ = angular_momentum_and_inertia(system, state)
     assert np.linalg.norm(final - first) <= 1e-9 * np.linalg.norm(first)
@@ -123,7 +124,7 @@ def test_a_free_spin_keeps_its_angular_momentum(position):
 
 def test_a_rigid_spin_without_momentum_restore_decays_as_predicted():
     """1 / w^2 = 1 / w0^2 + 2 h t."""
-    substeps, seconds, w0 = 20, 10.0, 5.0
+    substeps, seconds, w0 = 20, 5.0, 5.0
     body = sp.Body("ball", SPHERE, sp.EdgesAndVolume(), angular_velocity=(0.0, w0, 0.0))
     solver = XPBD(substeps=substeps, momentum_restore=False, contact=None)
     system, _, state = run(sp.Scene(bodies=[body], gravity=(0, 0, 0)), solver, round(seconds / DT))

@@ -235,7 +235,7 @@ def test_with_kept_weights_the_energy_is_the_integral_of_the_force(seed):
     barrier = model.barriers(KAPPA).triangles
     start = x.copy()
     # Just above the highest place on the way.
-    count, width = 4000, 1.8e-3
+    count, width = 2000, 1.8e-3
     low, high = 0.0, 0.01
     for _ in range(30):
         middle = 0.5 * (low + high)

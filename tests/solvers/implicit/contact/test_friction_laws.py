@@ -49,13 +49,13 @@ def way_down(mu, time=TIME, dt=DT):
 
 @pytest.mark.parametrize("kind", ["half-space", "box", "sheet"])
 def test_a_block_on_a_slope_sticks_at_the_angle_of_friction(kind):
-    frames, way = slide(sp.Scene([block()], obstacles=[downhill(0.5)[kind]]))
+    frames, way = slide(sp.Scene([block()], obstacles=[downhill(0.5)[kind]]), 1.0)
     slow = 1e-3 * 0.2 * 3**0.5
-    assert way <= slow * TIME
+    assert way <= slow * 1.0
     assert np.linalg.norm(frames[-1].velocities["block"].mean(axis=0)) <= slow
 
 
-@pytest.mark.parametrize("kind", ["half-space", "box", "sheet"])
+@pytest.mark.parametrize("kind", ["half-space", "sheet", pytest.param("box", marks=pytest.mark.slow)])
 def test_a_block_on_a_slope_slides_by_coulombs_law(kind):
     _, way = slide(sp.Scene([block()], obstacles=[downhill(0.49)[kind]]))
     assert way == pytest.approx(way_down(0.49), rel=0.02)

@@ -27,7 +27,10 @@ def energy(report):
 
 @pytest.mark.parametrize(
     ("mu", "rate", "steps"),
-    [(1e6, 60, 300), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((1e6, 240, 360), (1e7, 60, 300)))],
+    [
+        (1e6, 60, 100),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((1e6, 60, 300), (1e6, 240, 360), (1e7, 60, 300))),
+    ],
 )
 def test_stiff_stitches_that_start_loaded_make_neither_energy_nor_spin(mu, rate, steps):
     scene = stitched_cubes(mu)
@@ -61,7 +64,7 @@ def turning(max_substeps):
     soft = sp.Body("soft", sp.shapes.box((0.004, 0.001, 0.001), (8, 2, 2)), law, angular_velocity=(10, 20, 50))
     scene = sp.Scene([soft], gravity=(0, 0, 0))
     solver = sp.Implicit(integrator="newmark", max_substeps=max_substeps)
-    return [frame.report for frame in sp.simulate(scene, solver, 1 / 60, 4)]
+    return [frame.report for frame in sp.simulate(scene, solver, 1 / 60, 2)]
 
 
 def test_a_step_that_makes_energy_is_repeated_shorter():

@@ -1,5 +1,7 @@
 """The stable Neo-Hookean body against closed forms: a bar in uniaxial tension and compression."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -48,7 +50,7 @@ def test_a_stretched_bar_agrees_with_the_closed_form(stretch):
         material = sp.StableNeoHookean(youngs=YOUNGS, poisson=POISSON, damping=damping)
         return sp.Scene(bodies=[sp.Body("bar", mesh, material)], pins=[sp.Pin("bar", held)], gravity=(0, 0, 0))
 
-    frames = sp.simulate(scene(ends, 0.002), XPBD(substeps=60), 1 / 60, 90, initial_positions={"bar": start})
+    frames = sp.simulate(scene(ends, 0.002), XPBD(substeps=60), 1 / 60, 60, initial_positions={"bar": start})
     rest = last(frames).positions["bar"]
     shift = np.abs(rest - exact).max()
     assert shift <= min(1e-2 * abs(stretch - 1.0), 1e-3) * 0.2
@@ -58,6 +60,7 @@ def test_a_stretched_bar_agrees_with_the_closed_form(stretch):
     assert pull / WIDTH**2 == pytest.approx(stress, rel=0.01)
 
 
+@cache
 def hanging_weight(substeps, damping=0.05):
     """Stretch along and across the middle of a bar whose heavy end stretches it to 1.5 by gravity."""
     stress, across = TABLE[1.5]
@@ -86,4 +89,4 @@ def test_a_hanging_weight_stretches_the_bar_by_the_closed_form_at_any_number_of_
 
 
 def test_damping_does_not_make_a_loaded_bar_sag_more():
-    assert hanging_weight(40, damping=0.2)[0] == pytest.approx(hanging_weight(40, damping=0.05)[0], rel=2e-3)
+    assert hanging_weight(40, damping=0.2)[0] == pytest.approx(hanging_weight(40)[0], rel=2e-3)

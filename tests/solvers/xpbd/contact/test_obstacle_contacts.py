@@ -75,7 +75,7 @@ def test_a_dropped_ball_lands_on_a_ball_and_rolls_off(kind):
     obstacle = sp.obstacles.Sphere(center=(0, -1, 0), radius=1) if kind == "ball" else ball_of_triangles()
     scene = sp.Scene([ball(0.13)], [obstacle])
     gaps = []
-    for frame in sp.simulate(scene, XPBD(substeps=60, accuracy=0.9), 1 / 60, 60):
+    for frame in sp.simulate(scene, XPBD(substeps=60, accuracy=0.9), 1 / 60, 40):
         assert frame.report.status == "converged"
         gaps.append(np.linalg.norm(frame.positions["ball"] + [0, 1, 0], axis=1).min() - 1)
     # The triangles' planes are up to 3 mm inside of the ball.
@@ -105,8 +105,7 @@ def fly(obstacle, position, velocity, time, substeps=20):
     return x, v, np.array(energies)
 
 
-@pytest.mark.parametrize("substeps", [1, 20])
-@pytest.mark.parametrize("speed", [0.5, 10.0, 60.0])
+@pytest.mark.parametrize(("speed", "substeps"), [(0.5, 20), (10.0, 1), (60.0, 1), (60.0, 20)])
 @pytest.mark.parametrize(
     "obstacle",
     [
