@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError, SolverError
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
-from supple.materials.flows.internal import checked
+from supple.materials.laws.internal import checked
 from supple.model.state import Problems, State, StepReport
 from supple.model.system import System, build_system, initial_state
 from supple.results.frame import Frame, completed_report, start_frame

@@ -5,7 +5,7 @@ import pytest
 from tests.scenes import converged
 
 import supple as sp
-from supple.contact.mesh.obstacle_vertices import obstacle_positions, with_obstacles
+from supple.contact.mesh.obstacles import obstacle_positions, with_obstacles
 from supple.model.system import build_system
 from supple.scene.obstacles.polyhedra import SPHERE_SPLITS, round_ball
 from supple.scene.rotation import rotation_matrix

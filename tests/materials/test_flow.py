@@ -6,7 +6,7 @@ from tests.derivatives import derivative_errors, gradient_of
 
 import supple as sp
 from supple.errors import SceneError, SolverError
-from supple.materials.flows.internal import at_rest, count_of
+from supple.materials.laws.internal import at_rest, count_of
 from supple.model.state import State
 from supple.model.system import build_system
 from supple.results.check.stored_energies import elastic_energy

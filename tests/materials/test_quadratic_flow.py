@@ -5,7 +5,7 @@ import pytest
 from tests.derivatives import differences, gradient_of, hessian_product
 
 import supple as sp
-from supple.materials.flows.internal import at_rest, count_of
+from supple.materials.laws.internal import at_rest, count_of
 from supple.model.system import build_system
 from supple.solvers.implicit.energies.elasticity import elasticity_of
 

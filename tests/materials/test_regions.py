@@ -8,11 +8,10 @@ import pytest
 import supple as sp
 from supple.errors import SceneError
 from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic import NeoHookean, StableNeoHookean
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.kinds import needs_positive_volume
-from supple.materials.neo_hookean import NeoHookean
 from supple.materials.per_tet import NOT_ELASTIC
-from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.model.system import build_system
 
 SOFT = StableNeoHookean(youngs=1e4, poisson=0.3, density=900.0, damping=0.01)

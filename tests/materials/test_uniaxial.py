@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from supple.materials.arap import ARAP
-from supple.materials.fixed_corotated import FixedCorotated
-from supple.materials.neo_hookean import NeoHookean
-from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import ARAP, FixedCorotated, NeoHookean, StableNeoHookean, StVenantKirchhoff
 
 
 def uniaxial(material, stretch):

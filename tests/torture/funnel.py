@@ -6,7 +6,7 @@ import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, torture
 
 from supple.app.demos.demo import Claim, volume
-from supple.materials.neo_hookean import NeoHookean
+from supple.materials.elastic import NeoHookean
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh

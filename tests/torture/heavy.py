@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.torture.watch import ContactMeasurement, Size, mass, push, torture
 
 from supple.app.demos.demo import Claim
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace

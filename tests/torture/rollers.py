@@ -6,7 +6,7 @@ import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, torture
 
 from supple.app.demos.demo import Claim, volume
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.scene.body import Body

@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from tests.torture.watch import ContactMeasurement, Size, center, torture
 
 from supple.app.demos.demo import Claim
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.contact_pairs import ContactPair

@@ -6,7 +6,7 @@ import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, center, torture
 
 from supple.app.demos.demo import Claim
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh

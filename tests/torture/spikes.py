@@ -8,7 +8,7 @@ import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, mechanical_energy, push, torture
 
 from supple.app.demos.demo import Claim
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh.tetmesh import TetMesh
 from supple.results.frame import Frame
 from supple.scene.body import Body

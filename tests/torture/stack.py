@@ -13,7 +13,7 @@ from tests.torture.meshes import mirrored_box
 from tests.torture.watch import ContactMeasurement, Size, mass, push, torture
 
 from supple.app.demos.demo import Claim
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace

@@ -9,7 +9,7 @@ import numpy as np
 from tests.torture.watch import ContactMeasurement, Torture
 
 from supple.app.demos.demo import Claim, Demo, pin_error
-from supple.materials.neo_hookean import NeoHookean
+from supple.materials.elastic import NeoHookean
 from supple.mesh import shapes
 from supple.results.frame import Frame
 from supple.scene.body import Body

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.assessment.findings import tangled_bodies

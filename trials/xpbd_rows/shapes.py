@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.model.system import System
 from supple.numerics.mat3 import row
 from supple.runtime.kernel_cache import njit, reached_code

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
-from supple.contact.mesh.obstacle_vertices import ObstacleRange, with_obstacles
+from supple.contact.mesh.obstacles import ObstacleRange, with_obstacles
 from supple.model.system import System
 from supple.numerics.adjacency import Adjacency, adjacency
 from supple.numerics.geometry.box_tree import BoxTree, boxes_of_triangles

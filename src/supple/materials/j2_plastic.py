@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.kinds.forms import NON_NEGATIVE, POSITIVE, NumberPerTet
-from supple.materials.flows.j2 import J2_FLOW
-from supple.materials.lame import lame_from_engineering
 from supple.materials.laws.hencky import HENCKY
-from supple.materials.material import POISSON, Hyperelastic
+from supple.materials.laws.j2 import J2_FLOW
+from supple.materials.material import POISSON, Hyperelastic, lame_from_engineering
 from supple.materials.per_tet import BY_LAW, LawTets, TetMaterial, one_per_tet
 
 

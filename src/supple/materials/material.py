@@ -14,12 +14,31 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Choice, Number, NumberPerTet
 from supple.kinds.kind import Kind
-from supple.materials.flows.internal import add_resting_densities, add_resting_hessians, add_resting_piolas
 from supple.materials.kinds import STRETCH_ENERGIES
-from supple.materials.lame import lame_from_engineering
+from supple.materials.laws.internal import add_resting_densities, add_resting_hessians, add_resting_piolas
 from supple.materials.laws.pointwise import densities_at, hessians_at, piolas_at
 from supple.materials.per_tet import NO_REGION, TetMaterial, one_per_tet
 from supple.materials.stretch_energies.stretches import StretchFunctions, no_volume_term
+
+
+def lame_from_engineering(youngs: ArrayLike, poisson: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lamé parameters of a linear isotropic material.
+
+    Parameters
+    ----------
+    youngs : Young's modulus E [Pa], scalar or array.
+    poisson : Poisson's ratio nu [-], scalar or array, below 0.5.
+
+    Returns
+    -------
+    mu, lam : shear modulus mu_L and first Lamé parameter lam_L [Pa].
+    """
+    E = np.asarray(youngs, dtype=np.float64)
+    nu = np.asarray(poisson, dtype=np.float64)
+    mu = E / (2.0 * (1.0 + nu))
+    lam = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    return mu, lam
+
 
 POISSON = Number(above=-1.0, below=0.5)
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.kinds.forms import ListOf, OneOf
-from supple.materials.flows.maxwell import MAXWELL_FLOW
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.j2_plastic import J2Plastic
 from supple.materials.laws.hencky import MAXWELL
+from supple.materials.laws.maxwell import MAXWELL_FLOW
 from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import LawTets, TetMaterial
 from supple.materials.registry import UNRELAXED

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import elastic_energy
-from supple.materials.flows.internal import DISSIPATED
+from supple.materials.laws.internal import DISSIPATED
 from supple.model.state import State
 from supple.model.system import System
 

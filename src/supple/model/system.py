@@ -22,9 +22,8 @@ from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.mesh.topology import graph_components
 from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.build import actuators_of
-from supple.model.loads.applied import ActiveLoad, AppliedLoad, DeadLoad
+from supple.model.loads.applied import ActiveLoad, AppliedLoad, Setting
 from supple.model.loads.build import applied, applied_force
-from supple.model.loads.setting import Setting
 from supple.model.state import State
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
@@ -170,11 +169,9 @@ class System:
             law, rows = part.body.material, part.tets
             if isinstance(law, EdgesAndVolume):
                 own = law.edge_compliance, law.volume_compliance
-                of_tets = self.rest_positions, self.tets[rows], self.rest_volumes[rows]
-                springs.append(EdgeSprings.of(own, rows, *of_tets))
-        joined = joined_materials(materials)
+                springs.append(EdgeSprings.of(own, rows, self.rest_positions, self.tets[rows], self.rest_volumes[rows]))
         rest = self.rest_shape_inverse, self.rest_volumes
-        return TetLaws(self.tets, *rest, joined, tuple(springs), self.quadratic)
+        return TetLaws(self.tets, *rest, joined_materials(materials), tuple(springs), self.quadratic)
 
     def laws_at(self, time: float) -> TetLaws:
         """`laws` with the growths and muscles as they are at `time` [s]."""
@@ -242,7 +239,11 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     lengths = np.linalg.norm(rest_positions[all_edges[:, 0]] - rest_positions[all_edges[:, 1]], axis=1)
     all_masses, start_states = np.concatenate(masses), _start_states(scene, start)
     begins = {part.name: part.vertices.start for part in ranges}
-    forces = [_applied_force(force, next(part for part in ranges if part.name == force.body)) for force in scene.forces]
+    forces = []
+    for force in scene.forces:
+        part = next(part for part in ranges if part.name == force.body)
+        rows = force.select(part.body.place(part.body.points))
+        forces.append(applied_force(force, part.body, part.vertices.start, rows))
     x_start = start_states[0].positions
     setting = Setting(scene.bodies, begins, all_masses, x_start)
     given = [applied(load, setting) for load in scene.loads]
@@ -295,11 +296,6 @@ def _start_states(scene: Scene, start: State | None) -> tuple[State, ...]:
     return (begun,) if start is None else (begun, start)
 
 
-def _applied_force(force: Force, part: BodyRange) -> DeadLoad:
-    rows = force.select(part.body.place(part.body.points))
-    return applied_force(force, part.body, part.vertices.start, rows)
-
-
 def _anchored(
     item: Pin | Force | SoftTarget, ranges: list[BodyRange], start: State | None
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
@@ -337,20 +333,18 @@ def initial_state(
     SceneError : where a name is unknown, a shape is wrong or a value is not finite.
     """
     names = {body.name for body in scene.bodies}
+    positions, velocities = positions or {}, velocities or {}
     for what, given in (("initial_positions", positions), ("initial_velocities", velocities)):
-        for name in given or ():
+        for name in given:
             if name not in names:
                 raise SceneError(f"{what}: there is no body {name!r}; there are {', '.join(map(repr, sorted(names)))}")
     x, v = [], []
     for body in scene.bodies:
-        if positions is not None and body.name in positions:
+        placed, moving = body.place(body.mesh.vertices), None
+        if body.name in positions:
             placed = body.vertex_values(positions[body.name], f"initial_positions[{body.name!r}]", places=True)
-        else:
-            placed = body.place(body.mesh.vertices)
-        if velocities is not None and body.name in velocities:
+        if body.name in velocities:
             moving = body.vertex_values(velocities[body.name], f"initial_velocities[{body.name!r}]", places=False)
-        else:
-            moving = body.velocities_at(placed)
         x.append(placed)
-        v.append(moving)
+        v.append(body.velocities_at(placed) if moving is None else moving)
     return State(0.0, np.ascontiguousarray(np.concatenate(x)), np.ascontiguousarray(np.concatenate(v)))

@@ -6,7 +6,7 @@ import ipctk
 import numpy as np
 import pytest
 
-from supple.contact.additive_ccd import KEEP, ROUND_OFF, edge_edge_time, point_triangle_time
+from supple.contact.ccd import KEEP, ROUND_OFF, edge_edge_time, point_triangle_time
 from supple.runtime.kernel_cache import njit
 
 POINT_TRIANGLE, EDGE_EDGE = 0, 1

@@ -9,8 +9,9 @@ from supple.contact.barrier.barrier_energy import (
     barrier_energy,
     barrier_forces,
     barrier_hessian,
+    barrier_slopes,
+    barrier_value,
 )
-from supple.contact.barrier.barrier_function import barrier_slopes, barrier_value
 from supple.contact.features.contacts import Contacts
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_TRIANGLE, VERTEX_VERTEX
 

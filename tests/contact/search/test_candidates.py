@@ -117,7 +117,7 @@ def test_places_on_the_way_need_no_search(monkeypatch):
     way = 0.2 * rng.normal(size=x.shape)
     finder = CandidateFinder(mesh, DHAT)
     finder.find(x, x + way)
-    monkeypatch.setattr("supple.contact.search.surface_trees.SurfaceTrees.find", None)
+    monkeypatch.setattr("supple.contact.search.candidates.SurfaceTrees.find", None)
     for place in along(x, x + way, (1.0, 0.5, 0.25, 0.1, 0.01)):
         assert_contains(finder.at(place), near_pairs(mesh, [place]))
 

@@ -6,7 +6,7 @@ from scipy.interpolate import LinearNDInterpolator
 
 import supple as sp
 from supple.errors import SolverError
-from supple.materials.neo_hookean import NeoHookean
+from supple.materials.elastic import NeoHookean
 from supple.scene.forces import Force
 from supple.solvers.implicit.solver import Implicit
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.materials.elastic import NeoHookean
 from supple.materials.material import Elastic
-from supple.materials.neo_hookean import NeoHookean
 from supple.scene.forces import Force, SoftTarget
 from supple.solvers.implicit.solver import Implicit
 

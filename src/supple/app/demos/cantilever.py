@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.forces import Force

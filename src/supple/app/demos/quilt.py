@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.demos.demo import Claim, Demo, Measurement, stitch_lengths
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.forces import Force

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.demos.demo import Claim, Demo, Measurement, stitch_lengths
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.results.frame import Frame

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from supple.app.demos.demo import Claim, Demo, Measurement, volume
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.results.frame import Frame
 from supple.scene.body import Body

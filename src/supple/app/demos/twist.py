@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from supple.app.demos.demo import Claim, Demo, Measurement, pin_error
-from supple.materials.neo_hookean import NeoHookean
+from supple.materials.elastic import NeoHookean
 from supple.mesh import shapes
 from supple.results.frame import Frame
 from supple.scene.body import Body

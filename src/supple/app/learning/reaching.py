@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.app.learning.batch import Batch
 from supple.app.learning.task import Task
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body

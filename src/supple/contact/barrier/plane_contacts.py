@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from supple.contact.barrier.barrier_function import barrier_slopes, barrier_value
+from supple.contact.barrier.barrier_energy import barrier_slopes, barrier_value
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacle_vertices import ObstacleRange
+from supple.contact.mesh.obstacles import ObstacleRange
 from supple.contact.mesh.stitch_filter import StitchFilter, WeldedPoints, stitch_filter
 from supple.mesh.topology import edge_keys
 from supple.model.system import System
 from supple.numerics.adjacency import Adjacency, adjacency
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.triangle_crossings import crossing_triangles
+from supple.runtime.kernel_cache import ROWS
+from supple.runtime.threads import threads_for
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,3 +162,14 @@ def mesh_of_triangles(
         stitched=stitched,
         rows=np.full(s, -1, dtype=np.int32) if rows is None else rows,
     )
+
+
+def intersects(mesh: ContactMesh, points: NDArray[np.float64]) -> bool:
+    """Whether two triangles that may touch have a common point at `points` (s, 3).
+
+    Common vertices do not count, and neither do seams of stitches, whose sides touch.
+    """
+    owner = mesh.owner[mesh.triangles[:, 0]]
+    ignored = None if mesh.stitched is None else mesh.stitched.crossing
+    with threads_for(len(mesh.triangles), ROWS):
+        return len(crossing_triangles(points, mesh.triangles, owner, mesh.collide, 1, ignored)[0]) > 0

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from supple.contact.mesh.touching import touching_pairs
+from supple.contact.mesh.distances import touching_pairs
 from supple.numerics.adjacency import Adjacency, adjacency
 from supple.scene.stitches.masks import stitched_crossings, stitched_edges, stitched_triangles
 

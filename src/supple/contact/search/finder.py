@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.contact_mesh import ContactMesh
-from supple.contact.search.candidates import Candidates
+from supple.contact.search.candidates import Candidates, Rule, SurfaceTrees
 from supple.contact.search.pair_kernels import covers
-from supple.contact.search.surface_trees import Rule, SurfaceTrees
 
 # Margins are this share of the present motion, between these shares of dhat and of the mean edge: what moves by little
 # needs no new search for several steps, and what moves by much needs one anyway.

@@ -179,7 +179,7 @@ class Mover:
         if a == b or not bodies or self.together(a, b):
             return None
         limit = float(min(self.limits[k] for k in (a, b) if k < len(self.masses)))
-        pair = self._pair(s, a, b)
+        pair = s.pair(a, b)
         best: tuple[float, int, float, NDArray[np.float64], float] | None = None
         ways = []
         for direction in self._directions(s, item):
@@ -237,20 +237,6 @@ class Mover:
         if abs(upwards) > 0.1:
             return (first, 1.0) if upwards > 0.0 else (second, -1.0)
         return (first, 1.0) if self.masses[first] < self.masses[second] else (second, -1.0)
-
-    def _pair(self, s: StartSurfaces, a: int, b: int) -> StartSurfaces:
-        """The surfaces of two things alone; rows of triangles are their own."""
-        rows = np.isin(s.owner, (a, b))
-        owner = s.owner[rows]
-        return replace(
-            s,
-            triangles=s.triangles[rows],
-            owner=owner,
-            first_row=np.searchsorted(owner, np.arange(len(s.solid))),
-            pieces=s.pieces[np.isin(s.pieces[:, 0], (a, b))],
-            planes=tuple(plane for plane in s.planes if plane[0] in (a, b)),
-            rooms=tuple(room for room in s.rooms if room in (a, b)),
-        )
 
     def _directions(self, s: StartSurfaces, item: Intersection) -> list[NDArray[np.float64]]:
         """Candidates (unit vectors) for the translation of the first thing; the most likely ones first."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacle_vertices import with_obstacles
+from supple.contact.mesh.obstacles import with_obstacles
 from supple.mesh.topology import connected_components
 from supple.model.system import System
 from supple.numerics.mat3 import cross, dot, row, subtract
@@ -39,6 +39,20 @@ class StartSurfaces:
     def of(self, thing: int) -> NDArray[np.int32]:
         """Triangles (k, 3) of one thing."""
         return self.triangles[self.owner == thing]
+
+    def pair(self, a: int, b: int) -> StartSurfaces:
+        """The surfaces of two things alone; rows of triangles are their own."""
+        rows = np.isin(self.owner, (a, b))
+        owner = self.owner[rows]
+        return replace(
+            self,
+            triangles=self.triangles[rows],
+            owner=owner,
+            first_row=np.searchsorted(owner, np.arange(len(self.solid))),
+            pieces=self.pieces[np.isin(self.pieces[:, 0], (a, b))],
+            planes=tuple(plane for plane in self.planes if plane[0] in (a, b)),
+            rooms=tuple(room for room in self.rooms if room in (a, b)),
+        )
 
 
 def start_surfaces(system: System, positions: NDArray[np.float64], time: float) -> StartSurfaces:

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from supple.materials.elastic_tets.active import ActiveTets, Growth
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS, QuadraticTets
-from supple.materials.flows.internal import checked, rows_of_points
+from supple.materials.laws.internal import checked, rows_of_points
 from supple.materials.material import Material
 from supple.materials.patches.domains import Patches, patches_of
 from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, LawTets, TetMaterial

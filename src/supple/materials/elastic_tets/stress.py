@@ -20,8 +20,8 @@ from supple.materials.elastic_tets.active import add_active_piolas
 from supple.materials.elastic_tets.edge_springs import cofactors
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.quadratic import QuadraticTets
-from supple.materials.flows.internal import add_densities, add_piolas
 from supple.materials.isotropic import piolas
+from supple.materials.laws.internal import add_densities, add_piolas
 from supple.materials.laws.pointwise import densities_at, piolas_at
 from supple.materials.patches.domains import Patches
 from supple.materials.patches.energy import star_states, tet_shares

@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.materials.hyperelastic.by_law import ByLaw
-from supple.materials.hyperelastic.mooney_rivlin import MooneyRivlin
-from supple.materials.hyperelastic.ogden import Ogden
-from supple.materials.hyperelastic.yeoh import Yeoh
+from supple.materials.by_law import ByLaw
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.laws.ogden import OGDEN
 from supple.materials.laws.yeoh import YEOH
+from supple.materials.rubber import MooneyRivlin, Ogden, Yeoh
 
 # Exponents that a fit of Ogden's energy begins with.
 _EXPONENTS = (-2.0, 1.5, 4.0, 8.0)

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.materials.by_law import ByLaw
 from supple.materials.fitting.curves import MODES, Curve, nominal_stresses, read_curve
 from supple.materials.fitting.families import Family, family_of
 from supple.materials.fitting.picture import draw_fit
-from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.runtime.threads import threads_for
 

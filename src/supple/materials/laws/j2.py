@@ -1,4 +1,4 @@
-"""The energy of one step of J2 plasticity, as a function of the trial strains: elastic, or elastic and plastic.
+"""J2 plasticity: the energy of one step as a function of the trial strains, and the plastic flow.
 
 The trial strains e are those without plastic flow within the step, q_trial = sqrt(6) mu |dev e|. Where it is above the
 yield stress Y(a) of the accumulated plastic strain a, the increment d of a solves
@@ -20,9 +20,14 @@ from __future__ import annotations
 
 import math
 
-from supple.materials.laws.hencky import isotropic_tensor
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.laws.hencky import HENCKY, isotropic_tensor
+from supple.materials.laws.internal import DISSIPATED, FLOW, flowed
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.laws.log_strains import law_kernel, log_strains
+from supple.materials.per_tet import Flow
 from supple.runtime.kernel_cache import njit
 
 
@@ -79,3 +84,43 @@ def _energy(s, p):
 
 
 J2_STEP = IsotropicLaw(law_kernel("j2_step", _energy), range(7, 8), infinite_when_flat=True)
+
+
+class J2Flow(Flow):
+    """Parameters of the law: K, mu, Y0, H, Y1 [Pa], r. The measure of flow is the accumulated plastic strain."""
+
+    name = "j2"
+    step_law = J2_STEP
+
+    def step_parameters(self, p: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        return np.column_stack([p, internal[:, FLOW]])
+
+    def advanced(
+        self, F: NDArray[np.float64], p: NDArray[np.float64], internal: NDArray[np.float64], h: float
+    ) -> NDArray[np.float64]:
+        _, s, V, _ = HENCKY.decomposed(F, p)
+        e = np.log(s)
+        e -= e.mean(axis=1)[:, None]
+        size = np.linalg.norm(e, axis=1)
+        trial = np.sqrt(6.0) * p[:, 1] * size
+        grown, works = np.empty(len(p)), np.empty(len(p))
+        _increments(p, internal[:, FLOW].copy(), trial, grown, works)
+        flows = grown > 0.0
+        after = internal.copy()
+        strains = np.sqrt(1.5) * (grown[flows] / size[flows])[:, None] * e[flows]
+        after[flows, :9] = flowed(internal[flows], V[flows], strains).reshape(-1, 9)
+        after[:, FLOW] += grown
+        after[:, DISSIPATED] += works
+        return after
+
+
+@njit(cache=True)
+def _increments(p, accumulated, trial, out, works):
+    """The growth of the accumulated plastic strain, and the plastic work, the integral of the yield stress over it."""
+    for e in range(len(out)):
+        a, d = accumulated[e], plastic_increment(p[e], accumulated[e], trial[e])
+        out[e] = d
+        works[e] = yield_stress(p[e], a + d)[2] - yield_stress(p[e], a)[2] if d > 0.0 else 0.0
+
+
+J2_FLOW = J2Flow()

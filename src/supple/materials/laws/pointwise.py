@@ -1,6 +1,6 @@
 """Energy densities, stresses and Hessians at given deformation gradients, of materials of any kind.
 
-What flows is not in them: see `supple.materials.flows.internal`.
+What flows is not in them: see `supple.materials.laws.internal`.
 """
 
 from __future__ import annotations

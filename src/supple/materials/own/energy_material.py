@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.forms import NON_NEGATIVE, Choice, Form, NumberPerTet
-from supple.materials.hyperelastic.by_law import ByLaw
+from supple.materials.by_law import ByLaw
 from supple.materials.own.derivation import (
     OwnLaw,
     compiled_law,

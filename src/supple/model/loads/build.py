@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
-from supple.model.loads.applied import AppliedLoad, DeadLoad, MassLoad, UniformLoad
+from supple.model.loads.applied import AppliedLoad, DeadLoad, MassLoad, Setting, UniformLoad
 from supple.model.loads.growth import GrownTets
 from supple.model.loads.muscles import FibreTension
 from supple.model.loads.pressure import FollowerPressure, area_vectors
-from supple.model.loads.setting import Setting
 from supple.model.loads.springs import PointSpring
 from supple.model.loads.wind import wind_drag
 from supple.scene.actuators.muscle import Muscle

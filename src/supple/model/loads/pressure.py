@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.loads.applied import AppliedLoad, LoadPattern
-from supple.numerics.geometry.cross_matrices import cross_matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,3 +91,11 @@ class SweptTriangles:
         B, C, turn = -cross_matrices(self.first), cross_matrices(self.second), -cross_matrices(self.sum) / 3.0
         blocks = np.concatenate([2.0 * B + C + turn, C - B + turn, -B - 2.0 * C + turn]) / 6.0
         return np.concatenate([i, j, k]), np.concatenate([j, k, i]), blocks
+
+
+def cross_matrices(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 3, 3) the matrices of w -> v x w for v (k, 3)."""
+    out = np.zeros((len(v), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    out[:, 1, 0], out[:, 2, 0], out[:, 2, 1] = v[:, 2], -v[:, 1], v[:, 0]
+    return out

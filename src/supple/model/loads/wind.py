@@ -20,9 +20,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.loads.applied import AppliedLoad, DragLoad, LoadPattern
+from supple.model.loads.applied import AppliedLoad, DragLoad, LoadPattern, Setting
 from supple.model.loads.pressure import area_vectors
-from supple.model.loads.setting import Setting
 from supple.scene.loads.over_time import script_of
 from supple.scene.loads.wind import Wind
 

@@ -1,4 +1,4 @@
-"""Symmetric matrices between a few vertices, given by blocks that add up: what contacts add to a Hessian."""
+"""Symmetric matrices between a few vertices: blocks that add up, as contacts have, and g g^T, as an actuator has."""
 
 from __future__ import annotations
 
@@ -58,3 +58,27 @@ def _add_product(rows, columns, blocks, x, out):
             for r in range(3):
                 for c in range(3):
                     out[j, c] += blocks[t, r, c] * x[i, r]
+
+
+@dataclass(frozen=True, eq=False)
+class RankOne:
+    """g g^T between all of its vertices, which no sparse matrix could hold.
+
+    Attributes
+    ----------
+    vertices : (v,) all different; vector : (v, 3) g
+    """
+
+    vertices: NDArray[np.int32]
+    vector: NDArray[np.float64]
+
+    def add_product(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Add the product with x (n, 3) to `out` (n, 3)."""
+        out[self.vertices] += float(np.einsum("ij,ij->", self.vector, x[self.vertices])) * self.vector
+
+    def in_rows(self, row_of: NDArray[np.int32], count: int) -> NDArray[np.float64]:
+        """(count, 3) g where vertex i has the row row_of[i]; without those whose row is -1."""
+        out = np.zeros((count, 3))
+        rows = row_of[self.vertices]
+        out[rows[rows >= 0]] = self.vector[rows >= 0]
+        return out

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.materials.flows.internal import COLUMNS
+from supple.materials.laws.internal import COLUMNS
 from supple.model.state import State
 from supple.results.checkpoint.memories import MEMORIES
 from supple.results.checkpoint.values import Known, check, decoded, described, encoded, restored

@@ -18,8 +18,8 @@ from supple.materials.elastic_tets.stress import (
     volume_ratios,
     von_mises,
 )
-from supple.materials.flows.internal import DISSIPATED, FLOW, NEVER_FLOWED, checked
 from supple.materials.laws.hencky import HENCKY
+from supple.materials.laws.internal import DISSIPATED, FLOW, NEVER_FLOWED, checked
 from supple.materials.per_tet import LawTets
 from supple.numerics.svd3 import principal_stretches
 from supple.results.readings.by_body import BodyRows, TetField

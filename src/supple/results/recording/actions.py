@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.loads.actuators.cable_length import CableLength
+from supple.model.loads.actuators.cables import CableLength
 from supple.model.loads.actuators.enclosed_volume import EnclosedVolume
 from supple.model.system import System, initial_state
 from supple.results.checkpoint.values import Rows

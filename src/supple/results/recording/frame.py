@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from supple.errors import OutputError
 from supple.materials.elastic_tets.active import ActiveTets
 from supple.materials.elastic_tets.laws import TetLaws
-from supple.materials.flows.internal import NEVER_FLOWED
+from supple.materials.laws.internal import NEVER_FLOWED
 from supple.model.state import State
 from supple.results.frame import Report
 from supple.results.readings.by_body import ByBody

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS
-from supple.materials.flows.internal import count_of
-from supple.materials.flows.registry import RECORDED_FLOWS
-from supple.materials.laws.registry import RECORDED_LAWS
+from supple.materials.laws.internal import count_of
+from supple.materials.laws.registry import RECORDED_FLOWS, RECORDED_LAWS
 from supple.materials.material import Hyperelastic
 from supple.materials.own.derivation import OwnLaw
 from supple.materials.own.formula import Formula

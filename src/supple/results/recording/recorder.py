@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.materials.flows.internal import COLUMNS, count_of
+from supple.materials.laws.internal import COLUMNS, count_of
 from supple.model.state import Status
 from supple.model.system import System
 from supple.results.frame import Frame

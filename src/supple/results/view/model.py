@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
-from supple.materials.flows.internal import NEVER_FLOWED
+from supple.materials.laws.internal import NEVER_FLOWED
 from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.results.recording.actions import RecordedJoint, RecordedStitches, no_stitches

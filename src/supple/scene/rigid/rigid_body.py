@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import check_name, finite_vector, positive
+from supple.materials.elastic import StVenantKirchhoff
 from supple.materials.material import Material
-from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.model.system import System
 from supple.scene.scene import Scene
 from supple.solvers.xpbd.contact.contact_rows import LoadedRows

@@ -6,8 +6,8 @@ import pytest
 from tests.derivatives import dense_couplings, differences, gradient_of
 
 import supple as sp
-from supple.contact.barrier.barrier_function import barrier_slopes, barrier_value
-from supple.contact.mesh.obstacle_vertices import obstacle_positions
+from supple.contact.barrier.barrier_energy import barrier_slopes, barrier_value
+from supple.contact.mesh.obstacles import obstacle_positions
 from supple.model.system import build_system, initial_state
 from supple.numerics.svd3 import rotation_variant_svd
 from supple.solvers.implicit.contact.build import contact_model

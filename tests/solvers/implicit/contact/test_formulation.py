@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.barrier.barrier_energy import barrier_hessian
-from supple.contact.barrier.barrier_function import barrier_slopes
+from supple.contact.barrier.barrier_energy import barrier_hessian, barrier_slopes
 from supple.contact.features.pair_geometry import EDGE_EDGE
 from supple.model.system import build_system, initial_state
 from supple.solvers.implicit.contact.build import contact_model

@@ -7,8 +7,7 @@ from tests.derivatives import dense_couplings, differences, gradient_of
 
 import supple as sp
 from supple.errors import SceneError
-from supple.materials.fixed_corotated import FixedCorotated
-from supple.materials.neo_hookean import NeoHookean
+from supple.materials.elastic import FixedCorotated, NeoHookean
 from supple.materials.patches.stars import star_patches
 from supple.model.system import build_system
 from supple.solvers.implicit.energies.elasticity import elasticity_of

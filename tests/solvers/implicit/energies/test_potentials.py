@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from tests.derivatives import differences, gradient_of, hessian_product
 
 import supple as sp
-from supple.materials.neo_hookean import NeoHookean
+from supple.materials.elastic import NeoHookean
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.model.system import build_system
 from supple.solvers.implicit.energies.damping import Damping, StrainRate, viscosity_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.materials.neo_hookean import NeoHookean
+from supple.materials.elastic import NeoHookean
 from supple.solvers.implicit.solver import Implicit
 
 

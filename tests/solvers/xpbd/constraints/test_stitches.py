@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.search.stitch_masks import stitched_contacts
+from supple.contact.search.excluded_pairs import stitched_contacts
 from supple.model.system import build_system, initial_state
 from supple.numerics.geometry.triangle_tree import pair_distances
 from supple.solvers.xpbd.contact.collisions import Collisions

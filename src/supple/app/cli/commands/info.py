@@ -241,7 +241,7 @@ def _material_text(body: PlacedBody) -> str:
     """The material, with the moduli of small strains where other parameters were given."""
     import numpy as np
 
-    from supple.materials.hyperelastic.by_law import ByLaw
+    from supple.materials.by_law import ByLaw
     from supple.materials.viscoelastic import Viscoelastic
 
     material = body.material

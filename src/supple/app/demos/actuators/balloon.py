@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.materials.neo_hookean import NeoHookean
+from supple.materials.elastic import NeoHookean
 from supple.mesh import shapes
 from supple.model.system import build_system
 from supple.results.frame import Frame

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.results.frame import Frame
 from supple.results.readings.sensor_readings import ForceReading

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.demos.demo import Claim, Demo, Measurement
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.tetmesh import TetMesh
 from supple.results.frame import Frame

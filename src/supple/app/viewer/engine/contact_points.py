@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from supple.app.viewer.engine.scene.obstacle_distance import signed_distance
 from supple.app.viewer.protocol import limits
-from supple.contact.mesh.distances import middles_of_edges, middles_of_points
-from supple.contact.mesh.touching import touching_pairs
+from supple.contact.mesh.distances import middles_of_edges, middles_of_points, touching_pairs
 from supple.mesh.topology import unique_edges
 from supple.model.system import System
 from supple.scene.contact_pairs import pair_table

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.protocol.snapshots import Snapshot
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.model.state import State
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 

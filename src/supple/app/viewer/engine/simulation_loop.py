@@ -23,7 +23,7 @@ from supple.app.viewer.protocol import commands, limits
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.outbox import Outbox
 from supple.app.viewer.protocol.snapshots import Notice, Snapshot
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.errors import SuppleError
 from supple.model.state import State
 from supple.results.readings.tet_readings import tet_values

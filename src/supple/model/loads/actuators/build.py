@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from supple.errors import SceneError
 from supple.kinds.kind import Kind
 from supple.model.loads.actuators.actuator import Actuator
-from supple.model.loads.actuators.cable_length import CableLength
+from supple.model.loads.actuators.cables import CableLength
 from supple.model.loads.actuators.enclosed_volume import EnclosedVolume
 from supple.model.loads.actuators.laws import ElasticCable, GivenForce, GivenGas, GivenValue, Law
 from supple.scene.actuators.cable import Cable

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.loads.actuators.actuator import Coordinate
-from supple.numerics.geometry.cross_matrices import cross_matrices
+from supple.model.loads.pressure import cross_matrices
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit
 

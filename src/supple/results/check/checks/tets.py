@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from supple.materials.elastic import StableNeoHookean
 from supple.materials.registry import ELASTIC_MATERIALS
-from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.orientation import volume_signs

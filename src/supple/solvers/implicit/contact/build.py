@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.contact_mesh import contact_mesh
-from supple.contact.mesh.obstacle_vertices import obstacle_positions, with_obstacles
+from supple.contact.mesh.obstacles import obstacle_positions, with_obstacles
 from supple.model.stitched_points import stitched_state
 from supple.model.system import System, initial_state
 from supple.scene.contact_pairs import pair_table

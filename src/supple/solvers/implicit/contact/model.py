@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.barrier.barrier_energy import barrier_forces
-from supple.contact.barrier.friction_lag import lagged_slips, sides
-from supple.contact.largest_step import Limit
+from supple.contact.barrier.friction_energy import lagged_slips, sides
+from supple.contact.ccd import Limit
 from supple.contact.mesh.contact_mesh import ContactMesh
-from supple.contact.mesh.obstacle_vertices import ObstacleRange
+from supple.contact.mesh.obstacles import ObstacleRange
 from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
 from supple.model.system import System

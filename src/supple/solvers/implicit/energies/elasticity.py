@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
+from supple.materials.elastic import StableNeoHookean
 from supple.materials.elastic_tets.laws import of_points
 from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS, QuadraticTets
-from supple.materials.flows.internal import rows_of_points
+from supple.materials.laws.internal import rows_of_points
 from supple.materials.material import Hyperelastic
 from supple.materials.patches.energy import tet_shares
 from supple.materials.per_tet import BY_LAW, NO_REGION, TetMaterial
-from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.materials.tet_energies import element_energies, element_models
 from supple.model.system import System
 from supple.numerics.sparse.block_csr import incidences

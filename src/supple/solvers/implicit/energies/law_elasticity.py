@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.flows.internal import inverse_flow
 from supple.materials.laws.elements import element_forces, element_stiffness
+from supple.materials.laws.internal import inverse_flow
 from supple.materials.per_tet import Flow, Law, LawTets
 from supple.numerics.deformation import deformation_gradients
 from supple.runtime.threads import threads_for

@@ -11,8 +11,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.sparse.couplings import Couplings
-from supple.numerics.sparse.low_rank import RankOne
+from supple.numerics.sparse.couplings import Couplings, RankOne
 
 
 class Projection(Enum):

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.materials.tet_energies import element_energies, element_gradients, element_hessians
 from supple.numerics.sparse.block_csr import incidences
 from supple.runtime.threads import threads_for

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from supple.contact.mesh.obstacle_vertices import obstacle_positions
+from supple.contact.mesh.obstacles import obstacle_positions
 from supple.materials.elastic_tets.active import Growth
 from supple.model.joints.geometry import JointGeometry
 from supple.model.state import State

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.model.system import System
 from supple.numerics.geometry.box_tree import boxes_of_labels, boxes_of_triangles, near_boxes, overlap
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from supple.model.actuator_readings import actuator_fields
 from supple.model.energy_balance import works_of_actuators
 from supple.model.loads.actuators.actuator import Actuator
-from supple.model.loads.actuators.cable_length import CableLength
-from supple.model.loads.actuators.eyelets import limits, turn_at
+from supple.model.loads.actuators.cables import CableLength, limits, turn_at
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.assessment.substep import Substep

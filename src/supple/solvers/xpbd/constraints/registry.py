@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic import StableNeoHookean
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Elastic, Material
 from supple.materials.per_tet import NO_REGION
-from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.model.system import BodyRange, System
 from supple.solvers.xpbd.constraints.edges_and_volume import EdgeConstraints, VolumeConstraints
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints

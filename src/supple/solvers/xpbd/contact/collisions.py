@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.contact.search.reach import any_beyond_reach
 from supple.contact.search.surfaces import ContactSurfaces, build_surfaces
 from supple.model.system import System

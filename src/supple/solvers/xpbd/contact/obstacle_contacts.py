@@ -12,7 +12,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.model.system import System
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.contact_pairs import PairTable

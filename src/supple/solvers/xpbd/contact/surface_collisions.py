@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacle_poses import ObstaclePoses
+from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.contact.search.boxes import boxes_of_pieces
+from supple.contact.search.excluded_pairs import stitched_points
 from supple.contact.search.point_inside import depths_inside
-from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.model.system import System
 from supple.runtime.threads import threads_for

@@ -22,7 +22,7 @@ from supple.app.viewer.protocol.parameters import Value, find_parameter
 from supple.errors import CommandError
 from supple.materials.elastic_tets.laws import tet_material
 from supple.materials.elastic_tets.regions import Regions
-from supple.materials.flows.internal import at_rest, checked, count_of, tets_of
+from supple.materials.laws.internal import at_rest, checked, count_of, tets_of
 from supple.materials.material import Material
 from supple.materials.viscoelastic import Viscoelastic
 from supple.model.state import State

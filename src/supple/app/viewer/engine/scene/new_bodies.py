@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import AddBody, AddMesh, Point
 from supple.errors import CommandError
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.loads.actuators.actuator import Actuator, Coordinate
-from supple.model.loads.actuators.cable_length import CableLength
-from supple.model.loads.actuators.eyelets import CREEP, EyeletFriction, span_forces
+from supple.model.loads.actuators.cables import CREEP, CableLength, EyeletFriction, span_forces
 from supple.model.loads.actuators.laws import ForceLaw
 from supple.model.system import System
-from supple.numerics.sparse.low_rank import RankOne
+from supple.numerics.sparse.couplings import RankOne
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
 
 # How much stiffer than the body a prescribed coordinate is held within a minimization: the error of the constraint

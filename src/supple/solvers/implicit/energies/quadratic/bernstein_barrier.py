@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from supple.numerics.bernstein import COUNT, TERM, TERMS, corner_derivatives, determinant_coefficients
 from supple.numerics.quadratic_shape_functions import reference_gradients
 from supple.numerics.sparse.couplings import Couplings
-from supple.numerics.volume_barrier import barrier_derivatives
 from supple.runtime.kernel_cache import njit
+from supple.solvers.implicit.energies.inversion_barrier import barrier_derivatives
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
 
 _CORNER_GRADIENTS = reference_gradients(np.eye(4))

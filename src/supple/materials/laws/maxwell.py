@@ -17,8 +17,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.flows.internal import DISSIPATED, FLOW, flowed
 from supple.materials.laws.hencky import MAXWELL
+from supple.materials.laws.internal import DISSIPATED, FLOW, flowed
 from supple.materials.per_tet import Flow
 
 
