@@ -30,6 +30,29 @@ def differences(potential, x, d, step):
     return of_value, (gradient_of(potential, ahead) - gradient_of(potential, behind)) / (2 * step)
 
 
+def assert_slope_two(exact, central, largest, within=0.1):
+    """Errors of central(step) fall with the square of the step, from `largest` on, until they are round-off."""
+    steps = largest * 0.5 ** np.arange(5)
+    errors = np.array([np.abs(central(step) - exact).max() for step in steps])
+    size = np.abs(exact).max()
+    if errors.max() <= 1e-9 * size:
+        return  # a polynomial of degree two: differences are exact
+    if errors.min() < 1e-8 * size:
+        assert errors.min() < errors.max() / 4
+        return
+    # The error at the shortest step may be round-off.
+    assert abs(np.polyfit(np.log(steps[:4]), np.log(errors[:4]), 1)[0] - 2.0) < within
+
+
+def assert_derivatives(potential, product, x, d, largest, within=0.1):
+    """Gradient and Hessian of a potential along d, whose product with the Hessian is given, have slope two."""
+    slope = np.vdot(gradient_of(potential, x), d)
+    assert_slope_two(slope, lambda step: differences(potential, x, d, step)[0], largest, within)
+    assert_slope_two(
+        product, lambda step: differences(potential, x, d, step)[1].reshape(product.shape), largest, within
+    )
+
+
 def derivative_errors(potential, tets, x, d, steps):
     """Relative errors of gradient and Hessian along d for each step, (k, 2); and the Hessian times d."""
     slope, product = np.vdot(gradient_of(potential, x), d), hessian_product(potential, tets, x, d)

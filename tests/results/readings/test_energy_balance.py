@@ -75,11 +75,16 @@ def test_the_work_of_a_constant_force_is_force_times_way(solver):
     assert residual < 1e-9 * work["body_forces"]
 
 
+@pytest.mark.parametrize(
+    ("solver", "rate"),
+    [(sp.Implicit(integrator="bdf2", contact=None), 720), (sp.XPBD(substeps=40, contact=None), 60)],
+    ids=NAMES,
+)
 @pytest.mark.parametrize("values", [{"damping": 3.0}, {"friction": 5.0}, {"max_velocity": 1.0}])
-def test_damping_and_friction_of_joints_take_energy(values):
+def test_damping_and_friction_of_joints_take_energy(solver, rate, values):
     bar = sp.RigidBody("bar", sp.shapes.box_surface((1, 0.05, 0.05), (1, 1, 1)), density=1000, position=(0.5, 0, 0))
     scene = sp.Scene([bar], joints=[sp.HingeJoint("bar", point=(0, 0, 0), **values)])
-    frames = list(sp.simulate(scene, sp.XPBD(substeps=40, contact=None), 1 / 60, 12))
+    frames = list(sp.simulate(scene, solver, 1 / rate, rate // 5))
     taken = sum(frame.report.work["joints"] for frame in frames)
     assert taken < -0.2
     assert taken == pytest.approx(frames[-1].report.energy, rel=5e-3)

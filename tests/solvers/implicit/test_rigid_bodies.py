@@ -125,12 +125,12 @@ def test_a_collision_keeps_momentum(other):
     """Off the center, with friction. Contact acts where bodies are at the end of a step: L is not kept exactly."""
     hit = {"position": (0.13, 0.03, 0.02), "velocity": (-1.0, 0.0, 0.0), "friction": 0.5}
     bodies = [rigid("a", friction=0.5), rigid("b", **hit) if other == "rigid" else soft("b", **hit)]
-    frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 0.001, 120, "bdf2")
+    frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 7.5e-4, 160, "bdf2")
     P, L = momenta(frames)
     pushes = [np.linalg.norm(f.report.details.contact_forces["a"]) for f in frames]
     assert max(pushes) > 10.0
     assert np.abs(P - P[0]).max() <= 1e-10 * np.linalg.norm(P[0])
-    assert np.abs(L - L[0]).max() <= 1e-2 * np.linalg.norm(L[0])
+    assert np.abs(L - L[0]).max() <= 5e-3 * np.linalg.norm(L[0])
     assert frames[-1].poses["a"].velocity[0] < -0.2
 
 

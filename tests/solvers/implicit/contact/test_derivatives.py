@@ -3,7 +3,7 @@
 import ipctk
 import numpy as np
 import pytest
-from tests.derivatives import dense_couplings, differences, gradient_of
+from tests.derivatives import assert_derivatives, assert_slope_two, dense_couplings, differences, gradient_of
 
 import supple as sp
 from supple.contact.barrier.barrier_energy import barrier_slopes, barrier_value
@@ -83,35 +83,6 @@ def dense_hessian(potential, x, project=False):
     return dense
 
 
-def check_slope_two(exact, central, largest):
-    steps = largest * 2.0 ** -np.arange(5)
-    errors = np.array([np.abs(central(t) - exact).max() for t in steps])
-    size = np.abs(exact).max()
-    assert size > 0.0
-    if errors.max() < 1e-9 * size:
-        return
-    assert errors[-1] < 2e-2 * size
-    if errors.min() < 1e-8 * size:
-        assert errors.min() < errors.max() / 4
-        return
-    assert 1.85 < np.polyfit(np.log(steps), np.log(errors), 1)[0] < 2.15
-
-
-def check_derivatives(potential, x, d, largest):
-    """Along d, whose longest component is one, with central differences of steps up to `largest` [m]."""
-    d = d / np.abs(d).max()
-    check_slope_two(
-        float((gradient_of(potential, x) * d).sum()),
-        lambda t: differences(potential, x, d, t)[0],
-        largest,
-    )
-    check_slope_two(
-        dense_hessian(potential, x) @ d.ravel(),
-        lambda t: differences(potential, x, d, t)[1].ravel(),
-        largest,
-    )
-
-
 @pytest.mark.parametrize("size", [1.0, 1e-3])
 @pytest.mark.parametrize("kind", PAIRS)
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -121,8 +92,8 @@ def test_the_barrier_has_slope_two(kind, seed, size):
     assert barrier.value(x) > 0.0
     # Contacts keep their weights while a minimum is searched; that of nearly parallel edges depends on their angle.
     model.collisions.keep_weights(x)
-    d = np.random.default_rng(seed + 100).normal(size=x.shape)
-    check_derivatives(barrier, x, d, 0.02 * GAP * size)
+    d = unit(np.random.default_rng(seed + 100).normal(size=x.shape))
+    assert_derivatives(barrier, dense_hessian(barrier, x) @ d.ravel(), x, d, 0.02 * GAP * size, 0.15)
 
 
 @pytest.mark.parametrize("kind", PAIRS)
@@ -135,6 +106,11 @@ def test_the_barriers_projected_hessian_has_no_negative_eigenvalue(kind):
     assert values.min() > -1e-9 * values.max()
     # The surfaces repel each other: without projection some direction has a negative curvature.
     assert np.linalg.eigvalsh(full).min() < -1e-6 * values.max()
+
+
+def unit(d):
+    """Its longest component is one."""
+    return d / np.abs(d).max()
 
 
 def check_majorizer(friction, x, slips, longest):
@@ -168,9 +144,9 @@ def test_friction_has_slope_two(kind, size, speed):
     start += 1e-2 * SLOW * size * H * rng.normal(size=start.shape)
     (friction,) = model.frictions(model.barriers(1e4), lagged, start, (0.0, H))
     check_majorizer(friction, lagged, lagged - start, 2.0 * SLOW * size * H)
-    d = rng.normal(size=lagged.shape)
+    d = unit(rng.normal(size=lagged.shape))
     friction.renew(lagged, np.zeros_like(lagged))
-    check_derivatives(friction, lagged, d, 0.02 * SLOW * size * H)
+    assert_derivatives(friction, dense_hessian(friction, lagged) @ d.ravel(), lagged, d, 0.02 * SLOW * size * H, 0.15)
 
 
 def on_plane(seed, size, friction=0.3, motion=None):
@@ -193,18 +169,13 @@ def test_the_barrier_of_planes_has_slope_two(seed, size):
     assert barrier.value(x) > 0.0
     d = np.random.default_rng(seed + 100).normal(size=x.shape)
     # Also by the two points of the plane, which tilt it.
-    check_slope_two(
-        float((gradient_of(barrier, x) * d).sum()),
-        lambda t: differences(barrier, x, d, t)[0],
-        0.01 * GAP * size,
+    assert_slope_two(
+        np.vdot(gradient_of(barrier, x), d), lambda t: differences(barrier, x, d, t)[0], 0.01 * GAP * size, 0.15
     )
     d[4:] = d[4]  # the Hessian knows planes that shift
     rows = slice(0, 12)  # and is asked for the forces on the body
-    check_slope_two(
-        (dense_hessian(barrier, x) @ d.ravel())[rows],
-        lambda t: differences(barrier, x, d, t)[1].ravel()[rows],
-        0.01 * GAP * size,
-    )
+    exact = (dense_hessian(barrier, x) @ d.ravel())[rows]
+    assert_slope_two(exact, lambda t: differences(barrier, x, d, t)[1].ravel()[rows], 0.01 * GAP * size, 0.15)
     body = dense_hessian(barrier, x, True)[:12, :12]
     assert np.linalg.eigvalsh(body).min() > -1e-12 * np.abs(body).max()
 
@@ -236,7 +207,8 @@ def test_friction_with_planes_has_slope_two(size, speed):
     slips[5:] = 0.0
     check_majorizer(friction, lagged, slips, 2.0 * SLOW * size * H)
     friction.renew(lagged, np.zeros_like(lagged))
-    check_derivatives(friction, lagged, d, 0.02 * SLOW * size * H)
+    d = unit(d)
+    assert_derivatives(friction, dense_hessian(friction, lagged) @ d.ravel(), lagged, d, 0.02 * SLOW * size * H, 0.15)
 
 
 @pytest.mark.parametrize("dhat", [0.1, 1e-5])

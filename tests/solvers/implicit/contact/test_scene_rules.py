@@ -40,6 +40,12 @@ def test_settings_out_of_range_are_errors(given, complaint):
     assert "\n" not in str(caught.value)
 
 
+def test_obstacles_without_contact_are_an_error():
+    scene = sp.Scene([cube()], obstacles=[sp.HalfSpace(name="floor")])
+    with pytest.raises(sp.SolverError, match=r"obstacle 'floor': with contact=None obstacles have no effect"):
+        sp.simulate(scene, sp.Implicit(contact=None), dt=1 / 60, steps=1)
+
+
 def test_pairs_that_do_not_collide_fall_through():
     floor = sp.HalfSpace(name="floor")
     ghost = sp.ContactPair("ghost", "floor", collide=False)

@@ -58,17 +58,19 @@ def test_the_reaction_of_a_pin_is_what_changes_the_momentum_of_a_step():
         before = frame.report.linear_momentum
 
 
-def turning(max_substeps):
+def turning(max_substeps, youngs=2e5, spin=(10, 20, 50)):
     """Damped rubber of 4 mm, so stiff that a turn of 50 degrees in a step strains it."""
-    law = sp.StableNeoHookean(youngs=2e5, poisson=0.3, damping=0.02)
-    soft = sp.Body("soft", sp.shapes.box((0.004, 0.001, 0.001), (8, 2, 2)), law, angular_velocity=(10, 20, 50))
+    law = sp.StableNeoHookean(youngs=youngs, poisson=0.3, damping=0.02)
+    soft = sp.Body("soft", sp.shapes.box((0.004, 0.001, 0.001), (8, 2, 2)), law, angular_velocity=spin)
     scene = sp.Scene([soft], gravity=(0, 0, 0))
     solver = sp.Implicit(integrator="newmark", max_substeps=max_substeps)
     return [frame.report for frame in sp.simulate(scene, solver, 1 / 60, 2)]
 
 
-def test_a_step_that_makes_energy_is_repeated_shorter():
-    reports = turning(64)
+@pytest.mark.parametrize(("youngs", "spin"), [(2e5, (10, 20, 50)), (1e4, (20, 40, 100))])
+def test_a_step_that_makes_energy_is_repeated_shorter(youngs, spin):
+    """Of the second one, the forces of damping would give a hundred times the energy of the motion."""
+    reports = turning(64, youngs, spin)
     assert {str(report.status) for report in reports} == {"converged"}
     assert reports[-1].details.substeps > 1
     energies = [report.kinetic_energy + report.elastic_energy for report in reports]

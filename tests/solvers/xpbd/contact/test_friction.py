@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.solvers.xpbd.contact.friction import friction_total
 from supple.solvers.xpbd.solver import XPBD
 
 SLOPE = np.arctan(0.5)  # 26.565 degrees
@@ -27,21 +26,6 @@ def centers(scene, steps, substeps=20, dt=1 / 60):
         m = system.masses
         rows.append([m[r.vertices] @ frame.state.positions[r.vertices] / m[r.vertices].sum() for r in system.bodies])
     return np.array(rows)
-
-
-def test_the_correction_is_in_the_friction_cone_and_at_most_the_slip():
-    n, slip, nothing = (0.0, 1.0, 0.0), (3.0, 0.7, -4.0), (0.0, 0.0, 0.0)
-    assert friction_total(nothing, slip, n, 1.0) == pytest.approx((-0.6, 0, 0.8))
-    assert friction_total(nothing, slip, n, 20.0) == pytest.approx((-3, 0, 4))
-    assert friction_total(nothing, slip, n, 0.0) == (0, 0, 0)
-
-
-def test_a_correction_that_is_held_already_counts_towards_the_cone():
-    n, slip = (0.0, 1.0, 0.0), (3.0, 0.7, -4.0)
-    assert friction_total((-3.0, 0.0, 4.0), (0.0, 0.0, 0.0), n, 20.0) == (-3.0, 0.0, 4.0)
-    assert friction_total((1.0, 0.0, 0.0), slip, n, 20.0) == pytest.approx((-2, 0, 4))
-    assert friction_total((-3.0, 0.0, 4.0), (0.0, 0.0, 0.0), n, 1.0) == pytest.approx((-0.6, 0, 0.8))
-    assert friction_total((-3.0, 0.0, 4.0), (0.0, 0.0, 0.0), n, 0.0) == (0, 0, 0)
 
 
 @pytest.fixture(scope="module")

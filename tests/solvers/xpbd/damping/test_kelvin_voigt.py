@@ -130,32 +130,6 @@ def test_viscous_forces_dissipate_and_do_not_resist_rotations(kind):
     assert np.abs(K @ (turned - x).ravel()).max() <= 1e-12 * eigenvalues[-1]
 
 
-def test_the_power_of_the_forces_is_the_quadratic_form_of_their_matrix():
-    """The power alone, which the length of a step needs, of tets of a deformed shape and of springs."""
-    x, generator = BALL.vertices * (1.3, 0.8, 1.1), np.random.default_rng(0)
-    for material in (
-        sp.StableNeoHookean(youngs=YOUNGS, poisson=POISSON, damping=1.0),
-        sp.EdgesAndVolume(edge_compliance=1e-5, volume_compliance=1e-6, damping=1.0),
-    ):
-        system = build_system(sp.Scene([sp.Body("ball", BALL, material)]))
-        ws = XPBD(contact=None).prepare(system)
-        order = ws.layout.old_from_new
-        v = generator.standard_normal(x.shape)
-        damping = ws.damping
-        assert damping is not None
-        damping._motion[:, :3], damping._motion[:, 3:] = x[order], v[order]
-        expected = v.ravel() @ viscosity(system, x) @ v.ravel()
-        assert damping._powers(0.0).sum() == pytest.approx(expected, rel=1e-12)
-
-
-def test_each_element_counts_once_in_the_parts_of_its_body():
-    bodies = np.repeat([0, 1, 2], [70, 5, kelvin_voigt.ENOUGH_GROUPS])
-    weights = kelvin_voigt._weights_of_parts(bodies)
-    np.testing.assert_array_equal((weights > 0.0).sum(axis=0), np.where(bodies == 1, kelvin_voigt.PARTS, 1))
-    for part in weights:
-        np.testing.assert_allclose(np.bincount(bodies, part), np.bincount(bodies))
-
-
 def test_the_coarse_matrix_is_the_projected_one():
     system = build_system(beam(1.0))
     tets, x = viscous_tets(system, system.inverse_masses), BEAM.vertices

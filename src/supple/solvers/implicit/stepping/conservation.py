@@ -11,7 +11,8 @@ of third order in the step, whatever loads, contacts and pins act besides. Where
 turn far within a step, it adds up. The sum is followed for every piece. Beyond a share of the piece's energy, it is
 removed from the velocities relative to the piece's rigid motion, which changes neither momentum. With smaller steps the
 sum stays below that share, so that the order of the method is that of the midpoint rule. Where the velocities do not
-have that energy, as in a stiff body that hardly moves but turns far in a step, the step is too long.
+have that energy, as in a stiff body that hardly moves but turns far in a step, the step is too long. It is also too
+long where the forces of damping, which are those at the midpoint, give energy to a piece.
 
 Sources: Hairer, Lubich, Wanner, "Geometric Numerical Integration" (2006), section IV.4 (projection); Simo, Tarnow,
 Wong, "Exact energy-momentum conserving algorithms" (1992) for what the midpoint rule conserves.
@@ -19,6 +20,7 @@ Wong, "Exact energy-momentum conserving algorithms" (1992) for what the midpoint
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +29,7 @@ from numpy.typing import NDArray
 from supple.model.state import State
 from supple.model.system import System
 from supple.solvers.implicit.energies.elasticity import Elasticity
+from supple.solvers.implicit.energies.potential import Potential
 from supple.solvers.implicit.energies.stitches import StitchEnergy
 from supple.solvers.implicit.newton.free_motion import FreeMotion
 
@@ -103,16 +106,25 @@ class Conservation:
                 made[k] -= taken
         return EnergyMade(made)
 
-    def gained(self, end: State) -> tuple[float, str] | None:
+    def gained(self, before: State, end: State, damping: Iterable[Potential], place: float) -> tuple[float, str] | None:
         """The share of its energy that a piece has from nowhere after `limit_energy`, and one of its bodies.
 
         None where no share is too large.
+
+        Parameters
+        ----------
+        damping : the energies whose gradients at the end are the forces of damping; place : see `Plan`
         """
         if not isinstance(end.memory, EnergyMade) or self.latest is None:
             return None
+        n, gradient = len(self.piece), np.zeros_like(end.positions)
+        for term in damping:
+            term.add_gradient(end.positions, gradient)
+        works = -place * np.einsum("ij,ij->i", gradient[:n], (end.positions - before.positions)[:n])
+        made = end.memory.made + np.maximum(np.bincount(self.piece, weights=works), 0.0)
         m, v = self.system.masses, end.velocities
         kinetic = 0.5 * np.bincount(self.piece, weights=m * np.einsum("ij,ij->i", v, v))
-        shares = end.memory.made / np.maximum(self.latest[1] + kinetic, np.finfo(np.float64).tiny)
+        shares = made / np.maximum(self.latest[1] + kinetic, np.finfo(np.float64).tiny)
         share, name = max((float(shares[self.piece[part.vertices]].max()), part.name) for part in self.system.bodies)
         return (share, name) if share > _MOST_MADE else None
 

@@ -167,7 +167,8 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     after = State(end, x, plan.velocity(x), plan.memory, internal=internal, hinge_angles=angles)
     residual = plan.place * outcome.end.gradient
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
-    gained = workspace.conservation.gained(after)
+    damping = (term for term in problem.objective.terms if term.work == "damping")
+    gained = workspace.conservation.gained(state, after, damping, plan.place)
     if gained is not None and outcome.status is Status.CONVERGED:
         share, name = gained
         text = f"{100.0 * share:.2g} % of the energy of body {name!r} came from nowhere; take a shorter step"
