@@ -76,14 +76,15 @@ def test_the_work_of_a_constant_force_is_force_times_way(solver):
 
 
 @pytest.mark.parametrize(
-    ("solver", "rate"),
-    [(sp.Implicit(integrator="bdf2", contact=None), 720), (sp.XPBD(substeps=40, contact=None), 60)],
-    ids=NAMES,
+    ("values", "rate"), [({"damping": 3.0}, 720), ({"friction": 5.0}, 240), ({"max_velocity": 1.0}, 240)]
 )
-@pytest.mark.parametrize("values", [{"damping": 3.0}, {"friction": 5.0}, {"max_velocity": 1.0}])
-def test_damping_and_friction_of_joints_take_energy(solver, rate, values):
+@pytest.mark.parametrize("solver", ["implicit", "xpbd"])
+def test_damping_and_friction_of_joints_take_energy(solver, values, rate):
+    """In `Implicit`, works are those of the forces at the ends of steps: their error is of first order."""
     bar = sp.RigidBody("bar", sp.shapes.box_surface((1, 0.05, 0.05), (1, 1, 1)), density=1000, position=(0.5, 0, 0))
     scene = sp.Scene([bar], joints=[sp.HingeJoint("bar", point=(0, 0, 0), **values)])
+    exact = sp.Implicit(integrator="bdf2", contact=None)
+    solver, rate = (exact, rate) if solver == "implicit" else (sp.XPBD(substeps=40, contact=None), 60)
     frames = list(sp.simulate(scene, solver, 1 / rate, rate // 5))
     taken = sum(frame.report.work["joints"] for frame in frames)
     assert taken < -0.2
