@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from supple.numerics.geometry.closest_segments import closest_on_segments
+from supple.numerics.geometry.closest_points import closest_on_segments
 
 
 def gap(points, s, t):

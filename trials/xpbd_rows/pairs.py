@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.geometry.closest_point import closest_on_triangle
-from supple.numerics.geometry.closest_segments import closest_on_segments
+from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 

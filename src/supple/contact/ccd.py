@@ -27,8 +27,7 @@ from numpy.typing import NDArray
 from supple.contact.mesh.contact_mesh import ContactMesh
 from supple.contact.search.candidates import Candidates
 from supple.contact.search.finder import CandidateFinder
-from supple.numerics.geometry.closest_point import closest_on_triangle, combine
-from supple.numerics.geometry.closest_segments import closest_on_segments
+from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle, combine
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 

@@ -3,8 +3,7 @@
 import numpy as np
 from tests.derivatives import dense_couplings
 
-from supple.contact.mesh.embedded_couplings import vertex_couplings
-from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints, vertex_couplings
 from supple.numerics.sparse.couplings import Couplings
 
 

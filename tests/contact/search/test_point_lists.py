@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from supple.contact.search.point_lists import PairFinder
-from supple.numerics.geometry.closest_point import closest_on_triangle
+from supple.numerics.geometry.closest_points import closest_on_triangle
 
 
 def distance(p, a, b, c):

@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.features.contacts import Contacts
+from supple.contact.features.contacts import Contacts, KnownWeights
 from supple.contact.features.edge_contacts import (
     edge_ends,
     edge_weights,
     saddle_weights,
     write_edge_contacts,
 )
-from supple.contact.features.known_weights import KnownWeights
 from supple.contact.features.vertex_contacts import REACH, write_vertex_contacts
 from supple.contact.features.vertex_features import alternating_sums, grouped, near_features
 from supple.contact.mesh.contact_mesh import ContactMesh

@@ -1,4 +1,11 @@
-"""Contacts of one state: pairs of parts of surfaces that repel each other, and the area that each stands for."""
+"""Contacts of one state: pairs of parts of surfaces that repel each other, and the area that each stands for.
+
+A weight depends on directions, and its derivatives are no forces. While the minimum of an energy is searched, contacts
+keep the weights with which the search first met them: the energy is then a function of the positions. Weights may grow
+where the search goes on, so that nothing comes near without a force; they cannot grow without end. A vertex that counts
+with the plane of a triangle beside an outline keeps the triangle, too: another one would have another plane. Where it
+goes over the face, or too far away from the outline to count, the plane loses the weight.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from supple.runtime.kernel_cache import njit
 
 
 class Contacts(NamedTuple):
@@ -31,3 +40,77 @@ class Contacts(NamedTuple):
         """The chosen ones (k,)."""
         kinds, points, coefficients = self.kinds[chosen], self.points[chosen], self.coefficients[chosen]
         return Contacts(kinds, points, coefficients, self.vectors[chosen], self.distances[chosen], self.weights[chosen])
+
+
+# A weight grows by at least this share of the largest one.
+_LEAST_GROWTH = 0.1
+
+
+class KnownWeights(NamedTuple):
+    """Of pairs with ascending codes.
+
+    Attributes
+    ----------
+    codes, weights : (k,), (k,) [m^2]; triangles : (k,) whose planes count, -1 for other pairs
+    """
+
+    codes: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+
+    @classmethod
+    def none(cls) -> KnownWeights:
+        return cls(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int32))
+
+    def with_more(self, more: KnownWeights) -> KnownWeights:
+        """With further pairs, and the others' weights where both have one; `more` is in any order."""
+        if not len(more.codes):
+            return self
+        # The first of equal codes counts.
+        codes, first = np.unique(np.concatenate([more.codes, self.codes]), return_index=True)
+        weights = np.concatenate([more.weights, self.weights])[first]
+        return KnownWeights(codes, weights, np.concatenate([more.triangles, self.triangles])[first])
+
+    def with_planes(self, codes: NDArray[np.int64]) -> KnownWeights:
+        """With no weight for pairs that count with a plane, but for those with these codes (m,)."""
+        lost = np.flatnonzero((self.triangles >= 0) & (self.weights > 0.0))
+        if not len(lost):
+            return self
+        lost = lost[~_are_among(self.codes[lost], np.sort(codes))]
+        if not len(lost):
+            return self
+        weights = self.weights.copy()
+        weights[lost] = 0.0
+        return self._replace(weights=weights)
+
+
+def _are_among(codes: NDArray[np.int64], ascending: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(k,) which of the codes (k,) are among others (m,), in ascending order."""
+    return np.searchsorted(ascending, codes, "right") > np.searchsorted(ascending, codes, "left")
+
+
+@njit
+def has_grown(known, now, full):
+    """Whether a weight is to replace the known one (-1: none), where `full` is the largest possible."""
+    return known < 0.0 or now > known + _LEAST_GROWTH * full
+
+
+@njit
+def known_weight(known, code):
+    """The weight of a pair, or -1 where it is not known."""
+    k = known_row(known, code)
+    return known.weights[k] if k >= 0 else -1.0
+
+
+@njit
+def known_row(known, code):
+    """Where a pair is in `known`, a `KnownWeights`, or -1."""
+    codes = known.codes
+    low, high = 0, len(codes)
+    while low < high:
+        middle = (low + high) // 2
+        if codes[middle] < code:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < len(codes) and codes[low] == code else -1

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from supple.contact.features.known_weights import has_grown, known_weight
+from supple.contact.features.contacts import has_grown, known_weight
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX
 from supple.contact.features.vertex_contacts import NEARER_SHARE
 from supple.contact.features.vertex_features import nearest_of_edge

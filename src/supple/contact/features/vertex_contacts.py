@@ -15,10 +15,10 @@ import math
 
 import numpy as np
 
-from supple.contact.features.known_weights import has_grown, known_row, known_weight
+from supple.contact.features.contacts import has_grown, known_row, known_weight
 from supple.contact.features.pair_geometry import VERTEX_EDGE, VERTEX_TRIANGLE, VERTEX_VERTEX
 from supple.contact.features.vertex_features import PARTS, beyond, nearest_of_edge, share_between
-from supple.numerics.geometry.closest_point import closest_on_triangle
+from supple.numerics.geometry.closest_points import closest_on_triangle
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 

@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
-from supple.contact.features.known_weights import known_row
-from supple.numerics.geometry.closest_point import closest_on_triangle
+from supple.contact.features.contacts import known_row
+from supple.numerics.geometry.closest_points import closest_on_triangle
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.geometry.box_tree import BoxTree, overlapping
-from supple.numerics.geometry.closest_point import between, closest_on_triangle, combine
-from supple.numerics.geometry.closest_segments import closest_on_segments
+from supple.numerics.geometry.closest_points import between, closest_on_segments, closest_on_triangle, combine
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 

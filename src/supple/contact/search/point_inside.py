@@ -2,7 +2,7 @@
 
 import math
 
-from supple.numerics.geometry.closest_point import closest_on_triangle, combine
+from supple.numerics.geometry.closest_points import closest_on_triangle, combine
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 

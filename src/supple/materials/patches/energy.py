@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.patches.domains import EdgePatches, Patches
-from supple.materials.patches.edge_kernels import edge_energies, mean_gradients
-from supple.materials.patches.star_kernels import star_pressures
+from supple.materials.patches.kernels import edge_energies, mean_gradients, star_pressures
 from supple.runtime.threads import threads_for
 
 # Fewer tets than this are processed by one thread.

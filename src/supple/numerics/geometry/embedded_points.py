@@ -1,4 +1,4 @@
-"""Points that move with the vertices of a system: affine combinations of a few vertices each."""
+"""Points that move with the vertices of a system, affine combinations of a few vertices each; matrices between them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit
 
 
@@ -110,3 +111,37 @@ def _spread(forces, start, vertices, weights, out):
         for k in range(start[i], start[i + 1]):
             for j in range(3):
                 out[vertices[k], j] += weights[k] * forces[i, j]
+
+
+def vertex_couplings(points: EmbeddedPoints, between: Couplings) -> Couplings:
+    """The couplings of vertices, from those `between` points."""
+    if points.are_vertices:
+        return Couplings(points.vertices[between.rows], points.vertices[between.columns], between.blocks)
+    return Couplings(
+        *_spread_couplings(between.rows, between.columns, between.blocks, points.start, points.vertices, points.weights)
+    )
+
+
+@njit(cache=True)
+def _spread_couplings(rows, columns, blocks, start, vertices, weights):
+    count = 0
+    for t in range(len(rows)):
+        one, other = start[rows[t] + 1] - start[rows[t]], start[columns[t] + 1] - start[columns[t]]
+        count += one * (one + 1) // 2 if rows[t] == columns[t] else one * other
+    new_rows, new_columns = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+    out = np.empty((count, 3, 3))
+    b = 0
+    for t in range(len(rows)):
+        for k in range(start[rows[t]], start[rows[t] + 1]):
+            # Each unordered pair of the vertices of one point is given once.
+            for m in range(k if rows[t] == columns[t] else start[columns[t]], start[columns[t] + 1]):
+                i, j, size = vertices[k], vertices[m], weights[k] * weights[m]
+                new_rows[b], new_columns[b] = i, j
+                for p in range(3):
+                    for q in range(3):
+                        out[b, p, q] = size * blocks[t, p, q]
+                        # Two points on one vertex: its block contains the pair in both orders.
+                        if i == j and (rows[t] != columns[t] or k != m):
+                            out[b, p, q] += size * blocks[t, q, p]
+                b += 1
+    return new_rows, new_columns, out

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.geometry.box_tree import boxes_of_triangles
-from supple.numerics.geometry.closest_point import area_normal, closest_on_triangle, combine
+from supple.numerics.geometry.closest_points import area_normal, closest_on_triangle, combine
 from supple.numerics.mat3 import copy_elements, dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange, read_only
 

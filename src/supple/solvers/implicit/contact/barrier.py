@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.barrier.barrier_energy import add_barrier_gradient, barrier_energy, barrier_hessian
-from supple.contact.mesh.embedded_couplings import vertex_couplings
+from supple.numerics.geometry.embedded_points import vertex_couplings
 from supple.solvers.implicit.contact.collisions import Collisions
 from supple.solvers.implicit.energies.potential import ContactPotential, HessianBlocks
 

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from supple.contact.ccd import Limit, largest_step_in_pieces
 from supple.contact.features.contact_set import ContactSet, Found
-from supple.contact.features.contacts import Contacts
-from supple.contact.features.known_weights import KnownWeights
+from supple.contact.features.contacts import Contacts, KnownWeights
 from supple.contact.features.vertex_contacts import REACH
 from supple.contact.mesh.contact_mesh import ContactMesh, intersects
 from supple.contact.search.finder import CandidateFinder

@@ -21,8 +21,7 @@ from supple.contact.barrier.friction_energy import (
     friction_hessian,
     renew_duals,
 )
-from supple.contact.mesh.embedded_couplings import vertex_couplings
-from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints, vertex_couplings
 from supple.solvers.implicit.energies.potential import ContactPotential, HessianBlocks, Projection
 
 

@@ -21,9 +21,8 @@ from supple.contact.barrier.plane_contacts import (
 )
 from supple.contact.features.pair_geometry import VERTEX_VERTEX
 from supple.contact.mesh.contact_mesh import ContactMesh
-from supple.contact.mesh.embedded_couplings import vertex_couplings
 from supple.contact.mesh.obstacles import ObstacleRange
-from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints, vertex_couplings
 from supple.numerics.sparse.couplings import Couplings
 from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.energies.potential import ContactPotential, HessianBlocks

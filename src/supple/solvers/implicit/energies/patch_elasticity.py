@@ -9,11 +9,17 @@ from numpy.typing import NDArray
 
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.patches.domains import Patches
-from supple.materials.patches.edge_kernels import FRAME, add_law_models, edge_models
 from supple.materials.patches.energy import SERIAL_TETS, edge_gradients, patch_energies, star_states
-from supple.materials.patches.pair_kernel import pair_blocks
+from supple.materials.patches.kernels import (
+    FRAME,
+    add_law_models,
+    edge_models,
+    pair_blocks,
+    pressure_hessians,
+    slot_gradients,
+    volume_gradients,
+)
 from supple.materials.patches.pairs import Pairs
-from supple.materials.patches.star_kernels import pressure_hessians, slot_gradients, volume_gradients
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from supple.numerics.geometry.closest_point import between
+from supple.numerics.geometry.closest_points import between
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
 

@@ -16,7 +16,7 @@ rows of `ContactRows`, which are solved afterwards in a fixed order.
 import math
 
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine, square_from_box
+from supple.numerics.geometry.closest_points import area_normal, between, closest_on_triangle, combine, square_from_box
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 
