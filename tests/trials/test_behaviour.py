@@ -11,6 +11,7 @@ from supple.mesh import shapes
 from supple.solvers.xpbd.assessment.surfaces import SurfaceCheck, crossings
 from supple.solvers.xpbd.contact.collisions import mean_edge_length
 
+pytestmark = pytest.mark.slow  # of a trial beside the package
 SLOPE = np.arctan(0.5)
 
 

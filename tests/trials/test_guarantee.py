@@ -13,6 +13,7 @@ from trials.xpbd_rows.solver import RowsXPBD
 import supple as sp
 from supple.mesh import shapes
 
+pytestmark = pytest.mark.slow  # of a trial beside the package
 FLOOR = sp.HalfSpace(name="floor", friction=0.5)
 
 
