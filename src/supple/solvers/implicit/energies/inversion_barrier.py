@@ -13,7 +13,6 @@ Source of b: Li et al., "Incremental Potential Contact" (2020), equation 6, with
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +26,7 @@ from supple.runtime.kernel_cache import njit, prange
 from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.solvers.implicit.energies.quadratic.bernstein_barrier import barrier_derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,16 +149,3 @@ def _cofactors(F):
 @njit(cache=True)
 def _times(A, v):
     return (dot(A[:3], v), dot(A[3:6], v), dot(A[6:], v))
-
-
-@njit
-def barrier_derivatives(J, onset):
-    """b and its first and second derivative by J."""
-    y = J / onset
-    if not y < 1.0:
-        return 0.0, 0.0, 0.0
-    if y <= 0.0:
-        return math.inf, 0.0, 0.0
-    log, ratio = math.log(y), (y - 1.0) / y
-    first = -2.0 * (y - 1.0) * log - (y - 1.0) * ratio
-    return -(y - 1.0) * (y - 1.0) * log, first / onset, (-2.0 * log - 4.0 * ratio + ratio * ratio) / (onset * onset)

@@ -18,6 +18,7 @@ is g_n1^a v x w + g_n2^b w x u + g_n3^c u x v, and the second derivative by x_n 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,6 @@ from supple.numerics.bernstein import COUNT, TERM, TERMS, corner_derivatives, de
 from supple.numerics.quadratic_shape_functions import reference_gradients
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit
-from supple.solvers.implicit.energies.inversion_barrier import barrier_derivatives
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
 
 _CORNER_GRADIENTS = reference_gradients(np.eye(4))
@@ -155,3 +155,16 @@ def _derivatives(x, nodes, ratios, rest, stiffness, onset, g, second, curved, fo
                         for i in range(3):
                             for j in range(3):
                                 blocks[e, n, m, i, j] += bend[k] * slopes[k, n, i] * slopes[k, m, j]
+
+
+@njit
+def barrier_derivatives(J, onset):
+    """b and its first and second derivative by J."""
+    y = J / onset
+    if not y < 1.0:
+        return 0.0, 0.0, 0.0
+    if y <= 0.0:
+        return math.inf, 0.0, 0.0
+    log, ratio = math.log(y), (y - 1.0) / y
+    first = -2.0 * (y - 1.0) * log - (y - 1.0) * ratio
+    return -(y - 1.0) * (y - 1.0) * log, first / onset, (-2.0 * log - 4.0 * ratio + ratio * ratio) / (onset * onset)
