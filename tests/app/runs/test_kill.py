@@ -181,7 +181,7 @@ def survives(out, scene_of, starter, solver, seconds):
     return kills
 
 
-@pytest.mark.parametrize(("solver", "seconds"), [("xpbd", 0.5), ("bdf2", 0.6)])
+@pytest.mark.parametrize(("solver", "seconds"), [pytest.param("xpbd", 0.5, marks=pytest.mark.slow), ("bdf2", 0.6)])
 def test_a_killed_run_resumes(tmp_path, scene_of, solver, seconds):
     survives(tmp_path / "out", scene_of, Commands(), solver, [seconds])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -34,8 +35,6 @@ SOLVERS = {
     "bdf2": sp.Implicit(integrator="bdf2"),
     "newmark": sp.Implicit(integrator="newmark"),
 }
-SCENES = {"contact": contact_scene, "stitches": stitched_scene}
-PAIRS = [(solver, scene) for solver in SOLVERS for scene in SCENES]
 
 
 def rigid_scene():
@@ -46,10 +45,20 @@ def rigid_scene():
     return sp.Scene([soft, stone.changed(position=(0, top + 0.104, 0), velocity=(0, -0.5, 0))], pins=[held])
 
 
+SCENES = {"contact": contact_scene, "stitches": stitched_scene, "rigid": rigid_scene}
+PAIRS = [(solver, scene) for solver in SOLVERS for scene in ("contact", "stitches")]
+
+
+@cache
+def whole_of(solver, scene):
+    """The frames of a run that nobody interrupts."""
+    return list(sp.simulate(SCENES[scene](), SOLVERS[solver], DT, STEPS))
+
+
 @pytest.mark.parametrize(("solver", "scene"), [*PAIRS, ("bdf2", "rigid")])
 def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(out, solver, scene):
-    made, used = (SCENES | {"rigid": rigid_scene})[scene], SOLVERS[solver]
-    whole = list(sp.simulate(made(), used, DT, STEPS))
+    made, used = SCENES[scene], SOLVERS[solver]
+    whole = whole_of(solver, scene)
     kept(out, made(), used, stop_after=7, checkpoint_every=3)
     rest = list(sp.resume(out, made(), used))
     assert [frame.index for frame in rest] == list(range(8, STEPS + 1))
@@ -80,8 +89,7 @@ def test_a_static_run_resumes(out):
 
 @pytest.mark.parametrize("stop_after", [5, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_run_may_be_resumed_many_times(out, stop_after):
-    solver = SOLVERS["bdf2"]
-    whole = list(sp.simulate(contact_scene(), solver, DT, STEPS))
+    solver, whole = SOLVERS["bdf2"], whole_of("bdf2", "contact")
     frames = kept(out, contact_scene(), solver, stop_after)
     while len(frames) < STEPS:
         rest = sp.resume(out, contact_scene(), solver)
@@ -124,8 +132,7 @@ def test_frames_that_are_computed_differently_are_replaced_from_there(out, caplo
 
 
 def test_a_complete_run_is_refused_until_it_shall_have_more_frames(out):
-    solver = SOLVERS["newmark"]
-    whole = list(sp.simulate(contact_scene(), solver, DT, STEPS))
+    solver, whole = SOLVERS["newmark"], whole_of("newmark", "contact")
     kept(out, contact_scene(), solver, steps=6)
     with pytest.raises(OutputError, match=r"6 of 6 frames are there; give a larger number of steps"):
         sp.resume(out, contact_scene(), solver)

@@ -8,6 +8,7 @@ import platform
 import sys
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -27,13 +28,16 @@ def versions() -> dict[str, str]:
     """The versions of Supple, of Python, and of the installed packages that compute."""
     from supple import __version__
 
-    found = {"supple": __version__, "python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
+    installed = {name: number for name in _PACKAGES if (number := _installed(name)) is not None}
+    return {"supple": __version__, "python": platform.python_version(), **installed}
+
+
+@cache
+def _installed(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
 
 
 def machine() -> dict[str, Any]:

@@ -32,6 +32,7 @@ WRITTEN = "supple/frames_written"
 TIMES = "supple/frames/time"
 _COPY_BYTES = 1 << 20  # more would remain in the memory of the process
 _STEP_COLUMNS = 5  # different columns in VTKHDF/Steps
+_HEADER = 1 << 12  # of one dataset, at most
 _SPARE_ROOM = 1 << 16  # for what HDF5 writes beside the arrays
 
 
@@ -162,7 +163,15 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
     _require_room(target, 0, length=layout.frame_bytes * (capacity or 0))
     with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
         written = int(_dataset(old, WRITTEN)[()])
-        _copy_static(old, new, "", {series.path for series in layout.series})
+        paths, sizes = {series.path for series in layout.series}, [written * layout.frame_bytes]
+        old.visititems(
+            lambda path, item: sizes.append(
+                _HEADER + item.id.get_storage_size() if isinstance(item, h5py.Dataset) and path not in paths else 0
+            )
+        )
+        small = sizes[0] <= _COPY_BYTES  # then it is tried once whether there is room, which takes milliseconds
+        _require_room(target, sum(sizes if small else sizes[1:]))
+        _copy_static(old, new, "", paths)
         new.create_dataset(WRITTEN, data=np.int64(written))
         for series in layout.series:
             source_data = _dataset(old, series.path)
@@ -177,7 +186,8 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
                 data = _reserve(new, series, shape)
             step = max(1, _COPY_BYTES // max(1, series.frame_bytes)) * series.rows
             for row in range(0, rows if 0 not in shape else 0, step):
-                _require_room(target, step * series.frame_bytes // max(1, series.rows))
+                if not small:
+                    _require_room(target, step * series.frame_bytes // max(1, series.rows))
                 data[row : min(row + step, rows)] = source_data[row : min(row + step, rows)]
         if capacity is None:
             _require_room(target, _STEP_COLUMNS * 8 * written)
@@ -212,7 +222,6 @@ def _copy_static(old: h5py.Group, new: h5py.Group, where: str, series: set[str])
         if isinstance(item, h5py.Group):
             _copy_static(item, new.require_group(name), f"{path}/", series)
         else:
-            _require_room(Path(new.file.filename), item.id.get_storage_size())
             old.copy(item, new, name)
 
 
