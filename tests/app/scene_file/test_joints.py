@@ -8,7 +8,7 @@ from supple.app.cli.app import main
 from supple.app.scene_file.document import json_schema
 from supple.app.scene_file.loader import load_run
 from supple.app.scene_file.resolved import resolved_scene
-from supple.app.scene_file.yaml_reader import read_yaml
+from supple.app.scene_file.yaml_files import read_yaml
 
 BAR = (
     "{name: %s, shape: {kind: box, size: [1, .05, .05], divisions: [1, 1, 1]}, rigid: {mass: 2}, position: [%g, 1, 0]}"

@@ -14,7 +14,7 @@ import supple as sp
 from supple.app.scene_file.document import KINDS_OF_LISTS, SceneFileModel, json_schema
 from supple.app.scene_file.entries.families import solver_of_kind
 from supple.app.scene_file.loader import load_scene
-from supple.app.scene_file.yaml_reader import read_yaml
+from supple.app.scene_file.yaml_files import read_yaml
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
 

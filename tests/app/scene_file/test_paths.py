@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 
 import supple as sp
 from supple.app.scene_file.paths import unit_of, with_values
-from supple.app.scene_file.yaml_reader import read_yaml
-from supple.app.scene_file.yaml_writer import yaml_text
+from supple.app.scene_file.yaml_files import read_yaml, yaml_text
 
 DATA = {"bodies": [{"name": "bear", "material": {"youngs": 1.0}}, {"name": "hat"}], "gravity": [0, -9.81, 0], "dt": 0.1}
 

@@ -6,7 +6,7 @@ from jsonschema import Draft202012Validator
 
 import supple as sp
 from supple.app.scene_file.document import json_schema
-from supple.app.scene_file.yaml_reader import read_yaml
+from supple.app.scene_file.yaml_files import read_yaml
 
 REGIONS = """
 bodies:

@@ -11,7 +11,7 @@ from supple.app.cli.app import main
 from supple.app.scene_file.document import json_schema
 from supple.app.scene_file.loader import load_run
 from supple.app.scene_file.resolved import resolved_scene
-from supple.app.scene_file.yaml_reader import read_yaml
+from supple.app.scene_file.yaml_files import read_yaml
 
 SCENE = """\
 bodies:

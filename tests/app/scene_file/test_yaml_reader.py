@@ -5,7 +5,7 @@ import math
 import pytest
 
 import supple as sp
-from supple.app.scene_file.yaml_reader import MAX_BYTES, key_text, read_yaml
+from supple.app.scene_file.yaml_files import MAX_BYTES, key_text, read_yaml
 
 
 @pytest.fixture

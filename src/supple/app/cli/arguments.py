@@ -32,7 +32,7 @@ def steps(_: Any, tokens: Sequence[Token]) -> int:
 
 def seconds(_: Any, tokens: Sequence[Token]) -> float:
     """A time [s], as a number or a fraction such as 1/60."""
-    from supple.app.scene_file.fraction import number_or_fraction
+    from supple.app.scene_file.model import number_or_fraction
 
     text = tokens[0].value
     try:

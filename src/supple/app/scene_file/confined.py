@@ -6,7 +6,7 @@ import glob
 from pathlib import Path
 
 from supple.app.scene_file.entries.mesh_sources import MeshStore
-from supple.app.scene_file.yaml_reader import printable
+from supple.app.scene_file.yaml_files import printable
 from supple.errors import SceneError
 
 LARGEST_FILE = 256 * 1024 * 1024

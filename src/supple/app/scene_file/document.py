@@ -11,8 +11,7 @@ from supple.app.scene_file.entries import spelling as spelling  # registers how 
 from supple.app.scene_file.entries.bodies import BodyModel
 from supple.app.scene_file.entries.families import SOLVERS, model_of_kind
 from supple.app.scene_file.entries.kinds import KindModel, entry_of
-from supple.app.scene_file.fraction import number_or_fraction
-from supple.app.scene_file.model import Model, Vector
+from supple.app.scene_file.model import Model, Vector, number_or_fraction
 from supple.kinds.kind import Kind
 from supple.model.loads.build import LOADS
 from supple.results.readings.fields import FIELDS

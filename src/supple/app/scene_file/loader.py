@@ -20,7 +20,7 @@ from supple.app.scene_file.mesh_sets import with_numbers
 from supple.app.scene_file.new_scenes import read_surface_scene
 from supple.app.scene_file.urdf.document import read_urdf
 from supple.app.scene_file.validation_errors import scene_error
-from supple.app.scene_file.yaml_reader import Key, YamlDocument, read_yaml
+from supple.app.scene_file.yaml_files import Key, YamlDocument, read_yaml
 from supple.errors import SceneError
 from supple.mesh.meshing.spelling import spelled_for
 from supple.scene.body import PlacedBody

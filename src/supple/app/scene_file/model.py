@@ -1,4 +1,4 @@
-"""Common to all parts of a scene file: strict values, no unknown keys, and errors that list the known keys."""
+"""Common to all parts of a scene file: strict values, no unknown keys, errors that list the known ones; fractions."""
 
 from __future__ import annotations
 
@@ -50,3 +50,17 @@ class Model(BaseModel):
             if sum(getattr(self, key) is not None for key in keys) != 1:
                 raise ValueError(message)
         return self
+
+
+def number_or_fraction(text: str) -> float:
+    """The value of a number, or of a fraction of two numbers.
+
+    Raises
+    ------
+    ValueError : where the text is neither, or divides by zero.
+    """
+    above, slash, below = text.partition("/")
+    try:
+        return float(above) / float(below) if slash else float(above)
+    except ZeroDivisionError:
+        raise ValueError(f"{text!r} divides by zero") from None

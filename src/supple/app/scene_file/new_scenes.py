@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.scene_file.yaml_reader import YamlDocument, parse_yaml
+from supple.app.scene_file.yaml_files import YamlDocument, parse_yaml
 from supple.errors import SceneError
 from supple.mesh.meshing.child_process import DEFAULT_TETS
 from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed

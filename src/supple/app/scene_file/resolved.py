@@ -7,7 +7,7 @@ from typing import Any
 
 from supple.app.scene_file.entries.families import model_of_kind
 from supple.app.scene_file.loader import Run
-from supple.app.scene_file.yaml_writer import yaml_text
+from supple.app.scene_file.yaml_files import yaml_text
 from supple.mesh.io.tetgen_family import SUFFIXES
 
 SCENE_NAME, INPUTS = "scene.yaml", "inputs"

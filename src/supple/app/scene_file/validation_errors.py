@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from supple.app.scene_file.model import UnknownKeyError
-from supple.app.scene_file.yaml_reader import Key, YamlDocument, printable
+from supple.app.scene_file.yaml_files import Key, YamlDocument, printable
 from supple.errors import SceneError
 
 

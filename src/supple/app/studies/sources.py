@@ -17,8 +17,7 @@ from typing import Any
 
 from supple.app.scene_file.loader import Run, load_run, validated
 from supple.app.scene_file.paths import unit_of, with_values
-from supple.app.scene_file.yaml_reader import YamlDocument, read_yaml
-from supple.app.scene_file.yaml_writer import yaml_text
+from supple.app.scene_file.yaml_files import YamlDocument, read_yaml, yaml_text
 from supple.errors import StudyError
 from supple.runtime.replacing import whole_file
 from supple.scene.scene import Scene

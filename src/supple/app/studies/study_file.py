@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 
 from supple.app.scene_file.model import FilePath, Model, Name, Number
 from supple.app.scene_file.validation_errors import scene_error
-from supple.app.scene_file.yaml_reader import YamlDocument, read_yaml
+from supple.app.scene_file.yaml_files import YamlDocument, read_yaml
 from supple.app.studies import designs
 from supple.app.studies.factors import MOST_LEVELS, Factor, Levels, LogUniform, Uniform
 from supple.app.studies.measures import BodyMeasure, Measures, SeriesMeasure

@@ -156,7 +156,7 @@ def _mesh(file: Path, suffix: str) -> None:
 
 
 def _scene(file: Path, timed: bool) -> None:
-    from supple.app.cli.announcements import reading
+    from supple.app.cli.console import reading
     from supple.app.scene_file.loader import load_run
     from supple.model.system import build_system, initial_state
     from supple.scene.rigid.rigid_body import RigidBody

@@ -70,7 +70,7 @@ def run(
     quiet
         Print neither progress nor summary.
     """
-    from supple.app.cli.announcements import reading
+    from supple.app.cli.console import reading
     from supple.app.cli.session import Products, run_session
     from supple.app.cli.trace import traces
     from supple.app.runs.run_folder import SceneSource

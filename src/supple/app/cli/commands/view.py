@@ -54,7 +54,7 @@ def view(
         serve_page(found, port, open_)
         return
 
-    from supple.app.cli.announcements import reading
+    from supple.app.cli.console import reading
     from supple.app.scene_file.confined import ConfinedMeshStore
     from supple.app.scene_file.entries.families import solver_of_kind
     from supple.app.scene_file.loader import load_run

@@ -1,8 +1,9 @@
-"""Shapes of a scene file, by `kind`."""
+"""Shapes of a scene file, by `kind`: their keys are arguments of the functions of this name in `supple.mesh.shapes`."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -13,36 +14,49 @@ from supple.mesh.tetmesh import TetMesh
 
 Divisions = Annotated[list[Count], Field(min_length=3, max_length=3)]
 
+_DEFAULT_EDGES: dict[str, Callable[[Any], float]] = {
+    "sphere": lambda shape: 0.2 * shape.radius,
+    "cylinder": lambda shape: 0.2 * min(shape.radius, shape.height),
+    "spherical_shell": lambda shape: 0.5 * (shape.outer_radius - shape.inner_radius),
+    "torus": lambda shape: 0.4 * shape.tube_radius,
+    "gummy_bear": lambda shape: 0.08 * shape.height,
+}
 
-class BoxShapeModel(Model):
+
+class _Shape(Model):
+    kind: str
+
+    def build(self, order: int = 1) -> TetMesh:
+        return getattr(shapes, self.kind)(**self._arguments(), order=order)
+
+    def build_surface(self) -> SurfaceMesh:
+        made = getattr(shapes, f"{self.kind}_surface", None)
+        return self.build().surface.compact() if made is None else made(**self._arguments())
+
+    def _arguments(self) -> dict[str, Any]:
+        given = {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
+        if "edge_length" in given and given["edge_length"] is None:
+            given["edge_length"] = _DEFAULT_EDGES[self.kind](self)
+        return given
+
+
+class BoxShapeModel(_Shape):
     """A box, centred at the origin, divided into a grid."""
 
     kind: Literal["box"]
     size: Extents = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
     divisions: Divisions = Field(default=[4, 4, 4], description="cells along x, y and z")
 
-    def build(self, order: int = 1) -> TetMesh:
-        return shapes.box(self.size, self.divisions, order)
 
-    def build_surface(self) -> SurfaceMesh:
-        return shapes.box_surface(self.size, self.divisions)
-
-
-class SphereShapeModel(Model):
+class SphereShapeModel(_Shape):
     """A ball, centred at the origin."""
 
     kind: Literal["sphere"]
     radius: Positive = Field(default=0.5, description="[m]")
     edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: a fifth of the radius")
 
-    def build(self, order: int = 1) -> TetMesh:
-        return shapes.sphere(self.radius, self.edge_length or 0.2 * self.radius, order)
 
-    def build_surface(self) -> SurfaceMesh:
-        return shapes.sphere_surface(self.radius, self.edge_length or 0.2 * self.radius)
-
-
-class CylinderShapeModel(Model):
+class CylinderShapeModel(_Shape):
     """A cylinder along y, centred at the origin."""
 
     kind: Literal["cylinder"]
@@ -52,17 +66,8 @@ class CylinderShapeModel(Model):
         default=None, description="mean edge [m]; default: a fifth of the smaller of radius and height"
     )
 
-    def build(self, order: int = 1) -> TetMesh:
-        edge_length = self.edge_length or 0.2 * min(self.radius, self.height)
-        return shapes.cylinder(self.radius, self.height, edge_length, order)
 
-    def build_surface(self) -> SurfaceMesh:
-        return shapes.cylinder_surface(
-            self.radius, self.height, self.edge_length or 0.2 * min(self.radius, self.height)
-        )
-
-
-class SphericalShellShapeModel(Model):
+class SphericalShellShapeModel(_Shape):
     """A hollow ball."""
 
     kind: Literal["spherical_shell"]
@@ -70,15 +75,8 @@ class SphericalShellShapeModel(Model):
     outer_radius: Positive = Field(default=0.5, description="[m]")
     edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: half of the wall")
 
-    def build(self, order: int = 1) -> TetMesh:
-        edge_length = self.edge_length or 0.5 * (self.outer_radius - self.inner_radius)
-        return shapes.spherical_shell(self.inner_radius, self.outer_radius, edge_length, order)
 
-    def build_surface(self) -> SurfaceMesh:
-        return self.build().surface.compact()
-
-
-class TorusShapeModel(Model):
+class TorusShapeModel(_Shape):
     """A ring about the y axis."""
 
     kind: Literal["torus"]
@@ -86,22 +84,21 @@ class TorusShapeModel(Model):
     tube_radius: Positive = Field(default=0.2, description="of the tube [m]")
     edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: 0.4 of the tube's radius")
 
-    def build(self, order: int = 1) -> TetMesh:
-        return shapes.torus(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius, order)
 
-    def build_surface(self) -> SurfaceMesh:
-        return shapes.torus_surface(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius)
-
-
-class GummyBearShapeModel(Model):
+class GummyBearShapeModel(_Shape):
     """The gummy bear."""
 
     kind: Literal["gummy_bear"]
     height: Positive = Field(default=1.0, description="[m]")
     edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: 0.08 of the height")
 
-    def build(self, order: int = 1) -> TetMesh:
-        return shapes.gummy_bear(self.height, self.edge_length or 0.08 * self.height, order)
+
+class GummyBearSurfaceModel(_Shape):
+    """The surface of the gummy bear, at any resolution."""
+
+    kind: Literal["gummy_bear"]
+    height: Positive = Field(default=1.0, description="[m]")
+    resolution: Count = Field(default=64, description="its height in mean edges")
 
 
 ShapeModel = Annotated[
@@ -113,19 +110,6 @@ ShapeModel = Annotated[
     | GummyBearShapeModel,
     Field(discriminator="kind"),
 ]
-
-
-class GummyBearSurfaceModel(Model):
-    """The surface of the gummy bear, at any resolution."""
-
-    kind: Literal["gummy_bear"]
-    height: Positive = Field(default=1.0, description="[m]")
-    resolution: Count = Field(default=64, description="its height in mean edges")
-
-    def build_surface(self) -> SurfaceMesh:
-        return shapes.gummy_bear_surface(self.height, self.resolution)
-
-
 SurfaceShapeModel = Annotated[
     BoxShapeModel | SphereShapeModel | CylinderShapeModel | TorusShapeModel | GummyBearSurfaceModel,
     Field(discriminator="kind"),

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from supple.app.scene_file.urdf.describe import described
 from supple.app.scene_file.urdf.robot import read_robot
-from supple.app.scene_file.yaml_reader import Key, YamlDocument, key_text, parse_yaml
-from supple.app.scene_file.yaml_writer import yaml_text
+from supple.app.scene_file.yaml_files import Key, YamlDocument, key_text, parse_yaml, yaml_text
 from supple.errors import SceneError
 
 logger = logging.getLogger(__name__)

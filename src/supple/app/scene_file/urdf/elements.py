@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from supple.app.scene_file.yaml_reader import printable
+from supple.app.scene_file.yaml_files import printable
 
 _LARGEST = 16 * 2**20  # bytes
 _LARGEST_NUMBER = 1e90  # products of three of them are numbers

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES
 from supple.app.scene_file.urdf.elements import Problem, attribute, child_of, ignore_others, numbers, only, parsed
-from supple.app.scene_file.yaml_reader import printable
+from supple.app.scene_file.yaml_files import printable
 from supple.errors import SceneError
 from supple.scene.rotation import rotation_matrix
 

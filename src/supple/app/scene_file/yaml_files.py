@@ -1,4 +1,4 @@
-"""Reading YAML by the rules of version 1.2, with the line of each value; a repeated key is an error.
+"""Reading and writing YAML by the rules of version 1.2, with the line of each value; a repeated key is an error.
 
 PyYAML follows YAML 1.1, where `1e5` is a text, `no` is false and `1:30` is ninety. Here scalars follow the core schema
 of YAML 1.2.2 (section 10.3.2). Only plain data is built, never any other object.
@@ -229,3 +229,26 @@ class _Builder:
         if kind == "float" and (_FLOAT.fullmatch(text) or _INT.fullmatch(text)):
             return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
         self.check_tag(node, "str")
+
+
+class _Dumper(yaml.SafeDumper):
+    """PyYAML's writer by the rules of YAML 1.2: the text `1e5` gets quotes, because it would be read as a number."""
+
+    yaml_implicit_resolvers = SceneLoader.yaml_implicit_resolvers
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _text(dumper: yaml.SafeDumper, value: str) -> yaml.Node:
+    # Between other quotes, PyYAML writes these line breaks of Unicode as they are, and reads them as spaces.
+    style = '"' if any(character in value for character in "\x85\u2028\u2029") else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", value, style=style)
+
+
+_Dumper.add_representer(str, _text)
+
+
+def yaml_text(data: Any) -> str:
+    """Plain data (None, true, false, numbers, texts, lists, mappings) as YAML, with keys in their order."""
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
