@@ -9,7 +9,7 @@ import h5py
 from numpy.typing import NDArray
 
 from supple.results.checkpoint.values import encoded
-from supple.scene.joints.conditions import Function
+from supple.scene.joints.joint import Function
 
 
 def set_in_scene(file: h5py.File, where: str, value: Any) -> None:

@@ -33,6 +33,9 @@ def kinds_page() -> str:
     parts = [HEAD]
     for name, kinds in lists.items():
         parts.append(f"## {name}\n")
+        if name != "loads" and set(kinds) <= set(KINDS_OF_LISTS["loads"]):
+            parts.append(f"As `{kinds[0].kind}` among the [loads](#loads), without `kind`.\n")
+            continue
         for kind in kinds:
             title = f"`kind: {kind.kind}` (`{kind.__name__}`)" if len(kinds) > 1 else f"`{kind.__name__}`"
             rows = [row for field in declared(kind).items() for row in _rows(*field)]

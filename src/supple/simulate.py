@@ -18,8 +18,7 @@ from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.materials.laws.internal import checked
 from supple.model.state import Problems, State, StepReport
 from supple.model.system import System, build_system, initial_state
-from supple.results.frame import Frame, completed_report, start_frame
-from supple.results.readings.applied_values import with_applied_values
+from supple.results.frame import Frame, completed_report, start_frame, with_applied_values
 from supple.runtime.displayed import supplied
 from supple.runtime.memory import require_memory
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from supple.errors import MeshingError
-from supple.mesh.meshing import ftetwild, mesher_worker, tetrahedralize
+from supple.mesh.meshing import mesher_worker, meshers, tetrahedralize
 from supple.mesh.meshing.child_process import Limits, MesherFailure
-from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
+from supple.mesh.meshing.meshers import mesh_with_tetgen
 from supple.mesh.meshing.tetrahedralize import tetrahedralize as fill
 from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
 from supple.mesh.primitives.gummy_bear import gummy_bear_surface
@@ -167,7 +167,7 @@ def test_auto_uses_ftetwild_for_surfaces_with_faults(caplog: pytest.LogCaptureFi
 
 @pytest.mark.parametrize("options", [{"min_dihedral": 10.0}, {"keep_surface": True}])
 def test_options_without_support_in_ftetwild_are_errors(options: dict) -> None:
-    if not ftetwild.ftetwild_installed():
+    if not meshers.ftetwild_installed():
         pytest.skip("needs pytetwild")
     with pytest.raises(MeshingError, match="fTetWild has no"):
         fill(SPHERE, mesher="ftetwild", **options)
@@ -361,7 +361,7 @@ def test_two_threads_can_mesh_at_once() -> None:
     np.testing.assert_array_equal(meshes[0].tets, meshes[1].tets)
 
 
-@pytest.mark.skipif(not ftetwild.ftetwild_installed(), reason="needs pytetwild")
+@pytest.mark.skipif(not meshers.ftetwild_installed(), reason="needs pytetwild")
 def test_a_sheet_encloses_nothing() -> None:
     sheet = SurfaceMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     with pytest.raises(MeshingError, match="fTetWild found nothing that the surface encloses"):

@@ -11,8 +11,7 @@ import supple as sp
 from supple.results.export.exporter import export
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.surfaces import body_surface, split_at_creases
-from supple.scene.joints.conditions import Function
-from supple.scene.joints.joint import axes_along
+from supple.scene.joints.joint import Function, axes_along
 
 FLOOR = sp.HalfSpace(friction=0.3, name="floor")
 POINTS = "VTKHDF/Points"

@@ -23,7 +23,7 @@ from supple.results.view.layers.surfaces import ObstacleView
 from supple.results.view.surfaces import obstacle_surfaces
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.polyhedra import hull, round_ball
-from supple.scene.obstacles.registry import KINDS, register
+from supple.scene.registry import KINDS, register
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.01)
 

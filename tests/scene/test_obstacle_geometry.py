@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import supple as sp
 from supple.numerics.geometry.triangle_tree import TriangleTree
-from supple.scene.obstacles.registry import KINDS
 from supple.scene.obstacles.shape import PARAMETERS
+from supple.scene.registry import KINDS
 
 SOLIDS = {
     "HalfSpace": sp.HalfSpace(point=(0.1, 0.2, 0.3), normal=(1, 2, 0.5)),

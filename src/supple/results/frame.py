@@ -16,7 +16,6 @@ from supple.model.diagnostics import Diagnostics, measure
 from supple.model.energy_balance import completed_works
 from supple.model.state import ContactPoints, SolverDetails, State, Status, StepReport
 from supple.model.system import BodyRange, System
-from supple.results.readings.applied_values import with_applied_values
 from supple.results.readings.frame_readings import FrameReadings
 from supple.results.readings.joint_readings import JointReading, joint_readings
 from supple.runtime.displayed import DisplayedReport
@@ -159,3 +158,19 @@ def start_frame(system: System, state: State, index: int, solver: Solver | None)
     """A frame without a step that led to it."""
     report = completed_report(system, state, StepReport(Status.CONVERGED, 0), 0.0)
     return Frame(index, state, system, report, solver=solver)
+
+
+def with_applied_values(details: SolverDetails, system: System, time: float) -> SolverDetails:
+    """The details with the values of growths, muscles and loads at `time` [s]."""
+    active = {f"{each.kind}.{k}": each.value for k, each in enumerate(system.laws_at(time).active)}
+    vectors: dict[str, NDArray] = {}
+    values: dict[str, float] = {}
+    for k, load in enumerate(system.loads):
+        value = load.value(time)
+        if value is None:
+            continue
+        if value.ndim:
+            vectors[f"{load.work}.{k}"] = value
+        else:
+            values[f"{load.work}.{k}"] = float(value)
+    return replace(details, active=active, load_vectors=vectors, load_values=values)

@@ -14,12 +14,12 @@ from supple.errors import SceneError
 from supple.kinds.checks import check_name, finite_vector, float_array, non_negative
 from supple.materials.material import Material
 from supple.materials.per_tet import NO_REGION
+from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.quadratic import node_volumes
 from supple.mesh.skin import Embedding
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
-from supple.scene.closed_surface import require_closed
 from supple.scene.rotation import rotation_matrix
 
 

@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.checks import finite_vector
 from supple.runtime.displayed import Showable, short_list
-from supple.scene.actuators.cable import Cable
-from supple.scene.actuators.cavity import Cavity
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
@@ -25,6 +23,8 @@ from supple.scene.joints.joint import Joint
 from supple.scene.joints.motors import Motor
 from supple.scene.joints.weld import Weld
 from supple.scene.joints.welding import Welding, weld_together
+from supple.scene.loads.cable import Cable
+from supple.scene.loads.cavity import Cavity
 from supple.scene.loads.load import Load
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle

@@ -366,8 +366,9 @@ def test_the_table_of_the_documentation_has_every_key_of_every_kind():
     spec.loader.exec_module(page)
     text = page.kinds_page()
     definitions = json_schema()["$defs"]
-    for kind in (kind for kinds in KINDS_OF_LISTS.values() for kind in kinds):
+    for kind in {kind for kinds in KINDS_OF_LISTS.values() for kind in kinds}:
         (section,) = re.findall(rf"^### [^\n]*`{kind.__name__}`\)?\n(.*?)(?=^##|\Z)", text, flags=re.S | re.M)
-        keys = set(definitions[f"{kind.__name__}Model"]["properties"]) - {"kind"}
+        model = definitions.get(f"{kind.__name__}Model") or definitions[f"{kind.__name__}EntryModel"]
+        keys = set(model["properties"]) - {"kind"}
         assert {row.split("`")[1] for row in section.splitlines() if row.startswith("| `")} == keys
         assert not re.search(r"\| *\|$", section, flags=re.M), "a key has no description"

@@ -166,7 +166,7 @@ cables:
 
 
 def test_scene_files_recordings_and_tables_have_cables(tmp_path):
-    from supple.results.recording.report_columns import report_columns
+    from supple.results.export.table import report_columns
 
     path = tmp_path / "scene.yaml"
     path.write_text(FILE.format(drive="tension: {times: [0, 0.01], values: [0, 5]}\n    friction: 0.2"))

@@ -5,7 +5,7 @@ import pytest
 from tests.derivatives import derivative_errors
 
 import supple as sp
-from supple.mesh.voids import enclosed_voids
+from supple.mesh.closed_surfaces import enclosed_voids
 from supple.model.loads.actuators.laws import GivenForce, GivenGas, GivenValue
 from supple.model.system import build_system
 from supple.solvers.implicit.energies.loads.actuators import ActuatorPotential, actuators_at
@@ -212,7 +212,7 @@ cavities:
 
 def test_scene_files_recordings_tables_and_resumed_runs_have_cavities(tmp_path, capsys):
     from supple.app.cli.app import main
-    from supple.results.recording.report_columns import report_columns
+    from supple.results.export.table import report_columns
 
     path = tmp_path / "scene.yaml"
     path.write_text(FILE.format(cavity="{body: shell, pressure: {times: [0, 0.02], values: [0, 4e3]}, name: lung}"))

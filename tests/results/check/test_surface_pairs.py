@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.results.check.formula_obstacles import smallest_on_triangles
+from supple.results.check.checks.contact import smallest_on_triangles
 from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.results.check.geometry.surface_pairs import closest_pair, meeting_pairs
 from supple.results.check.geometry.triangle_distance import point_triangle, triangles_apart

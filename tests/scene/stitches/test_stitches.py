@@ -7,8 +7,8 @@ import pytest
 
 import supple as sp
 from supple.model.system import build_system, initial_state
+from supple.scene.registry import STITCHES
 from supple.scene.rotation import rotation_matrix
-from supple.scene.stitches.registry import STITCHES
 from supple.scene.stitches.stitch import Stitch
 
 SOFT = sp.StableNeoHookean(youngs=1e4, poisson=0.3)

@@ -10,7 +10,7 @@ PUSH = """
 import sys
 import numpy as np
 import supple as sp
-from supple.scene.obstacles.registry import KINDS
+from supple.scene.registry import KINDS
 from supple.solvers.xpbd.contact.movers import Movers
 from supple.solvers.xpbd.contact.shape_kernels import kernels_of
 

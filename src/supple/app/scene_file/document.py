@@ -15,16 +15,15 @@ from supple.app.scene_file.model import Model, Vector, number_or_fraction
 from supple.kinds.kind import Kind
 from supple.model.loads.build import LOADS
 from supple.results.readings.fields import FIELDS
-from supple.scene.actuators.cable import Cable
-from supple.scene.actuators.cavity import Cavity
 from supple.scene.contact_pairs import ContactPair
 from supple.scene.forces import Force, SoftTarget
-from supple.scene.joints.registry import JOINTS
 from supple.scene.joints.weld import Weld
-from supple.scene.obstacles.registry import KINDS as OBSTACLES
+from supple.scene.loads.cable import Cable
+from supple.scene.loads.cavity import Cavity
 from supple.scene.pins import Pin
+from supple.scene.registry import JOINTS, STITCHES
+from supple.scene.registry import KINDS as OBSTACLES
 from supple.scene.sensors import SENSORS
-from supple.scene.stitches.registry import STITCHES
 from supple.simulate import DT_RANGE
 
 MAX_STEPS = 10_000_000

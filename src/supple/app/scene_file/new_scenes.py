@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from supple.app.scene_file.yaml_files import YamlDocument, parse_yaml
 from supple.errors import SceneError
 from supple.mesh.meshing.child_process import DEFAULT_TETS
-from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed
+from supple.mesh.meshing.meshers import INSTALL, ftetwild_installed
 from supple.mesh.meshing.sizes import automatic_tets
 from supple.mesh.meshing.units import likely_scale
 from supple.mesh.surface import SurfaceMesh

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from supple.app.viewer.protocol.snapshots import PUSHER, RIGID, BodyDescription, SceneDescription, Snapshot
 from supple.mesh.skin import Embedding
 from supple.mesh.tetmesh import TetMesh
-from supple.results.recording.scene import RecordedObstacle
-from supple.results.recording.skinned_surface import SkinnedSurface
+from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
 from supple.results.view.camera import View
 from supple.results.view.model import Model, ModelBody, Moment
 

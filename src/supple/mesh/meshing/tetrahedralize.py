@@ -11,7 +11,7 @@ import numpy as np
 from supple.errors import MeshError, MeshingError
 from supple.mesh.meshing.child_process import DAMAGED, Limits, MesherFailure
 from supple.mesh.meshing.decimation import decimate_surface
-from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed, mesh_with_ftetwild
+from supple.mesh.meshing.meshers import INSTALL, ftetwild_installed, mesh_with_ftetwild, mesh_with_tetgen
 from supple.mesh.meshing.repair import RepairReport, repair_surface
 from supple.mesh.meshing.sizes import (
     COUNT_TOLERANCE,
@@ -23,7 +23,6 @@ from supple.mesh.meshing.sizes import (
     warn_of_many,
 )
 from supple.mesh.meshing.spelling import option
-from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
 from supple.mesh.tetmesh import TetMesh

@@ -41,8 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.scene.joints.conditions import FORMS
-from supple.scene.joints.joint import Joint
+from supple.scene.joints.joint import FORMS, Joint
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 

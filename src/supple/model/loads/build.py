@@ -17,16 +17,15 @@ from supple.model.loads.muscles import FibreTension
 from supple.model.loads.pressure import FollowerPressure, area_vectors
 from supple.model.loads.springs import PointSpring
 from supple.model.loads.wind import wind_drag
-from supple.scene.actuators.muscle import Muscle
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force
 from supple.scene.loads.body_force import BodyForce
 from supple.scene.loads.growth import Growth
 from supple.scene.loads.load import Load
+from supple.scene.loads.muscle import Muscle
 from supple.scene.loads.over_time import script_of
 from supple.scene.loads.spring import Spring
-from supple.scene.loads.surface_loads import Pressure, Traction
-from supple.scene.loads.wind import Wind
+from supple.scene.loads.surface_loads import Pressure, Traction, Wind
 
 
 def applied(load: Load, setting: Setting) -> list[AppliedLoad]:

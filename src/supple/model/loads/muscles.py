@@ -1,4 +1,4 @@
-"""Muscles on the tets of a system: the energy per volume a S G(s) with G' = f, see `supple.scene.actuators.muscle`.
+"""Muscles on the tets of a system: the energy per volume a S G(s) with G' = f, see `supple.scene.loads.muscle`.
 
 With the shape gradients b_p of a tet, F d = sum c_p x_p for c_p = b_p . d: a fibre is a spring between its vertices.
 """

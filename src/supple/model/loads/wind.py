@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from supple.model.loads.applied import AppliedLoad, DragLoad, LoadPattern, Setting
 from supple.model.loads.pressure import area_vectors
 from supple.scene.loads.over_time import script_of
-from supple.scene.loads.wind import Wind
+from supple.scene.loads.surface_loads import Wind
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,72 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from supple.results.recording.reader import Recording
-from supple.results.recording.report_columns import report_columns
+from supple.results.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
 from supple.runtime.replacing import whole_file
+
+_AXES = "xyz"
+
+
+def report_columns(recording: Recording) -> dict[str, NDArray[Any]]:
+    """By name, one value for each frame: what `Report` has, then the solver's details, in SI units.
+
+    A vector is three columns, `linear_momentum.x` and so on; a mapping of the details one, or three, for each of its
+    names, such as `contact_forces.ball.x`. Of a recorded field that is a number, each body has its largest value, such
+    as `von_mises.ball.max`. A force sensor has `sensors.tip.x` and so on, `.normal` and `.center.x` and so on; taxels
+    have the sum `sensors.palm.normal` and the largest cell `sensors.palm.max`. NaN stands for None.
+    """
+    columns: dict[str, NDArray[Any]] = {
+        "frame": recording.frame_values("index"),
+        "time": recording.times,
+        "status": np.array([str(status) for status in recording.statuses]),
+        "iterations": recording.frame_values("iterations"),
+        **{name: recording.series(name) for name in REPORT_NUMBERS},
+    }
+    for name in REPORT_VECTORS:
+        _add_vectors(columns, name, recording.series(name))
+    for field in recording.details.fields:
+        values = recording.frame_values(f"details/{field.name}")
+        for k, key in enumerate(field.keys or ()):
+            if field.row_shape:
+                _add_vectors(columns, f"{field.name}.{key}", values[:, k])
+            else:
+                columns[f"{field.name}.{key}"] = values[:, k]
+        if field.keys is None:
+            columns[field.name] = values
+    _add_fields(columns, recording)
+    _add_sensors(columns, recording)
+    columns["message"] = np.array(recording.messages)
+    return columns
+
+
+def _add_vectors(columns: dict[str, NDArray[Any]], name: str, values: NDArray[Any]) -> None:
+    for axis, column in zip(_AXES, values.T, strict=True):
+        columns[f"{name}.{axis}"] = column
+
+
+def _add_fields(columns: dict[str, NDArray[Any]], recording: Recording) -> None:
+    for field in recording.fields:
+        if field.shape == ():
+            frames = [frame.field(field.name) for frame in recording]
+            for name in frames[0] if frames else ():
+                columns[f"{field.name}.{name}.max"] = np.array([values[name].max() for values in frames])
+
+
+def _add_sensors(columns: dict[str, NDArray[Any]], recording: Recording) -> None:
+    for sensor in recording.sensors:
+        values = recording.frame_values(f"sensors/{sensor.number}")
+        name = f"sensors.{sensor.name}"
+        if sensor.is_grid:
+            columns[f"{name}.normal"] = values[..., 0].sum(axis=(1, 2))
+            columns[f"{name}.max"] = values[..., 0].max(axis=(1, 2))
+        else:
+            _add_vectors(columns, name, values[:, :3])
+            columns[f"{name}.normal"] = values[:, 3]
+            _add_vectors(columns, f"{name}.center", values[:, 4:])
 
 
 def write_csv(recording: Recording, output: Path) -> None:

@@ -16,7 +16,7 @@ from supple.model.loads.actuators.cables import CableLength
 from supple.model.loads.actuators.enclosed_volume import EnclosedVolume
 from supple.model.system import System, initial_state
 from supple.results.checkpoint.values import Rows
-from supple.scene.joints.conditions import Conditions, Function
+from supple.scene.joints.joint import Conditions, Function
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 from supple.scene.stitches.measures import attachments

@@ -16,8 +16,7 @@ from supple.results.readings.fields import Field
 from supple.results.recording.actions import cables_of, cavities_of, joints_of, recorded_stitches
 from supple.results.recording.details import RecordedDetails, recorded_sensors
 from supple.results.recording.physics import recorded_physics, recorded_welds, untouching_pairs
-from supple.results.recording.scene import QuadraticRows, RecordedBody, RecordedObstacle, RecordedScene
-from supple.results.recording.skinned_surface import SkinnedSurface
+from supple.results.recording.scene import QuadraticRows, RecordedBody, RecordedObstacle, RecordedScene, SkinnedSurface
 from supple.scene.rigid.rigid_body import RigidBody
 
 VTK_TETRA, VTK_QUADRATIC_TETRA = 10, 24

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from supple.errors import MeshError, SceneError
 from supple.materials.elastic_tets.active import ActiveTets
 from supple.materials.own.formula import Formula
+from supple.mesh.skin import mixed
 from supple.mesh.surface import SurfaceMesh
 from supple.model.loads.applied import LoadPattern
 from supple.model.state import Status
@@ -32,10 +33,32 @@ from supple.results.recording.actions import (
 from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.details import RecordedDetails, RecordedField, RecordedSensor
 from supple.results.recording.physics import RecordedLaw, RecordedPhysics, RecordedWeld
-from supple.results.recording.skinned_surface import SkinnedSurface
-from supple.scene.joints.conditions import Conditions, Function
+from supple.scene.joints.joint import Conditions, Function
 from supple.scene.obstacles.obstacle import Obstacle
-from supple.scene.obstacles.registry import KINDS, restored_obstacle
+from supple.scene.registry import KINDS, restored_obstacle
+
+
+@dataclass(frozen=True, eq=False)
+class SkinnedSurface:
+    """Triangles whose vertices follow tets.
+
+    Attributes
+    ----------
+    corners : (k, 4) int32, rows of the body's vertices: the tet that carries each surface vertex; (k, 10) the nodes of
+        a quadratic one
+    weights : (k, 4) barycentric coordinates in it, or (k, 10) shape functions, summing to one; negative
+        where the vertex lies outside
+    triangles : (t, 3) int32, rows of `corners`
+    """
+
+    corners: Annotated[NDArray[np.int32], Rows("k", "width", below="own")]
+    weights: Annotated[NDArray[np.float64], Rows("k", "width")]
+    triangles: Annotated[NDArray[np.int32], Rows("t", 3, below="k")]
+
+    def positions(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where the surface's vertices (k, 3) are when the body's are at x (n, 3) [m]."""
+        return mixed(self.corners, self.weights, np.ascontiguousarray(x, dtype=np.float64))
+
 
 RecordedLoad = LoadPattern
 FORMAT_VERSION = 4

@@ -17,8 +17,7 @@ from supple.materials.laws.internal import NEVER_FLOWED
 from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.results.recording.actions import RecordedJoint, RecordedStitches, no_stitches
-from supple.results.recording.scene import RecordedObstacle
-from supple.results.recording.skinned_surface import SkinnedSurface
+from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
 from supple.results.view.camera import View
 from supple.results.view.colors import body_color
 

@@ -8,8 +8,7 @@ from typing import Annotated, ClassVar
 from numpy.typing import ArrayLike
 
 from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Direction, Limits, OneOf
-from supple.scene.joints.conditions import FREE, Conditions, Function
-from supple.scene.joints.joint import Joint
+from supple.scene.joints.joint import FREE, Conditions, Function, Joint
 from supple.scene.joints.motors import MOTORS, Motor
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from supple.errors import SceneError
-from supple.kinds.forms import Name
+from supple.kinds.forms import NON_NEGATIVE, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TRIANGLES, OnSurface, Region, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
@@ -65,3 +65,42 @@ class Pressure(OnSurface):
         super().check(bodies)
         if isinstance(body_of(self.body, bodies, self.label), RigidBody):
             raise SceneError(f"{self.label}: the body is rigid, and pressure acts on soft ones; give a Traction")
+
+
+@dataclass(frozen=True, eq=False)
+class Wind(OnSurface):
+    """The drag of a flow on triangles: density/2 drag A |u| u of each triangle that faces the flow.
+
+    u is the velocity of the flow against the triangle, and A the area of the triangle's projection along u. So a plate
+    across the flow feels density/2 drag area |u|^2, whatever its tets, and a body that falls in still air reaches a
+    terminal velocity. Triangles do not shelter each other, and there is no lift.
+
+    Parameters
+    ----------
+    body : name of the soft body.
+    velocity : (3,) of the flow [m/s]; a vector, a `Curve`, or a function of time. Zero is still air.
+    drag : coefficient of drag [-]: 1.28 of a flat plate, 0.47 of a sphere.
+    density : of the flow [kg/m^3]; 1.2 of air, 1000 of water.
+    region : None for the whole surface, an `InBox` that holds all three corners of a triangle at the start, or rows of
+        `mesh.surface.triangles`.
+    name : appears in messages.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or out of range.
+    """
+
+    kind: ClassVar[str] = "wind"
+
+    body: Annotated[str, Name()]
+    velocity: Annotated[OverTime, OverTimeOf((3,))]
+    drag: Annotated[float, NON_NEGATIVE] = 1.0
+    density: Annotated[float, NON_NEGATIVE] = 1.2
+    region: Annotated[Region, TRIANGLES] = None
+    name: Annotated[str | None, Name()] = None
+
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        super().check(bodies)
+        body = body_of(self.body, bodies, self.label)
+        if isinstance(body, RigidBody):
+            raise SceneError(f"{self.label}: the body is rigid, and wind acts on soft ones; give a Traction")

@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
+from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
-from supple.scene.closed_surface import require_closed
 
 # Flatter than this, relative to its largest second moment, a body has no thickness: the motion across it would have
 # no inertia that double precision can tell from zero.

@@ -85,7 +85,7 @@ def test_pictures_go_on_after_one_that_raises(server, until):
 def test_fine_skins_follow_their_tets_without_a_python_loop(fake):
     """The work for every picture: 100k vertices, with bounded work for each and without a Python loop."""
     from supple.mesh.skin import Embedding
-    from supple.results.recording.skinned_surface import SkinnedSurface
+    from supple.results.recording.scene import SkinnedSurface
 
     mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(8, 8, 8))
     points = np.random.default_rng(0).uniform(-0.5, 0.5, (100_000, 3))

@@ -10,8 +10,8 @@ from supple.app.demos.demo import Claim, Demo, Measurement
 from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.results.frame import Frame
-from supple.scene.actuators.muscle import Muscle
 from supple.scene.body import Body
+from supple.scene.loads.muscle import Muscle
 from supple.scene.loads.over_time import Curve
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene

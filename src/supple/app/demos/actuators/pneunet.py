@@ -12,8 +12,8 @@ from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.tetmesh import TetMesh
 from supple.results.frame import Frame
-from supple.scene.actuators.cavity import Cavity
 from supple.scene.body import Body
+from supple.scene.loads.cavity import Cavity
 from supple.scene.loads.over_time import Curve
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene

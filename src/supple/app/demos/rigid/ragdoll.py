@@ -13,8 +13,8 @@ from supple.results.frame import Frame
 from supple.scene.body import Body
 from supple.scene.contact_pairs import ContactPair
 from supple.scene.joints.axis_joint import AxisJoint, HingeJoint
-from supple.scene.joints.ball_joint import BallJoint
 from supple.scene.joints.joint import Joint
+from supple.scene.joints.point_joints import BallJoint
 from supple.scene.joints.weld import Weld
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.rigid.rigid_body import RigidBody

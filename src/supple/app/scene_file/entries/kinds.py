@@ -82,9 +82,9 @@ def model_of(kind: type[Kind], tagged: bool) -> type[KindModel]:
             keys[key] = (spelled, Field(default=default, description=description))
         if len(own) > 1:
             choices.append(tuple(own))
-    model = create_model(
-        f"{kind.__name__}Model", __base__=KindModel, __doc__=first_paragraph(kind), __module__=__name__, **keys
-    )
+    # The names in the schema differ where a kind is one of several in one list, and alone in another.
+    name = f"{kind.__name__}{'' if tagged else 'Entry'}Model"
+    model = create_model(name, __base__=KindModel, __doc__=first_paragraph(kind), __module__=__name__, **keys)
     model.made, model.choices = kind, tuple(choices)
     return model
 

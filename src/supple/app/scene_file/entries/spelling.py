@@ -11,11 +11,11 @@ from supple.app.scene_file.entries.mesh_sources import MeshStore, SurfaceModel
 from supple.app.scene_file.model import Count, Extents, Index, Model, Name, NonNegative, Number, Positive, Vector
 from supple.kinds import forms
 from supple.materials.own.energy_material import FormulaText, NamedNumbers
-from supple.scene.actuators.muscle import ForceLength
 from supple.scene.contact_pairs import NameList
 from supple.scene.forces import ForceForm
 from supple.scene.inputs import MotorInput
 from supple.scene.loads.load import Rows
+from supple.scene.loads.muscle import ForceLength
 from supple.scene.loads.over_time import Curve, OverTimeOf
 from supple.scene.loads.points import Point, PointForm, PointList
 from supple.scene.loads.tet_region import Directions

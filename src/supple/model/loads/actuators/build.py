@@ -14,9 +14,9 @@ from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.cables import CableLength
 from supple.model.loads.actuators.enclosed_volume import EnclosedVolume
 from supple.model.loads.actuators.laws import ElasticCable, GivenForce, GivenGas, GivenValue, Law
-from supple.scene.actuators.cable import Cable
-from supple.scene.actuators.cavity import AMOUNT, GAS_CONSTANT, Cavity
 from supple.scene.body import PlacedBody
+from supple.scene.loads.cable import Cable
+from supple.scene.loads.cavity import AMOUNT, GAS_CONSTANT, Cavity
 from supple.scene.loads.over_time import Curve, OverTime, script_of
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name, OneOf, Whole
 from supple.kinds.kind import Kind
-from supple.mesh.voids import enclosed_voids, is_closed, signed_volumes
+from supple.mesh.closed_surfaces import enclosed_voids, is_closed, signed_volumes
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Rows, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf

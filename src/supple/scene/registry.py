@@ -1,9 +1,14 @@
-"""All kinds of obstacles: what recordings and scene files are read with."""
+"""All kinds of obstacles, joints and stitches: what scene files and recordings are read with.
+
+A new kind is one file and one line here."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from supple.scene.joints.axis_joint import HingeJoint, SliderJoint
+from supple.scene.joints.joint import Joint
+from supple.scene.joints.point_joints import BallJoint, FixedJoint, UniversalJoint
 from supple.scene.obstacles.box import Box
 from supple.scene.obstacles.capsule import Capsule
 from supple.scene.obstacles.cylinder import Cylinder
@@ -12,6 +17,9 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.sphere import Sphere
 from supple.scene.obstacles.torus import Torus
 from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
+from supple.scene.stitches.springs import VertexEdgeStitch, VertexVertexStitch
+from supple.scene.stitches.stitch import Stitch
+from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
 
 KINDS: dict[str, type[Obstacle]] = {}
 
@@ -36,3 +44,15 @@ def restored_obstacle(kind: str, values: dict[str, Any]) -> Obstacle:
 
 for _kind in (HalfSpace, Box, Sphere, Capsule, Cylinder, Torus, TriangleObstacle):
     register(_kind)
+
+
+JOINTS: tuple[type[Joint], ...] = (
+    FixedJoint,
+    BallJoint,
+    HingeJoint,
+    SliderJoint,
+    UniversalJoint,
+)
+
+
+STITCHES: tuple[type[Stitch], ...] = (SoftVertexTriangleStitch, VertexVertexStitch, VertexEdgeStitch)
