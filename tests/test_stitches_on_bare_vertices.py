@@ -14,16 +14,14 @@ from supple.solvers.implicit.energies.inertia import Inertia
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.stitches import StitchEnergy
 from supple.solvers.implicit.inversion_guard import InversionGuard
-from supple.solvers.implicit.newton.convergence import Convergence
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.linear_solver import LinearSolver
-from supple.solvers.implicit.newton.minimize import Problem, minimize
+from supple.solvers.implicit.newton.minimize import Convergence, Problem, minimize
 from supple.solvers.implicit.newton.objective import Objective
 from supple.solvers.implicit.step_limits import StepLimits
 from supple.solvers.xpbd.constraints.stitches import stitch_constraints
-from supple.solvers.xpbd.damping.element_matrices import matrices_of_tets
-from supple.solvers.xpbd.damping.elements import viscous_tets
+from supple.solvers.xpbd.damping.elements import matrices_of_tets, viscous_tets
 
 
 def side(points, triangles=()):

@@ -20,8 +20,7 @@ from supple.solvers.xpbd.frame.advance import damping_in
 from supple.solvers.xpbd.frame.substep_start import cycles, grow, pin_targets
 from supple.solvers.xpbd.integration import first_lost
 from supple.solvers.xpbd.memory import XPBDMemory
-from supple.solvers.xpbd.refusals import lost_position_message
-from supple.solvers.xpbd.solver import XPBD
+from supple.solvers.xpbd.solver import XPBD, lost_position_message
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 from trials.xpbd_rows.contact import RowContact, RowCounts
 from trials.xpbd_rows.substep import substep

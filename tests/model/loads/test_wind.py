@@ -9,7 +9,7 @@ import supple as sp
 from supple.app.cli.app import main
 from supple.model.state import State
 from supple.model.system import build_system
-from supple.solvers.implicit.energies.loads.drag import drags_at
+from supple.solvers.implicit.energies.loads.pressure import drags_at
 
 STIFF = sp.StableNeoHookean(youngs=2e5, poisson=0.0, density=40.0, damping=0.01)
 PLATE = sp.shapes.box((0.02, 0.4, 0.5), (1, 4, 5))

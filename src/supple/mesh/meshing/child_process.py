@@ -45,7 +45,7 @@ OUT_OF_MEMORY = (
 
 
 DEFAULT_TETS = 2_000
-"""Fine enough that a body bends, coarse enough for 30 frames/s: with 5,000, a knot of 13 cm took 5 times as long."""
+"""Fine enough that a body bends, coarse enough for 30 frames/s: with 5,000, a frame of a knot took 14 times as long."""
 DAMAGED = ("failed", "crash")
 """Kinds of failures of a mesher that its input causes."""
 

@@ -24,8 +24,7 @@ from supple.runtime.threads import threads_for
 from supple.scene.scene import Scene
 from supple.solvers.implicit.contact.build import contact_model
 from supple.solvers.implicit.contact.points import forces_on_owners
-from supple.solvers.implicit.contact.scales import smallest_diagonal
-from supple.solvers.implicit.contact.settings import IPCContact
+from supple.solvers.implicit.contact.settings import IPCContact, smallest_diagonal
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.energies.damping import quadratic_viscosity_of, viscosity_of
 from supple.solvers.implicit.energies.elasticity import SERIAL_TETS, elasticity_of

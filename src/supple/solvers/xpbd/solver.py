@@ -28,8 +28,7 @@ from supple.solvers.xpbd.assessment.works import Works
 from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
 from supple.solvers.xpbd.constraints.registry import build_constraint_sets
-from supple.solvers.xpbd.constraints.stitch_anchors import StitchAnchors
-from supple.solvers.xpbd.constraints.stitches import stitch_constraints
+from supple.solvers.xpbd.constraints.stitches import StitchAnchors, stitch_constraints
 from supple.solvers.xpbd.contact.collisions import Collisions
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.damping.kelvin_voigt import make_damping
@@ -43,15 +42,43 @@ from supple.solvers.xpbd.limits.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.limits.volume_guard import VolumeGuard
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.momentum import MomentumRestore
-from supple.solvers.xpbd.refusals import lost_position_message, refuse_unsupported
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection
 from supple.solvers.xpbd.sleep import Sleep
 from supple.solvers.xpbd.start import raise_if_inside
 from supple.solvers.xpbd.substeps import SubstepChoice, Substeps
-from supple.solvers.xpbd.sweeps.ordering import make_layout, reordered
+from supple.solvers.xpbd.sweeps.ordering import Layout, make_layout, reordered
 from supple.solvers.xpbd.welded_masses import WeldedMasses
 from supple.solvers.xpbd.workspace import XPBDWorkspace
+
+
+def refuse_unsupported(system: System) -> None:
+    """Check that XPBD can simulate the bodies of a system.
+
+    Raises
+    ------
+    SolverError : where it cannot.
+    """
+    for part in system.bodies:
+        if part.body.touches_with_skin and not part.rigid:
+            raise SolverError(f"XPBD: body {part.name!r} touches with its skin; simulate it with Implicit")
+    quadratic = [part.name for part in system.bodies if part.body.mesh.order == 2]
+    if quadratic:
+        raise SolverError(
+            f"XPBD: body {quadratic[0]!r} has quadratic tets; simulate it with Implicit, or give linear tets: "
+            "mesh.to_order(1)"
+        )
+
+
+def lost_position_message(system: System, layout: Layout, vertex: int, time: float) -> str:
+    """The message of a frame that ended because the position of a vertex (in the solver's numbering) is lost."""
+    part = next(p for p in system.bodies if p.vertices.start <= vertex < p.vertices.stop)
+    number = int(layout.old_from_new[vertex]) - part.vertices.start
+    return (
+        f"XPBD: body {part.name!r}, vertex {number}: its position is lost (not finite, or beyond 1e12 m) "
+        f"at t = {time:g} s; take more substeps or a shorter dt"
+    )
+
 
 # How often a bad frame is repeated with twice as many substeps. What crosses with twice as many crosses with more, too.
 MOST_REPEATS, MOST_FOR_CROSSINGS = 2, 1

@@ -18,14 +18,13 @@ from supple.runtime.thread_tuning import ThreadTuner
 from supple.runtime.threads import numba_threads
 from supple.solvers.xpbd.assessment.assessment import Assessment
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
-from supple.solvers.xpbd.assessment.moment import Moment
-from supple.solvers.xpbd.assessment.substep import Substep
+from supple.solvers.xpbd.assessment.moment import Moment, Substep
 from supple.solvers.xpbd.assessment.works import Works
 from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
 from supple.solvers.xpbd.constraints.registry import ConstraintSet
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
-from supple.solvers.xpbd.constraints.stitch_anchors import StitchAnchors
+from supple.solvers.xpbd.constraints.stitches import StitchAnchors
 from supple.solvers.xpbd.contact.collisions import Collisions
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
 from supple.solvers.xpbd.external_forces import ExternalForces

@@ -15,7 +15,7 @@ from supple.solvers.implicit.energies.elasticity import elasticity_of
 from supple.solvers.implicit.energies.inertia import Inertia
 from supple.solvers.implicit.energies.inversion_barrier import inversion_barrier
 from supple.solvers.implicit.energies.loads.external_forces import ExternalForces
-from supple.solvers.implicit.energies.loads.soft_targets import SoftTargets
+from supple.solvers.implicit.energies.loads.springs import SoftTargets
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
 from supple.solvers.implicit.newton.objective import Objective

@@ -15,11 +15,10 @@ from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.energies.inertia import Inertia
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.solvers.implicit.inversion_guard import InversionGuard
-from supple.solvers.implicit.newton.convergence import Convergence
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.linear_solver import LinearSolver
-from supple.solvers.implicit.newton.minimize import Outcome, Problem, minimize
+from supple.solvers.implicit.newton.minimize import Convergence, Outcome, Problem, minimize
 from supple.solvers.implicit.newton.objective import Objective
 from supple.solvers.implicit.step_limits import StepLimits
 

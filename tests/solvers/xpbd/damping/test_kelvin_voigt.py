@@ -9,8 +9,7 @@ import supple as sp
 from supple.model.system import build_system, initial_state
 from supple.solvers.xpbd.damping import kelvin_voigt
 from supple.solvers.xpbd.damping.coarse_space import CoarseMatrix, vertex_groups
-from supple.solvers.xpbd.damping.element_matrices import matrices_of_springs, matrices_of_tets
-from supple.solvers.xpbd.damping.elements import viscous_springs, viscous_tets
+from supple.solvers.xpbd.damping.elements import matrices_of_springs, matrices_of_tets, viscous_springs, viscous_tets
 from supple.solvers.xpbd.damping.kelvin_voigt import LONGEST_CYCLE, cycle_lengths
 from supple.solvers.xpbd.solver import XPBD
 

@@ -13,8 +13,7 @@ from supple.scene.contact_pairs import pair_table
 from supple.solvers.implicit.contact.collisions import Collisions
 from supple.solvers.implicit.contact.half_spaces import Planes
 from supple.solvers.implicit.contact.model import ContactModel
-from supple.solvers.implicit.contact.scales import largest_dhat, scales_of
-from supple.solvers.implicit.contact.settings import IPCContact
+from supple.solvers.implicit.contact.settings import IPCContact, largest_dhat, scales_of
 
 
 def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np.float64]) -> ContactModel:

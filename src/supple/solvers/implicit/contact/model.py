@@ -17,11 +17,10 @@ from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
 from supple.model.system import System
 from supple.scene.contact_pairs import PairTable
-from supple.solvers.implicit.contact.barrier import Barrier
-from supple.solvers.implicit.contact.collisions import Collisions
+from supple.solvers.implicit.contact.collisions import Barrier, Collisions
 from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.contact.half_spaces import PlaneBarrier, Planes, plane_friction
-from supple.solvers.implicit.contact.scales import Scales
+from supple.solvers.implicit.contact.settings import Scales
 
 logger = logging.getLogger(__name__)
 

@@ -24,8 +24,7 @@ from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.law_elasticity import LawElasticity, LawElements
 from supple.solvers.implicit.energies.patch_elasticity import PatchElasticity
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
-from supple.solvers.implicit.energies.quadratic.gathering import Gathering
-from supple.solvers.implicit.energies.quadratic.term import OfQuadraticTets, VirtualTets
+from supple.solvers.implicit.energies.quadratic.term import Gathering, OfQuadraticTets, VirtualTets
 
 # Fewer tets than this are processed by one thread: a pass of 1 ms is too short to share.
 SERIAL_TETS = 2_000

@@ -15,7 +15,7 @@ from supple.scene.stitches.stitching import Stitching
 from supple.solvers.implicit.energies.damping import Damping, StrainRate, Viscosity
 from supple.solvers.implicit.energies.elasticity import Elasticity
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
-from supple.solvers.implicit.energies.stitch_springs import spring_energies, spring_gradients, spring_hessians
+from supple.solvers.implicit.energies.stitches import spring_energies, spring_gradients, spring_hessians
 
 
 @dataclass(frozen=True, eq=False)

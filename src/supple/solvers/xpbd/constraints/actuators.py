@@ -25,7 +25,7 @@ from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.cables import CableLength, limits, turn_at
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.assessment.substep import Substep
+from supple.solvers.xpbd.assessment.moment import Substep
 
 Floats = NDArray[np.float64]
 

@@ -25,8 +25,7 @@ from supple.solvers.xpbd.contact.detection.surface_contacts import find_contacts
 from supple.solvers.xpbd.contact.detection.surface_lists import LEAST_REACH, SurfaceLists
 from supple.solvers.xpbd.contact.memory import SurfaceMemory
 from supple.solvers.xpbd.contact.movers import MovedPoints
-from supple.solvers.xpbd.contact.sweeps.prepared_rows import PreparedRows, prepare_rows
-from supple.solvers.xpbd.contact.sweeps.row_sweeps import note_shares, solve_rows
+from supple.solvers.xpbd.contact.sweeps.row_sweeps import PreparedRows, note_shares, prepare_rows, solve_rows
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 
 # Of the mean surface edge: the largest gap that is reported, and how far contacts may move a point in a substep, where

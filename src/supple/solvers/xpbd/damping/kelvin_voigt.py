@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 from supple.model.system import System, initial_state
 from supple.solvers.xpbd.damping import cycle
 from supple.solvers.xpbd.damping.coarse_space import CoarseMatrix, frames_of_groups, vertex_groups
-from supple.solvers.xpbd.damping.element_matrices import matrices_of_springs, matrices_of_tets
-from supple.solvers.xpbd.damping.elements import viscous_springs, viscous_tets
+from supple.solvers.xpbd.damping.elements import matrices_of_springs, matrices_of_tets, viscous_springs, viscous_tets
 from supple.solvers.xpbd.damping.force_sum import ForceSum
 from supple.solvers.xpbd.damping.forces import forces_of_springs, forces_of_tets, powers_of_springs, powers_of_tets
 from supple.solvers.xpbd.sweeps.groups import Groups, make_groups, make_groups_of_one_chunk

@@ -7,7 +7,7 @@ from itertools import chain, repeat
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.solvers.xpbd.assessment.substep import Substep
+from supple.solvers.xpbd.assessment.moment import Substep
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
 from supple.solvers.xpbd.integration import to_world, update_velocities
 from supple.solvers.xpbd.limits.rigid_fallback import united

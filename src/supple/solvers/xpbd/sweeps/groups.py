@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 from supple.numerics.coloring import independent_groups
 from supple.solvers.xpbd.sweeps.ordering import Layout
 
+# No flag that assumes finite numbers (NaN must be detected) and none that reorders sums (same bits on any threads).
+FLAGS = {"contract", "arcp", "nsz"}
+
+
 # With this many lanes LLVM makes vector instructions; with 8 it unrolls the loop instead.
 WIDTH = 16
 # A group is formed from this many constraints in sequence, whose vertices fit into the first cache.

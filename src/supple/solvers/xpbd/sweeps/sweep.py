@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.runtime.kernel_cache import kernel_with, njit, prange
-from supple.solvers.xpbd.sweeps.compilation import FLAGS
-from supple.solvers.xpbd.sweeps.groups import WIDTH, Groups
+from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, Groups
 
 
 class Sweep:

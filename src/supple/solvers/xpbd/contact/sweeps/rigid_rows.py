@@ -12,7 +12,7 @@ neither points nor weights.
 
 from supple.numerics.mat3 import cross, dot, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.contact.sweeps.columns import set_three, three
+from supple.solvers.xpbd.contact.sweeps.vertex_rows import set_three, three
 
 # f; the relative place at the beginning of the substep, without the shifts of a pass [m]; slip_0 [m]; how the slip
 # changes by a unit push [1/kg]; sum w C^2 1 - [A] J [A], symmetric: xx yy zz xy yz zx [1/kg].

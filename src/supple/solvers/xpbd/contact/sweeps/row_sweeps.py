@@ -1,8 +1,10 @@
 """The Gauss-Seidel sweeps over the rows of contact of a substep; see `contact_rows`."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
@@ -14,20 +16,82 @@ from supple.solvers.xpbd.contact.impulses import (
     relative,
     relative_before,
     shift_both,
+    shift_compliance,
 )
 from supple.solvers.xpbd.contact.response_rates import kept_share
-from supple.solvers.xpbd.contact.sweeps.prepared_rows import BOTH, FIRST, TOTAL, VERTICES, YIELD
 from supple.solvers.xpbd.contact.sweeps.rigid_rows import (
+    RIGID_COLUMNS,
     answer_of,
     begin_bodies,
     begin_sweeps,
+    join_points,
     place_of_bodies,
+    prepare_bodies,
     push_bodies,
     shift_bodies,
     slip_of_bodies,
     softness_along,
 )
-from supple.solvers.xpbd.contact.sweeps.vertex_rows import begin_vertices, push_vertices, slip_of_vertices
+from supple.solvers.xpbd.contact.sweeps.vertex_rows import (
+    VERTEX_COLUMNS,
+    begin_vertices,
+    prepare_vertices,
+    push_vertices,
+    slip_of_vertices,
+)
+
+# Rows of contact with what remains the same in all passes of a substep, found once.
+#
+# A row is one line of numbers, which kernels find by columns. Arguments of many arrays, which tell a kernel where
+# each of them lies, cost a sweep more than its arithmetic.
+
+
+# What a unit push changes the relative place by along the normal, and what a unit shift does [1/kg]; the columns of
+# `rigid_rows` or `vertex_rows` follow.
+TOTAL, YIELD, FIRST = 0, 1, 2
+COLUMNS = FIRST + max(RIGID_COLUMNS, VERTEX_COLUMNS)
+# In place of the first body: of a row that moves vertices alone, and of one that moves vertices and a rigid body.
+VERTICES, BOTH = -2, -3
+
+
+class PreparedRows(NamedTuple):
+    """k rows, as kernels receive them.
+
+    Attributes
+    ----------
+    bodies : (k, 2) the rigid bodies of each row, -1 for none; VERTICES or BOTH for the first where it moves vertices
+    numbers : (k, COLUMNS)
+    """
+
+    bodies: NDArray[np.int64]
+    numbers: NDArray[np.float64]
+
+
+@njit(cache=True)
+def prepare_rows(chosen, movers, rows):
+    """Prepare the chosen rows; see `solve_rows`."""
+    count, vertices, weights, normals = len(chosen), rows[0], rows[1], rows[2]
+    out = PreparedRows(np.empty((count, 2), dtype=np.int64), np.zeros((count, COLUMNS)))
+    bodies, numbers = out
+    for k in range(count):
+        e = chosen[k]
+        numbers[k, TOTAL] = compliance(movers, vertices, weights, e, row(normals, e))
+        numbers[k, YIELD] = shift_compliance(movers, vertices, weights, e)
+        any_body, any_vertex = False, False
+        for i in range(4):
+            p = vertices[e, i]
+            any_body = any_body or movers.body[p] >= 0
+            any_vertex = any_vertex or movers.inverse_masses[p] > 0.0
+        mine = numbers[k, FIRST:]
+        if not any_body:
+            bodies[k, 0] = VERTICES
+            prepare_vertices(mine, movers.inverse_masses, vertices[e], weights[e])
+        elif any_vertex or not join_points(bodies[k], mine, movers, vertices[e], weights[e]):
+            bodies[k, 0] = BOTH
+        else:
+            prepare_bodies(bodies[k], mine, movers.w, movers.J)
+    return out
+
 
 # Of the gap that is kept: an overlap of this size remains where a body is rigid. A shift that removes it lifts the body
 # off its other contacts, onto which it falls in the next substep, so that nothing would come to rest.

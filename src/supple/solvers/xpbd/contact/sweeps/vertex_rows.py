@@ -6,7 +6,18 @@ substep only change by the shifts before its sweeps.
 
 from supple.numerics.mat3 import cross, dot, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.contact.sweeps.columns import set_three, three
+
+
+@njit
+def three(numbers, c):
+    """The vector that begins at column c."""
+    return (numbers[c], numbers[c + 1], numbers[c + 2])
+
+
+@njit
+def set_three(numbers, c, v):
+    numbers[c], numbers[c + 1], numbers[c + 2] = v[0], v[1], v[2]
+
 
 # Of the four points: w_i c_i and w_i [1/kg]; r_prev [m]; y_i [m]; A^-1, symmetric: xx yy zz xy yz zx [1/m^2], or zero.
 SHARES, MASSES, PLACE, ARMS, TURN = 0, 4, 8, 11, 23
