@@ -1,6 +1,6 @@
 """Projected Newton: minimizes the objective of a step from a state without inverted tets to one without.
 
-Three parts: the direction (`direction`), the step along it (`line_search`), and the end (`Tolerances`).
+Three parts: the direction (`direction`), the step along it (`line_search`), and the end (`Convergence`).
 
 Source: Li, Jiang, Luo, "Physics-Based Simulation", chapter "Optimization Framework".
 """
