@@ -141,15 +141,15 @@ def test_of_several_processes_one_compiles(tmp_path):
     assert list(entry.parent.iterdir()) == [entry]
 
 
-@pytest.mark.parametrize("damage", [lambda content: content[:1000], lambda content: bytes(len(content))])
-def test_a_damaged_entry_is_compiled_again(clone, tmp_path, damage):
+def test_a_damaged_entry_is_compiled_again(clone, tmp_path):
     _, run = clone
     run(SOURCES)
     (entry,) = entries(tmp_path)
     content = entry.read_bytes()
-    entry.write_bytes(damage(content))
-    assert run(SOURCES) == "[3.0, 2.0, 1.0] 0"
-    assert len(entry.read_bytes()) == len(content)
+    for damaged in (content[:1000], bytes(len(content))):
+        entry.write_bytes(damaged)
+        assert run(SOURCES) == "[3.0, 2.0, 1.0] 0"
+        assert len(entry.read_bytes()) == len(content)
     assert run(SOURCES).endswith(" 1")
 
 
