@@ -5,7 +5,7 @@ import os
 import pytest
 
 import supple as sp
-from supple.app.scene_file.confined import ConfinedMeshStore
+from supple.app.scene_file.entries.mesh_sources import ConfinedMeshStore
 from supple.app.scene_file.loader import load_run
 from supple.errors import SceneError, SuppleError
 

@@ -55,8 +55,8 @@ def view(
         return
 
     from supple.app.cli.console import reading
-    from supple.app.scene_file.confined import ConfinedMeshStore
     from supple.app.scene_file.entries.families import solver_of_kind
+    from supple.app.scene_file.entries.mesh_sources import ConfinedMeshStore
     from supple.app.scene_file.loader import load_run
     from supple.app.viewer.protocol.live_source import LiveSource
 
