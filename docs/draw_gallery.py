@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from supple.results.export.film import Film
 
 import supple as sp
 from supple.app.demos.registry import DEMOS
+from supple.results.export.video import Film
 from supple.results.export.video_worker import Studio
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 

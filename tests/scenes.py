@@ -3,6 +3,8 @@
 import numpy as np
 
 import supple as sp
+from supple.model.system import initial_state
+from supple.simulate import first_frame
 
 G = 9.81
 FLOOR = sp.HalfSpace(point=(0, 0, 0), normal=(0, 1, 0), friction=0.5, name="floor")
@@ -18,6 +20,11 @@ def converged(frames):
         frame.report.message for frame in frames if frame.report.message
     ]
     return frames
+
+
+def at_start(scene, **given):
+    """The report of a scene before its first step, with initial positions and velocities if given."""
+    return first_frame(scene, initial_state(scene, **given)).report
 
 
 def rigid(name="rigid", shape=CUBE, **values):

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.scenes import converged
+from tests.scenes import at_start, converged
 
 import supple as sp
 from supple.solvers.implicit.solver import Implicit
@@ -63,7 +63,7 @@ def test_angular_momentum_error_falls_at_the_expected_order(integrator, order):
     errors = []
     for steps in (16, 32, 64):
         frames = run(scene, Implicit(integrator=integrator, tolerance=1e-7), 0.16 / steps, steps)
-        L0 = angular_momentum_at_start(body)
+        L0 = at_start(scene).angular_momentum
         errors.append(np.linalg.norm(frames[-1].report.angular_momentum - L0))
     rate = np.log2(errors[0] / errors[2]) / 2
     assert rate > order - 0.25
@@ -74,17 +74,9 @@ def test_angular_momentum_error_falls_at_the_expected_order(integrator, order):
 def test_newmark_keeps_angular_momentum(damping):
     body = cube(angular_velocity=(0, 4, 1), youngs=5e4, damping=damping)
     scene = sp.Scene([body], gravity=(0, 0, 0))
-    L0 = angular_momentum_at_start(body)
+    L0 = at_start(scene).angular_momentum
     for frame in run(scene, Implicit(integrator="newmark"), 1 / 60, 30):
         assert np.linalg.norm(frame.report.angular_momentum - L0) < 1e-12 * np.linalg.norm(L0)
-
-
-def angular_momentum_at_start(body):
-    from supple.model.system import initial_state
-    from supple.simulate import first_frame
-
-    scene = sp.Scene([body], gravity=(0, 0, 0))
-    return first_frame(scene, initial_state(scene)).report.angular_momentum
 
 
 def energy(frame):

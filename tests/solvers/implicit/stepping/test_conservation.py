@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from tests.scenes import at_start
 
 import supple as sp
-from supple.model.system import initial_state
-from supple.simulate import first_frame
 
 RUBBER = sp.StableNeoHookean(youngs=1e5, poisson=0.3, density=1000)
 CUBE = sp.shapes.box((0.2, 0.2, 0.2), (2, 2, 2))
@@ -34,7 +33,7 @@ def energy(report):
 )
 def test_stiff_stitches_that_start_loaded_make_neither_energy_nor_spin(mu, rate, steps):
     scene = stitched_cubes(mu)
-    start = first_frame(scene, initial_state(scene)).report
+    start = at_start(scene)
     assert start.stitch_energy > 100 * start.kinetic_energy
     for frame in sp.simulate(scene, sp.Implicit(integrator="newmark"), 1 / rate, steps):
         report = frame.report
