@@ -1,6 +1,7 @@
 """Deformation gradients of tetrahedra and their determinants."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.runtime.kernel_cache import njit
 
@@ -20,15 +21,7 @@ def deformation_gradients(x, tets, Dm_inv):
     return F
 
 
-@njit(cache=True)
-def determinants(F):
+def determinants(F: NDArray[np.float64]) -> NDArray[np.float64]:
     """det of every matrix: (m, 3, 3) -> (m,)."""
-    J = np.empty(len(F))
-    for e in range(len(F)):
-        f = F[e]
-        J[e] = (
-            f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
-            - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
-            + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
-        )
-    return J
+    a, b, c, d, e, f, g, h, i = F.reshape(-1, 9).T
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)

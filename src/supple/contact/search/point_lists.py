@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.distances import point_triangle_square
-from supple.contact.search.boxes import boxes_of_pieces
-from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner
+from supple.contact.search.pair_kernels import RUNS, meets_partner
 from supple.contact.search.room import Room
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import (
     GROUP,
     STACK,
     BoxTree,
+    boxes_of_labels,
+    boxes_of_triangles,
     from_root,
     morton_codes,
     near_boxes,
@@ -26,17 +27,6 @@ from supple.numerics.geometry.box_tree import (
     which_overlap,
 )
 from supple.runtime.kernel_cache import njit, prange
-
-
-@njit(cache=True)
-def _boxes_of_triangles(points, triangles, radii, out):
-    """Write the box of each triangle, enlarged by the largest motion of a corner, to out (t, 6)."""
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        moves = max(radii[a, 1], radii[b, 1], radii[c, 1])
-        for j in range(3):
-            out[t, j] = min(points[a, j], points[b, j], points[c, j]) - moves
-            out[t, 3 + j] = max(points[a, j], points[b, j], points[c, j]) + moves
 
 
 @njit
@@ -185,11 +175,11 @@ class PairFinder:
         trees, far_boxes = self._sorted(shapes, radii)
         room = self._room
         pieces = len(rules[0])
-        of_points, of_triangles = np.empty((2, pieces, 3)), np.empty((pieces, 6))
-        boxes_of_pieces(points, point_piece, radii[0], *of_points)
-        boxes_of_owners(far_boxes[:, :3], far_boxes[:, 3:] - far_boxes[:, :3], triangle_piece, of_triangles)
-        boxes = np.concatenate(
-            [np.minimum(of_points[0], of_triangles[:, :3]), np.maximum(of_points[1], of_triangles[:, 3:])], axis=1
+        margins = radii[0][:, :1]
+        of_points = boxes_of_labels(np.concatenate([points - margins, points + margins], axis=1), point_piece, pieces)
+        of_triangles = boxes_of_labels(far_boxes, triangle_piece, pieces)
+        boxes = boxes_of_labels(
+            np.concatenate([of_points, of_triangles]), np.tile(np.arange(pieces, dtype=np.int32), 2), pieces
         )
         own = np.diagonal(rules[0])
         partners = near_boxes(boxes, rules[0]), (np.append(0, np.cumsum(own)), np.flatnonzero(own))
@@ -206,8 +196,7 @@ class PairFinder:
         points, point_piece, triangles, triangle_piece = shapes
         trees, all_boxes = [], []
         for k, each in enumerate(radii):
-            boxes = np.empty((len(triangles), 6))
-            _boxes_of_triangles(points, triangles, each, boxes)
+            boxes = boxes_of_triangles(points, triangles, each[:, 1])
             all_boxes.append(boxes)
             if k < len(self._trees) and self._trees[k].refit(boxes):
                 trees.append(self._trees[k])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.start.surfaces import StartSurfaces, winding_number
+from supple.numerics.geometry.box_tree import boxes_of_labels, boxes_of_triangles
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.runtime.kernel_cache import ROWS
 from supple.runtime.threads import threads_for
@@ -140,10 +140,8 @@ def _nested(s: StartSurfaces, table: PairTable, met: set[tuple[int, int]]) -> li
 
 def _boxes(s: StartSurfaces) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Corners (p, 3) of the things' bounding boxes; planes have none."""
-    boxes = np.empty((len(s.solid), 3)), np.empty((len(s.solid), 3))
-    corners = s.points[s.triangles].reshape(-1, 3)
-    boxes_of_pieces(corners, np.repeat(s.owner, 3), np.zeros((len(corners), 1)), *boxes)
-    return boxes
+    boxes = boxes_of_labels(boxes_of_triangles(s.points, s.triangles), s.owner, len(s.solid))
+    return boxes[:, :3], boxes[:, 3:]
 
 
 def _behind_planes(s: StartSurfaces, table: PairTable) -> list[Intersection]:

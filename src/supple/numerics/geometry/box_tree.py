@@ -69,16 +69,25 @@ class BoxTree:
         return _refit(boxes, self.order, self.nodes) <= _GROWTH * self._size
 
 
-@njit(cache=True)
-def boxes_of_triangles(x, triangles):
-    """(t, 6) lowest and highest corner of triangles (t, 3) of points (n, 3); NumPy takes fifty times as long."""
+def boxes_of_triangles(
+    x: NDArray[np.float64], triangles: NDArray[np.int32], moves: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """(t, 6) lowest and highest corner of triangles (t, 3) of points (n, 3), each enlarged by the largest of the
+    distances (n,) that its corners may move [m]; default: 0."""
     out = np.empty((len(triangles), 6))
+    _boxes_of_triangles(x, triangles, np.zeros(len(x)) if moves is None else np.ascontiguousarray(moves), out)
+    return out
+
+
+@njit(cache=True)
+def _boxes_of_triangles(x, triangles, moves, out):
+    """NumPy takes fifty times as long."""
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        margin = max(moves[a], moves[b], moves[c])
         for j in range(3):
-            out[t, j] = min(x[a, j], x[b, j], x[c, j])
-            out[t, 3 + j] = max(x[a, j], x[b, j], x[c, j])
-    return out
+            out[t, j] = min(x[a, j], x[b, j], x[c, j]) - margin
+            out[t, 3 + j] = max(x[a, j], x[b, j], x[c, j]) + margin
 
 
 def overlapping(tree: BoxTree, boxes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:

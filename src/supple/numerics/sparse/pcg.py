@@ -24,7 +24,7 @@ from supple.runtime.threads import threads_for
 # Short passes in each iteration: fewer blocks than this are worked on by one thread.
 _SERIAL_BLOCKS = 50_000
 
-NOTHING_MORE = np.zeros((0, 0, 3))
+NOTHING_MORE, _NO_MATRIX = np.zeros((0, 0, 3)), np.zeros((0, 0))
 
 
 @dataclass(frozen=True)
@@ -65,22 +65,24 @@ def conjugate_gradients(
     """
     order = preconditioner.order
     solution = np.zeros_like(x)
+    inverse = (
+        (order.groups, order.group_start, order.color_start),
+        (order.lower.start, order.lower.columns, order.lower.blocks),
+        (order.upper.start, order.upper.columns, order.upper.blocks),
+        preconditioner.diagonal,
+        preconditioner.inverse_diagonal,
+        preconditioner.fields,
+        preconditioner.first,
+        preconditioner.coarse,
+    )
+    more = (low_rank, low_rank, low_rank, low_rank, _NO_MATRIX)
     with threads_for(preconditioner.pattern.blocks, _SERIAL_BLOCKS):
-        iterations, converged, indefinite, first = _solve(
-            (order.groups, order.group_start, order.color_start),
-            (order.lower.start, order.lower.columns, order.lower.blocks),
-            (order.upper.start, order.upper.columns, order.upper.blocks),
-            preconditioner.diagonal,
-            preconditioner.inverse_diagonal,
-            preconditioner.fields,
-            preconditioner.first,
-            preconditioner.coarse,
-            b[order.rows],
-            solution,
-            tolerance,
-            max_iterations,
-            np.take(low_rank, order.rows, axis=1) if len(low_rank) else low_rank,
-        )
+        if len(low_rank):
+            low = np.take(low_rank, order.rows, axis=1)
+            more = (low, np.zeros_like(low), np.zeros_like(low), np.zeros_like(low), np.eye(len(low)))
+            _prepare(*inverse, *more)
+        rhs = b[order.rows]
+        iterations, converged, indefinite, first = _solve(*inverse, rhs, solution, tolerance, max_iterations, more)
     x[order.rows] = solution
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
 
@@ -101,10 +103,9 @@ def _add(factor, a, out):
 
 
 @njit
-def _inverse(a):
-    """Of a small positive definite matrix, by elimination."""
+def _invert(a, out):
+    """The inverse of a small positive definite matrix, by elimination, which destroys it; `out` begins as 1."""
     n = len(a)
-    out = np.eye(n)
     for k in range(n):
         pivot = a[k, k]
         for j in range(n):
@@ -116,7 +117,6 @@ def _inverse(a):
                 for j in range(n):
                     a[i, j] -= factor * a[k, j]
                     out[i, j] -= factor * out[k, j]
-    return out
 
 
 @njit
@@ -127,49 +127,54 @@ def _coarse_solution(restricted, coarse, first, coefficients):
 
 
 @njit(cache=True)
-def _solve(
-    order,
-    lower,
-    upper,
-    diagonal,
-    inverse,
-    fields,
-    first,
-    coarse,
-    rhs,
-    x,
-    tolerance,
-    max_iterations,
-    low,
-):
+def _prepare(order, lower, upper, diagonal, inverse, fields, first, coarse, low, W, Y, UY, S_inverse):
+    """(M + G G^T)^-1 = M^-1 - Y S^-1 Y^T with Y = M^-1 G and S = 1 + G^T Y. W = (D + L)^-1 G."""
     groups, start, colors = order
     sums = np.zeros(len(groups))
     restricted = np.zeros(12 * len(groups))
-    coefficients = np.zeros_like(restricted)
-    r = np.zeros_like(rhs)
-    y, s, t, Ut = np.zeros_like(r), np.zeros_like(r), np.zeros_like(r), np.zeros_like(r)
-    p, Up, Ap, w = np.zeros_like(r), np.zeros_like(r), np.zeros_like(r), np.zeros_like(r)
-    # (M + G G^T)^-1 = M^-1 - Y S^-1 Y^T with Y = M^-1 G and S = 1 + G^T Y. W = (D + L)^-1 G.
-    W, Y, UY = np.zeros_like(low), np.zeros_like(low), np.zeros_like(low)
-    S = np.eye(len(low))
+    coefficients = np.zeros(len(restricted))
+    r, s, t, p = np.zeros_like(low[0]), np.zeros_like(low[0]), np.zeros_like(low[0]), np.zeros_like(low[0])
+    Up, Ap, x = np.zeros_like(low[0]), np.zeros_like(low[0]), np.zeros_like(low[0])
+    S = S_inverse.copy()
     for m in range(len(low)):
         # With p = 0 the sweep forward takes its right side from Ut: Ap becomes g and w becomes (D + L)^-1 g.
         forward(colors, 0.0, start, *lower, diagonal, inverse, t, low[m], p, Up, Ap, W[m], sums)
         copy_elements(low[m], r)
-        update(0.0, groups, start, fields, p, Ap, w, x, r, y, restricted)
+        update(0.0, groups, start, fields, p, Ap, W[m], x, r, s, restricted)
         _coarse_solution(restricted, coarse, first, coefficients)
         backward(colors, groups, start, *upper, inverse, fields, coefficients, r, W[m], s, Y[m], UY[m], sums)
         for n in range(len(low)):
             S[n, m] += _inner(low[n], Y[m])
-    S_inverse = _inverse(S)
+    _invert(S, S_inverse)
+
+
+@njit(cache=True)
+def _solve(order, lower, upper, diagonal, inverse, fields, first, coarse, rhs, x, tolerance, max_iterations, more):
+    groups, start, colors = order
+    low, W, Y, UY, S_inverse = more
+    sums = np.zeros(len(groups))
+    restricted = np.zeros(12 * len(groups))
+    coefficients = np.zeros(len(restricted))
+    r, y, s, t, Ut = np.zeros_like(rhs), np.zeros_like(rhs), np.zeros_like(rhs), np.zeros_like(rhs), rhs
+    p, Up, Ap, w = np.zeros_like(rhs), np.zeros_like(rhs), np.zeros_like(rhs), np.zeros_like(rhs)
     weights = np.zeros(len(low))
-    # The same for the right side: this update makes r of it.
-    forward(colors, 0.0, start, *lower, diagonal, inverse, t, rhs, p, Up, Ap, w, sums)
-    r[:] = 0.0
-    alpha = -1.0
-    first_norm = 0.0
-    old = 0.0
+    first_norm = old = rz = beta = 0.0
     for iteration in range(max_iterations + 1):
+        forward(colors, beta, start, *lower, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
+        # At first p is zero and Ap the right side, of which this update makes r.
+        alpha = -1.0
+        if iteration > 0:
+            curvature = 0.0
+            for g in range(len(groups)):
+                curvature += sums[g]
+            for m in range(len(low)):
+                along = _inner(low[m], p)
+                _add(along, low[m], Ap)
+                _add(along, W[m], w)
+                curvature += along * along
+            if not curvature > 0.0:
+                return iteration - 1, False, True, first_norm
+            alpha = rz / curvature
         update(alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
         _coarse_solution(restricted, coarse, first, coefficients)
         backward(colors, groups, start, *upper, inverse, fields, coefficients, r, y, s, t, Ut, sums)
@@ -196,16 +201,4 @@ def _solve(
             break
         beta = rz / old if iteration > 0 else 0.0
         old = rz
-        forward(colors, beta, start, *lower, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
-        curvature = 0.0
-        for g in range(len(groups)):
-            curvature += sums[g]
-        for m in range(len(low)):
-            along = _inner(low[m], p)
-            _add(along, low[m], Ap)
-            _add(along, W[m], w)
-            curvature += along * along
-        if not curvature > 0.0:
-            return iteration, False, True, first_norm
-        alpha = rz / curvature
     return iteration, False, False, first_norm

@@ -70,8 +70,13 @@ class SweepOrder:
         colors = _colors(pattern.row_start, pattern.columns, group_start, group_of)
         groups = np.argsort(colors, kind="stable").astype(np.int32)
         color_start = np.append(0, np.cumsum(np.bincount(colors))).astype(np.int32)
-        rows, start, lower, upper = _triangles(pattern.row_start, pattern.columns, group_start, groups)
-        return cls(rows, pattern.diagonal[rows], groups, start, color_start, Triangle.of(*lower), Triangle.of(*upper))
+        begin, end = group_start[groups], group_start[groups + 1]
+        start = np.append(0, np.cumsum(end - begin)).astype(np.int32)
+        rows = _ranges(begin, end).astype(np.int32)
+        place = np.empty_like(rows)
+        place[rows] = np.arange(len(rows))
+        lower, upper = _triangle(pattern, rows, place, 1), _triangle(pattern, rows[::-1], place, -1)
+        return cls(rows, pattern.diagonal[rows], groups, start, color_start, lower, upper)
 
     def take(self, data: NDArray[np.float64]) -> None:
         """Copy the blocks (b, 3, 3) of a matrix beside the diagonal."""
@@ -99,41 +104,20 @@ def _colors(row_start, columns, group_start, group_of):
     return colors
 
 
-@njit(cache=True)
-def _triangles(row_start, columns, group_start, groups):
-    """Rows and starts of groups in the order of `groups`, and both triangles: starts, columns, sources."""
-    n = len(row_start) - 1
-    rows = np.empty(n, dtype=np.int32)
-    start = np.zeros(len(groups) + 1, dtype=np.int32)
-    place = np.empty(n, dtype=np.int32)
-    k = 0
-    for g in range(len(groups)):
-        for i in range(group_start[groups[g]], group_start[groups[g] + 1]):
-            rows[k] = i
-            place[i] = k
-            k += 1
-        start[g + 1] = k
-    lower_start = np.zeros(n + 1, dtype=np.int32)
-    upper_start = np.zeros(n + 1, dtype=np.int32)
-    beside = (len(columns) - n) // 2
-    lower = np.empty((2, beside), dtype=np.int32)
-    upper = np.empty((2, beside), dtype=np.int32)
-    low = high = 0
-    for k in range(n):
-        last = n - 1 - k
-        for q in range(row_start[rows[k]], row_start[rows[k] + 1]):
-            if place[columns[q]] < k:
-                lower[0, low] = place[columns[q]]
-                lower[1, low] = q
-                low += 1
-        for q in range(row_start[rows[last]], row_start[rows[last] + 1]):
-            if place[columns[q]] > last:
-                upper[0, high] = place[columns[q]]
-                upper[1, high] = q
-                high += 1
-        lower_start[k + 1] = low
-        upper_start[k + 1] = high
-    return rows, start, (lower_start, lower[0], lower[1]), (upper_start, upper[0], upper[1])
+def _ranges(begin: NDArray[np.int32], end: NDArray[np.int32]) -> NDArray[np.int64]:
+    """The numbers of each range, begin (k,) to end (k,), one range after another."""
+    lengths = end - begin
+    return np.repeat(begin - (np.cumsum(lengths) - lengths), lengths) + np.arange(lengths.sum())
+
+
+def _triangle(pattern: BlockRows, rows: NDArray[np.int32], place: NDArray[np.int32], sign: int) -> Triangle:
+    """The blocks whose columns have lower places (sign 1) or higher ones (sign -1) than their rows, row after row."""
+    begin, end = pattern.row_start[rows], pattern.row_start[rows + 1]
+    source, of = _ranges(begin, end), np.repeat(np.arange(len(rows)), end - begin)
+    columns = place[pattern.columns[source]]
+    beside = sign * columns < sign * place[rows][of]
+    start = np.append(0, np.cumsum(np.bincount(of[beside], minlength=len(rows)))).astype(np.int32)
+    return Triangle.of(start, columns[beside], source[beside].astype(np.int32))
 
 
 @njit(cache=True, parallel=True)

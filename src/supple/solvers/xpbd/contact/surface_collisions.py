@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.obstacles import ObstaclePoses
-from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.search.excluded_pairs import stitched_points
 from supple.contact.search.point_inside import depths_inside
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.model.system import System
+from supple.numerics.geometry.box_tree import boxes_of_labels
 from supple.runtime.threads import threads_for
 from supple.solvers.xpbd.contact.contact_rows import ContactRows, LoadedRows, choose_rows, push_rows
 from supple.solvers.xpbd.contact.detection.edge_contacts import (
@@ -358,8 +358,8 @@ class SurfaceCollisions:
         self._depth[:] = 0.0
         if not (s.allowed & ~np.eye(len(s.allowed), dtype=np.bool_)).any():
             return
-        boxes = np.empty((len(s.closed), 3)), np.empty((len(s.closed), 3))
-        boxes_of_pieces(self._x, s.point_piece, np.zeros((len(self._x), 1)), *boxes)
+        both = boxes_of_labels(np.concatenate([self._x, self._x], axis=1), s.point_piece, len(s.closed))
+        boxes = both[:, :3].copy(), both[:, 3:].copy()
         for kind, part in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
             shapes = (self._x, s.point_piece, s.triangles[part], s.triangle_piece[part])
             depths_inside(shapes, s.closed, s.allowed, boxes, self._depth[kind])

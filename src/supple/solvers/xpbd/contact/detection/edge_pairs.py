@@ -19,20 +19,9 @@ from supple.numerics.geometry.box_tree import (
     next_leaf,
     overlap,
 )
-from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
-from supple.solvers.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
+from supple.solvers.xpbd.contact.detection.piece_runs import EDGE_EDGE, keys_of
 from supple.solvers.xpbd.contact.detection.surface_edges import SurfaceEdges
-
-
-@njit(cache=True)
-def keys_of_edges(first, second):
-    """The keys of pairs of edges (k,)."""
-    out = np.empty(len(first), dtype=np.int64)
-    for i in range(len(first)):
-        out[i] = key_of(EDGE_EDGE, first[i], second[i])
-    return out
-
 
 # Edges of one piece are compared only where the surface is compressed, where it can cross itself within one fold, and
 # where folds meet: where a point is near a triangle that it is not near at rest.
@@ -56,8 +45,16 @@ def _share_an_end(ends, e, f):
     return ends[e, 0] == ends[f, 0] or ends[e, 0] == ends[f, 1] or ends[e, 1] == ends[f, 0] or ends[e, 1] == ends[f, 1]
 
 
-@njit(cache=True)
-def folded_edges(x, ends, lengths, pieces, together, near, surfaces):
+@np.errstate(invalid="ignore", over="ignore")
+def folded_edges(
+    x: NDArray[np.float64],
+    ends: NDArray[np.int32],
+    lengths: NDArray[np.float64],
+    pieces: NDArray[np.int32],
+    together: NDArray[np.bool_],
+    near: tuple,
+    surfaces: tuple,
+) -> NDArray[np.bool_]:
     """The edges (e,) that have an end where the surface may cross itself; see `SQUEEZED`.
 
     Only edges of pieces that may touch themselves.
@@ -72,21 +69,14 @@ def folded_edges(x, ends, lengths, pieces, together, near, surfaces):
     marked = np.zeros(len(x), dtype=np.bool_)
     starts, listed = near
     point_piece, triangles, triangle_piece = surfaces
-    for p in range(len(x)):
-        for i in range(starts[p], starts[p + 1]):
-            t = listed[i]
-            if triangle_piece[t] == point_piece[p]:
-                marked[p] = True
-                for j in range(3):
-                    marked[triangles[t, j]] = True
-    for e in range(len(ends)):
-        d = subtract(row(x, ends[e, 0]), row(x, ends[e, 1]))
-        if together[pieces[e], pieces[e]] and dot(d, d) < (SQUEEZED * lengths[e]) ** 2:
-            marked[ends[e, 0]] = marked[ends[e, 1]] = True
-    found = np.zeros(len(ends), dtype=np.bool_)
-    for e in range(len(ends)):
-        found[e] = marked[ends[e, 0]] or marked[ends[e, 1]]
-    return found
+    point = np.repeat(np.arange(len(x)), np.diff(starts))
+    own = triangle_piece[listed] == point_piece[point]
+    marked[point[own]] = True
+    marked[triangles[listed[own]]] = True
+    a, b = ends.T
+    u, v, w = (x[a] - x[b]).T
+    marked[ends[together.diagonal()[pieces] & (u * u + v * v + w * w < (SQUEEZED * lengths) ** 2)]] = True
+    return marked[a] | marked[b]
 
 
 @njit(cache=True)
@@ -245,7 +235,7 @@ class EdgePairs:
                     break
             pairs = room.sorted(len(self.edges.ends))
         self._first, self._second = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
-        self.keys = keys_of_edges(self._first, self._second) if len(pairs) else np.zeros(0, dtype=np.int64)
+        self.keys = keys_of(EDGE_EDGE, self._first, self._second)
 
     def numbered(self, rows: NDArray[np.int64]) -> tuple:
         """The argument `pairs` of `find_edge_contacts`, for these rows."""

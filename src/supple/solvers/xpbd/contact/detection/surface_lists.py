@@ -57,7 +57,7 @@ class SurfaceLists:
         self.near = NearPairs(n, s.triangles, self.edges.arrays[0])
         self.pairs: tuple = ()
         self._finder = PairFinder(~edges.blunt)
-        self._runs = PieceRuns(self._finder, n, s.triangle_piece)
+        self._runs = PieceRuns(self._finder, s.triangle_piece)
         self._shapes = (s.point_piece, s.triangles, s.triangle_piece)
         self._least, self._most = (
             LEAST_REACH * edge_length,
