@@ -10,7 +10,7 @@ import numpy as np
 
 import supple as sp
 from supple.model.system import build_system, initial_state
-from supple.solvers.implicit.contact.build import contact_model
+from supple.solvers.implicit.contact.model import contact_model
 
 SIDE, GAP, DHAT, STIFFNESS = 0.1, 5e-5, 1e-4, 1e5
 SHIFTS = (0.0, 1e-7, 1e-6, 1e-5, 5e-5, 1e-4, 1e-3)

@@ -16,8 +16,7 @@ from supple.model.state import State, Status, StepReport
 from supple.model.system import System
 from supple.solvers.xpbd.assessment.findings import Findings, count_inverted
 from supple.solvers.xpbd.details import XPBDDetails
-from supple.solvers.xpbd.frame.advance import damping_in
-from supple.solvers.xpbd.frame.substep_start import cycles, grow, pin_targets
+from supple.solvers.xpbd.frame.advance import cycles, damping_in, grow, pin_targets
 from supple.solvers.xpbd.integration import first_lost
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.solver import XPBD, lost_position_message

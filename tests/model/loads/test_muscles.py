@@ -6,7 +6,7 @@ from tests.derivatives import derivative_errors, hessian_product
 
 import supple as sp
 from supple.model.system import build_system
-from supple.solvers.implicit.energies.loads.muscles import muscles_at
+from supple.solvers.implicit.energies.loads.actuators import muscles_at
 
 E, NU, RHO = 1e5, 0.3, 1000.0
 RUBBER = sp.StableNeoHookean(youngs=E, poisson=NU, density=RHO, damping=0.1)

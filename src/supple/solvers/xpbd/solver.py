@@ -29,17 +29,16 @@ from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
 from supple.solvers.xpbd.constraints.registry import build_constraint_sets
 from supple.solvers.xpbd.constraints.stitches import StitchAnchors, stitch_constraints
+from supple.solvers.xpbd.constraints.volume_guard import VolumeGuard
 from supple.solvers.xpbd.contact.collisions import Collisions
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.damping.kelvin_voigt import make_damping
 from supple.solvers.xpbd.details import XPBDDetails
 from supple.solvers.xpbd.external_forces import ExternalForces
-from supple.solvers.xpbd.frame.advance import advance, disturbed_bodies, overlaps_of
+from supple.solvers.xpbd.frame.advance import advance, disturbed_bodies, load, overlaps_of
 from supple.solvers.xpbd.frame.end import end_frame
-from supple.solvers.xpbd.frame.substep_start import load
+from supple.solvers.xpbd.frame.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.integration import first_lost
-from supple.solvers.xpbd.limits.rigid_fallback import RigidFallback
-from supple.solvers.xpbd.limits.volume_guard import VolumeGuard
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.momentum import MomentumRestore
 from supple.solvers.xpbd.rigid.bodies import RigidBodies

@@ -25,12 +25,12 @@ from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
 from supple.solvers.xpbd.constraints.registry import ConstraintSet
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.solvers.xpbd.constraints.stitches import StitchAnchors
+from supple.solvers.xpbd.constraints.volume_guard import VolumeGuard
 from supple.solvers.xpbd.contact.collisions import Collisions
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
 from supple.solvers.xpbd.external_forces import ExternalForces
+from supple.solvers.xpbd.frame.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.integration import apply_changes
-from supple.solvers.xpbd.limits.rigid_fallback import RigidFallback
-from supple.solvers.xpbd.limits.volume_guard import VolumeGuard
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.momentum import MomentumRestore
 from supple.solvers.xpbd.rigid.bodies import RigidBodies

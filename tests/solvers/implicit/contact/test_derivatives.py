@@ -10,8 +10,8 @@ from supple.contact.barrier.barrier_energy import barrier_slopes, barrier_value
 from supple.contact.mesh.obstacles import obstacle_positions
 from supple.model.system import build_system, initial_state
 from supple.numerics.svd3 import rotation_variant_svd
-from supple.solvers.implicit.contact.build import contact_model
 from supple.solvers.implicit.contact.half_spaces import PlaneBarrier, plane_friction
+from supple.solvers.implicit.contact.model import contact_model
 from supple.solvers.implicit.energies.potential import HessianBlocks
 
 GAP = 2e-3  # of a unit tet, and dhat five times as much

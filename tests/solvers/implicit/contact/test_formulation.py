@@ -7,7 +7,7 @@ import supple as sp
 from supple.contact.barrier.barrier_energy import barrier_hessian, barrier_slopes
 from supple.contact.features.pair_geometry import EDGE_EDGE
 from supple.model.system import build_system, initial_state
-from supple.solvers.implicit.contact.build import contact_model
+from supple.solvers.implicit.contact.model import contact_model
 
 DHAT = 1e-4
 KAPPA = 1e5

@@ -8,7 +8,7 @@ import pytest
 import supple as sp
 from supple.model.state import Status
 from supple.model.system import build_system, initial_state
-from supple.solvers.implicit.contact.build import contact_model
+from supple.solvers.implicit.contact.model import contact_model
 from supple.solvers.implicit.energies.elasticity import elasticity_of
 from supple.solvers.implicit.newton.minimize import Outcome
 from supple.solvers.implicit.newton.objective import Model

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import supple as sp
 from supple.contact.barrier import plane_contacts
 from supple.model.system import build_system, initial_state
-from supple.solvers.implicit.contact.build import contact_model
+from supple.solvers.implicit.contact.model import contact_model
 
 KEEP = Fraction(1, 10)
 

@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 from supple.contact.barrier.barrier_energy import barrier_forces
 from supple.contact.barrier.friction_energy import lagged_slips, sides
 from supple.contact.ccd import Limit
-from supple.contact.mesh.contact_mesh import ContactMesh
-from supple.contact.mesh.obstacles import ObstacleRange
+from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
+from supple.contact.mesh.obstacles import ObstacleRange, obstacle_positions, with_obstacles
 from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
-from supple.model.system import System
-from supple.scene.contact_pairs import PairTable
+from supple.model.stitched_points import stitched_state
+from supple.model.system import System, initial_state
+from supple.scene.contact_pairs import PairTable, pair_table
 from supple.solvers.implicit.contact.collisions import Barrier, Collisions
 from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.contact.half_spaces import PlaneBarrier, Planes, plane_friction
-from supple.solvers.implicit.contact.settings import Scales
+from supple.solvers.implicit.contact.settings import IPCContact, Scales, largest_dhat, scales_of
 
 logger = logging.getLogger(__name__)
 
@@ -153,3 +154,37 @@ class ContactModel:
     def _names(self, owners: list[int]) -> str:
         kinds = [f"{'body' if k < self.mesh.body_count else 'obstacle'} {self.mesh.names[k]!r}" for k in owners]
         return kinds[0] + " and itself" if len(kinds) == 1 else " and ".join(kinds)
+
+
+def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np.float64]) -> ContactModel:
+    """The model, whose `system` has the obstacles' vertices.
+
+    Parameters
+    ----------
+    shear_moduli : (m,) of the tets [Pa]
+    """
+    extended, obstacles = with_obstacles(system)
+    table = pair_table(system.scene)
+    begun = stitched_state(extended, initial_state(system.scene)).positions
+    placed = np.concatenate([begun, obstacle_positions(obstacles, 0.0)])
+    mesh = contact_mesh(extended, obstacles, table.collide, placed)
+    widest = largest_dhat(system)
+    planes, collisions = Planes(mesh, obstacles, table.collide, widest), Collisions(mesh, widest)
+    # A run that is continued keeps its dhat: what rests on something is nearer to it than at the start.
+    gaps = []
+    for start in system.start_states:
+        there = stitched_state(extended, start).positions
+        x = np.concatenate([there, obstacle_positions(obstacles, start.time)])
+        heights = planes.heights(x)  # vertices behind a plane are an error that is found later
+        gaps.append(min(collisions.smallest_distance(x), float(heights[heights > 0.0].min(initial=np.inf))))
+    scales = scales_of(settings, system, shear_moduli, max(gaps, default=np.inf))
+    return ContactModel(
+        system=extended,
+        obstacles=obstacles,
+        mesh=mesh,
+        collisions=Collisions(mesh, scales.dhat),
+        planes=Planes(mesh, obstacles, table.collide, scales.dhat),
+        table=table,
+        scales=scales,
+        friction_iterations=settings.friction_iterations,
+    )

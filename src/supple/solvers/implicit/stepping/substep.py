@@ -14,16 +14,14 @@ from supple.solvers.implicit.energies.damping import Damping
 from supple.solvers.implicit.energies.elasticity import Elasticity
 from supple.solvers.implicit.energies.inertia import Inertia
 from supple.solvers.implicit.energies.inversion_barrier import inversion_barrier
-from supple.solvers.implicit.energies.loads.actuators import actuators_at
+from supple.solvers.implicit.energies.loads.actuators import actuators_at, muscles_at
 from supple.solvers.implicit.energies.loads.external_forces import ExternalForces, total_forces
-from supple.solvers.implicit.energies.loads.muscles import muscles_at
 from supple.solvers.implicit.energies.loads.pressure import drags_at, pressures_at
 from supple.solvers.implicit.energies.loads.springs import soft_targets_at, springs_at
 from supple.solvers.implicit.energies.midpoint import ActingWithin
 from supple.solvers.implicit.energies.potential import Potential
 from supple.solvers.implicit.energies.stitch_damping import StitchDamping
 from supple.solvers.implicit.inversion_guard import InversionGuard
-from supple.solvers.implicit.joints.joint_step import JointStep
 from supple.solvers.implicit.newton.minimize import Convergence, Outcome, Problem, minimize
 from supple.solvers.implicit.newton.objective import Objective
 from supple.solvers.implicit.newton.trace import NewtonRow
@@ -31,6 +29,7 @@ from supple.solvers.implicit.step_limits import StepLimits
 from supple.solvers.implicit.stepping.contact_step import ContactStep
 from supple.solvers.implicit.stepping.dirichlet import move_pins
 from supple.solvers.implicit.stepping.integrators import Integrator, Plan, Static
+from supple.solvers.implicit.stepping.joint_step import JointStep
 from supple.solvers.implicit.stepping.rigid_bodies import with_rigid_bodies
 from supple.solvers.implicit.stepping.works import makes_energy, works_of_step
 from supple.solvers.implicit.stepping.workspace import Workspace

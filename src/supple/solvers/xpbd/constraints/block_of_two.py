@@ -1,8 +1,7 @@
 """The projection of one stable Neo-Hookean tet: both constraints at once (docs/theory/xpbd.md, "The block of two")."""
 
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH
-from supple.solvers.xpbd.sweeps.lanes import nine, put_twelve, twelve
+from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, nine, put_twelve, twelve
 
 
 @njit(fastmath=FLAGS, forceinline=True)

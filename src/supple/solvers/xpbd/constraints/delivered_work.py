@@ -29,8 +29,7 @@ from supple.solvers.xpbd.constraints.block_of_two import (
     stress_of_step,
 )
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
-from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH
-from supple.solvers.xpbd.sweeps.lanes import nine, put_twelve, twelve
+from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, nine, put_twelve, twelve
 
 if TYPE_CHECKING:
     from supple.solvers.xpbd.constraints.registry import ConstraintSet

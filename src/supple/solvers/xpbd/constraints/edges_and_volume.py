@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from supple.model.system import BodyRange, System
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, make_groups
-from supple.solvers.xpbd.sweeps.lanes import put_six, put_twelve, six, twelve
+from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, make_groups, put_six, put_twelve, six, twelve
 from supple.solvers.xpbd.sweeps.ordering import Layout
 from supple.solvers.xpbd.sweeps.sweep import Sweep
 

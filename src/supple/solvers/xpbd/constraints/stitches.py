@@ -16,8 +16,7 @@ from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.scene.stitches.elements import Springs, StitchTets
 from supple.solvers.xpbd.constraints.stable_neo_hookean import BlocksOfTwo
-from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, make_groups_of_one_chunk
-from supple.solvers.xpbd.sweeps.lanes import nine, put_nine
+from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, make_groups_of_one_chunk, nine, put_nine
 from supple.solvers.xpbd.sweeps.sweep import Sweep
 
 

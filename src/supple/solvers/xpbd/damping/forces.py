@@ -8,8 +8,7 @@ F_m^T (F - F_n) + (F - F_n)^T F_m = F^T F - F_n^T F_n.
 from __future__ import annotations
 
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH
-from supple.solvers.xpbd.sweeps.lanes import nine, put_nine, put_twelve, twelve
+from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, nine, put_nine, put_twelve, twelve
 
 
 @njit(fastmath=FLAGS, forceinline=True)

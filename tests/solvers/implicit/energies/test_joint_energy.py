@@ -9,7 +9,7 @@ from supple.model.joints.geometry import JointGeometry
 from supple.model.joints.laws import Law, Laws
 from supple.model.system import build_system, initial_state
 from supple.solvers.implicit.energies.potential import HessianBlocks
-from supple.solvers.implicit.joints.joint_step import JointStep
+from supple.solvers.implicit.stepping.joint_step import JointStep
 
 BOX = sp.shapes.box_surface((0.4, 0.2, 0.1), (1, 1, 1))
 AXIS = (1.0, 2.0, -0.5)

@@ -12,7 +12,7 @@ from supple.model.joints.geometry import ANGLE, JointGeometry
 from supple.model.joints.laws import laws_of
 from supple.model.state import State, Status
 from supple.solvers.implicit.details import ImplicitDetails
-from supple.solvers.implicit.joints.potential import JointPotential
+from supple.solvers.implicit.energies.joints import JointPotential
 from supple.solvers.implicit.newton.minimize import Outcome
 
 # The stiffness of a joint in multiples of that of its bodies against strain, and of inertia in a step. Each update of

@@ -29,7 +29,7 @@ from supple.model.system import System
 from supple.numerics.noninverting_step import noninverting_step, volume_signs
 from supple.scene.contact_pairs import pair_table
 from supple.scene.rotation import rotation_matrix
-from supple.solvers.xpbd.limits.volume_guard import FLATTEST
+from supple.solvers.xpbd.constraints.volume_guard import FLATTEST
 
 # How often all shapes are gone through: a displacement out of one may lead into another.
 MOST_ROUNDS = 4

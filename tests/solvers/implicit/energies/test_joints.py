@@ -9,7 +9,7 @@ import supple as sp
 from supple.model.joints.geometry import JointGeometry
 from supple.model.system import build_system, initial_state
 from supple.scene.rotation import rotation_matrix
-from supple.solvers.implicit.joints.joint_step import coordinates_at
+from supple.solvers.implicit.stepping.joint_step import coordinates_at
 
 MASS = 2.5
 
