@@ -243,6 +243,13 @@ def test_a_concave_polygon_with_a_thousand_corners(tmp_path, axis, turn):
     assert loaded.area_vectors.sum() == pytest.approx(turn * loaded.area)
 
 
+def test_a_concave_polygon_with_very_many_corners_is_refused(tmp_path):
+    angle = np.linspace(0.0, 2.0 * np.pi, 10_000, endpoint=False)
+    points = "".join(f"v {(2 + k % 2) * np.cos(a)} {(2 + k % 2) * np.sin(a)} 0\n" for k, a in enumerate(angle))
+    with pytest.raises(MeshError, match=r"a\.obj: a concave face has 10000 corners; at most 4000 are possible"):
+        SurfaceMesh.load(write(tmp_path / "a.obj", points + "f " + " ".join(map(str, range(1, 10_001)))))
+
+
 def test_a_polygon_that_crosses_itself_is_still_cut(tmp_path):
     """It has no inside, so any triangles between its corners are valid."""
     loaded = SurfaceMesh.load(write(tmp_path / "a.off", "OFF\n5 1 0\n0 0 0\n2 0 0\n0 1 0\n2 1 0\n1 3 0\n5 0 1 2 3 4\n"))

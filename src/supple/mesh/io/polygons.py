@@ -19,6 +19,7 @@ from supple.mesh.io.cells import (
     checked,
 )
 
+MOST_CORNERS = 4_000  # of a concave face: the time to cut it grows with their square, and is seconds here
 SURFACE_TYPES = (TRIANGLE, TRIANGLE_STRIP, POLYGON, PIXEL, QUAD)
 
 
@@ -82,6 +83,11 @@ def _with_concave_cut(
         wrong = is_polygon[cell] & (np.einsum("ij,ij->i", normals, total[cell]) < 0.0)
     starts, sizes, flat = cells
     for k in np.unique(cell[wrong]):
+        if sizes[k] > MOST_CORNERS:
+            raise FormatError(
+                f"a concave face has {sizes[k]} corners; at most {MOST_CORNERS} are possible: cut it into triangles in "
+                "the program that wrote it"
+            )
         corners = flat[starts[k] : starts[k] + sizes[k]]
         cut = ear_clipped(points[corners], total[k])
         if cut is not None:
