@@ -5,7 +5,7 @@ import pytest
 
 import supple as sp
 from supple.model.system import build_system, initial_state
-from supple.solvers.xpbd.frame.rigid_fallback import ObstacleLift, RigidFallback
+from supple.solvers.xpbd.rigid_fallback import ObstacleLift, RigidFallback
 
 CUBE = sp.shapes.box((0.2, 0.2, 0.2), (2, 2, 2))
 JELLY = sp.StableNeoHookean(youngs=1e4, poisson=0.4)

@@ -25,7 +25,7 @@ from supple.scene.scene import Scene
 from supple.solvers.implicit.contact.model import contact_model
 from supple.solvers.implicit.contact.points import forces_on_owners
 from supple.solvers.implicit.contact.settings import IPCContact, smallest_diagonal
-from supple.solvers.implicit.details import PARTS, ImplicitDetails
+from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.energies.damping import quadratic_viscosity_of, viscosity_of
 from supple.solvers.implicit.energies.elasticity import SERIAL_TETS, elasticity_of
 from supple.solvers.implicit.energies.potential import HessianBlocks
@@ -43,6 +43,7 @@ from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors
 from supple.solvers.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.solvers.implicit.stepping.substepping import Substepping
 from supple.solvers.implicit.stepping.workspace import Workspace
+from supple.solvers.implicit.timings import PARTS
 from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.solvers.implicit.contact.model import ContactModel
-from supple.solvers.implicit.details import Clock
 from supple.solvers.implicit.inversion_guard import InversionGuard
+from supple.solvers.implicit.timings import Clock
 
 
 class StepLimit(NamedTuple):

@@ -37,12 +37,12 @@ from supple.solvers.xpbd.details import XPBDDetails
 from supple.solvers.xpbd.external_forces import ExternalForces
 from supple.solvers.xpbd.frame.advance import advance, disturbed_bodies, load, overlaps_of
 from supple.solvers.xpbd.frame.end import end_frame
-from supple.solvers.xpbd.frame.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.integration import first_lost
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.momentum import MomentumRestore
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection
+from supple.solvers.xpbd.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.sleep import Sleep
 from supple.solvers.xpbd.start import raise_if_inside
 from supple.solvers.xpbd.substeps import SubstepChoice, Substeps

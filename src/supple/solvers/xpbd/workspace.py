@@ -29,12 +29,12 @@ from supple.solvers.xpbd.constraints.volume_guard import VolumeGuard
 from supple.solvers.xpbd.contact.collisions import Collisions
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
 from supple.solvers.xpbd.external_forces import ExternalForces
-from supple.solvers.xpbd.frame.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.integration import apply_changes
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.momentum import MomentumRestore
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection
+from supple.solvers.xpbd.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.sleep import Sleep
 from supple.solvers.xpbd.substeps import SubstepChoice
 from supple.solvers.xpbd.sweeps.ordering import Layout, reordered

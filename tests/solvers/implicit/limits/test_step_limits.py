@@ -6,9 +6,9 @@ import pytest
 import supple as sp
 from supple.model.system import build_system, initial_state
 from supple.solvers.implicit.contact.model import contact_model
-from supple.solvers.implicit.details import Clock
 from supple.solvers.implicit.inversion_guard import InversionGuard
 from supple.solvers.implicit.step_limits import StepLimits
+from supple.solvers.implicit.timings import Clock
 
 MATERIAL = sp.StableNeoHookean(youngs=1e5, poisson=0.3, density=1000.0)
 

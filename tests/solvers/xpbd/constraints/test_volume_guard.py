@@ -10,7 +10,7 @@ from supple.model.system import build_system, initial_state
 from supple.numerics.noninverting_step import volume_signs
 from supple.runtime.threads import numba_threads
 from supple.solvers.xpbd.constraints.volume_guard import ONSET, VolumeGuard
-from supple.solvers.xpbd.frame.rigid_fallback import RigidFallback, united
+from supple.solvers.xpbd.rigid_fallback import RigidFallback, united
 from supple.solvers.xpbd.solver import XPBD
 
 DT = 1.0 / 60.0

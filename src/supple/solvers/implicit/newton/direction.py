@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.solvers.implicit.details import Clock
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
 from supple.solvers.implicit.newton.linear_solver import LinearReport, LinearSolver
 from supple.solvers.implicit.newton.objective import Model, Objective
+from supple.solvers.implicit.timings import Clock
 
 # The relative tolerance of linear systems: 1e-2 at first, since a better solution of a poor model is lost work; below
 # 1e-8 round-off in the gradient makes up the rest of it.

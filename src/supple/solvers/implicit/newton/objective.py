@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.solvers.implicit.details import Clock
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
+from supple.solvers.implicit.timings import Clock
 
 # The labels of contact and of joints: so stiff that a short Newton step can leave large forces.
 _STIFF = ("contact", "joints")

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from supple.solvers.xpbd.assessment.moment import Substep
 from supple.solvers.xpbd.constraints.volume_guard import ENOUGH
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
-from supple.solvers.xpbd.frame.rigid_fallback import united
 from supple.solvers.xpbd.integration import to_world, update_velocities
+from supple.solvers.xpbd.rigid_fallback import united
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
 # How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
