@@ -66,8 +66,8 @@ def _in_the_shell(lines: str) -> str:
 
 def kernels_of(name: str) -> list[tuple[str, list]]:
     """Run a program in this process; the kernels that it used and their signatures."""
+    from supple.runtime.kernel_count import WATCHERS
     from supple.runtime.kernel_list import as_json
-    from supple.runtime.kernel_watchers import WATCHERS
 
     used = {}
 

@@ -18,8 +18,8 @@ def in_the_shell(block):
         assert main([command, *arguments, *shorter]) == 0, line
         if command == "new":
             scene = Path("part.yaml").read_text(encoding="utf-8")
-            assert "tets: 5000" in scene
-            Path("part.yaml").write_text(scene.replace("tets: 5000", "tets: 1000"), encoding="utf-8")
+            assert "tets: 2000" in scene
+            Path("part.yaml").write_text(scene.replace("tets: 2000", "tets: 1000"), encoding="utf-8")
 
 
 def in_python(block, number, names):

@@ -9,8 +9,7 @@ from typing import Any
 from supple.app.scene_file.document import KINDS_OF_LISTS
 from supple.app.scene_file.entries.families import MATERIALS, SOLVERS
 from supple.app.scene_file.entries.kinds import keys_of
-from supple.kinds.descriptions import first_paragraph
-from supple.kinds.kind import Kind, declared
+from supple.kinds.kind import Kind, declared, first_paragraph
 from supple.scene.joints.motors import MOTORS
 
 HEAD = """\

@@ -14,8 +14,8 @@ from .errors import SceneError as SceneError
 from .errors import SolverError as SolverError
 from .errors import StudyError as StudyError
 from .errors import SuppleError as SuppleError
-from .materials.edges_and_volume import EdgesAndVolume as EdgesAndVolume
 from .materials.elastic import ARAP as ARAP
+from .materials.elastic import EdgesAndVolume as EdgesAndVolume
 from .materials.elastic import FixedCorotated as FixedCorotated
 from .materials.elastic import NeoHookean as NeoHookean
 from .materials.elastic import StableNeoHookean as StableNeoHookean

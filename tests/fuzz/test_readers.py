@@ -23,9 +23,9 @@ from hypothesis import strategies as st
 from tests.forked_readers import forked_readers
 
 import supple as sp
-from supple.app.runs.checkpoints import frame_of
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import read_journal
+from supple.app.runs.keeper import frame_of
 from supple.app.scene_file.loader import load_run
 from supple.app.studies.cases import read_result
 from supple.mesh import shapes

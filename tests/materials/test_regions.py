@@ -7,8 +7,7 @@ import pytest
 
 import supple as sp
 from supple.errors import SceneError
-from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.elastic import NeoHookean, StableNeoHookean
+from supple.materials.elastic import EdgesAndVolume, NeoHookean, StableNeoHookean
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import NOT_ELASTIC

@@ -9,7 +9,7 @@ import pytest
 
 import supple as sp
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.results.export.exporter import export
 from supple.results.readings.fields import FIELDS
 from supple.results.recording.continued import ContinuedRecorder

@@ -10,8 +10,7 @@ import pytest
 from tests.scenes import converged
 
 import supple as sp
-from supple.app.viewer.engine.contact_points import contact_points
-from supple.app.viewer.engine.describe import describe
+from supple.app.viewer.engine.describe import contact_points, describe
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop
 from supple.app.viewer.from_snapshot import MomentBuilder

@@ -10,6 +10,8 @@ docstring describes it in the schema of scene files, in `supple info` and in the
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
@@ -18,8 +20,28 @@ from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hint
 import numpy as np
 
 from supple.errors import SceneError, SuppleError
-from supple.kinds.descriptions import descriptions
 from supple.kinds.forms import Form, Name
+
+_HEADING = re.compile(r"^(Parameters|Attributes|Raises|Returns|Yields)\n-+\n", flags=re.M)
+_ITEM = re.compile(r"(?:^|; )((?:[a-zA-Z_]\w*(?:, )?)+) : (.*?)(?=(?:; [a-z_]\w*(?:, \w+)* : )|^\S|\Z)", re.S | re.M)
+
+
+def first_paragraph(kind: type) -> str:
+    """The beginning of the class's docstring, on one line."""
+    return " ".join(inspect.cleandoc(kind.__dict__.get("__doc__") or "").partition("\n\n")[0].split())
+
+
+def descriptions(kind: type) -> dict[str, str]:
+    """By name of the parameter, its text on one line; a class's own docstring comes before those of its bases."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        _, *parts = _HEADING.split(inspect.cleandoc(base.__dict__.get("__doc__") or ""))
+        for heading, body in zip(parts[::2], parts[1::2], strict=True):
+            if heading == "Parameters":
+                for match in _ITEM.finditer(body):
+                    text = " ".join(match[2].split()).removesuffix(".")
+                    found |= dict.fromkeys(match[1].split(", "), text)
+    return found
 
 
 @dataclass(frozen=True)

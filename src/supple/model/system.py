@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
 from supple.materials.elastic_tets.quadratic import QuadraticTets

@@ -24,4 +24,5 @@ def deformation_gradients(x, tets, Dm_inv):
 def determinants(F: NDArray[np.float64]) -> NDArray[np.float64]:
     """det of every matrix: (m, 3, 3) -> (m,)."""
     a, b, c, d, e, f, g, h, i = F.reshape(-1, 9).T
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    with np.errstate(all="ignore"):  # positions that are not finite are reported where they arise
+        return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)

@@ -16,8 +16,7 @@ from supple.model.diagnostics import Diagnostics, measure
 from supple.model.energy_balance import completed_works
 from supple.model.state import ContactPoints, SolverDetails, State, Status, StepReport
 from supple.model.system import BodyRange, System
-from supple.results.readings.frame_readings import FrameReadings
-from supple.results.readings.joint_readings import JointReading, joint_readings
+from supple.results.readings.frame_readings import FrameReadings, JointReading, joint_readings
 from supple.runtime.displayed import DisplayedReport
 from supple.scene.rigid.pose import Pose, pose_of
 

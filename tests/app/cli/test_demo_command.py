@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.app.demos.demo import Measurement
 from supple.app.demos.registry import DEMOS
 from supple.results.recording.reader import read_recording

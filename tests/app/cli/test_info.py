@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.results.recording.recorder import Recorder
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 
 MATERIAL = "material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.3}"
 CUBE = "shape: {kind: box, size: [1, 1, 1], divisions: [1, 1, 1]}, " + MATERIAL

@@ -13,7 +13,7 @@ import pytest
 
 import supple as sp
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.runtime.lock import FolderLock
 from supple.solvers.xpbd.solver import XPBD
 

@@ -3,7 +3,7 @@
 import pytest
 
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.results.recording.reader import read_recording
 
 CUBE = "shape: {kind: box, divisions: [2, 2, 2]}, material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.3}"

@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 import supple as sp
 from supple.app.cli import app as shell
 from supple.app.cli.app import COMMANDS, main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 
 
 def test_version(capsys):

@@ -6,7 +6,7 @@ import pytest
 
 from supple.app.cli.app import main
 from supple.app.cli.commands.sweep import StudyBar, duration
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.app.studies.runner import StudyProgress
 
 SCENE = """\

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 
 SCENE = """\
 bodies:

@@ -16,7 +16,7 @@ import pytest
 
 import supple as sp
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.app.viewer.app import browser_at
 from supple.app.viewer.protocol.live_source import LiveSource
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from supple.app.cli.app import main
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.app.demos import cantilever, quilt
 from supple.app.demos.actuators import pneunet
 from supple.app.demos.demo import Claim, Demo, Measurement, stitch_lengths

@@ -7,8 +7,7 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.controls.measures import measures_text
-from supple.app.viewer.engine.contact_points import contact_points
-from supple.app.viewer.engine.describe import describe, measures
+from supple.app.viewer.engine.describe import contact_points, describe, measures
 from supple.app.viewer.engine.scene.changes import change, without_body
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop

@@ -14,7 +14,7 @@ import pytest
 import supple as sp
 from supple.app.viewer.engine import simulation_loop
 from supple.app.viewer.engine.pacing import Pacing
-from supple.app.viewer.engine.warnings_as_notices import warnings_as_notices
+from supple.app.viewer.engine.step_watch import warnings_as_notices
 from supple.app.viewer.protocol import commands
 from supple.errors import SolverError
 from supple.model.state import Status, StepReport

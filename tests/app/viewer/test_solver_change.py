@@ -9,7 +9,7 @@ import supple as sp
 from supple.app.viewer.engine.describe import describe, measures
 from supple.app.viewer.engine.scene.changes import change
 from supple.app.viewer.engine.scene.live_scene import LiveScene
-from supple.app.viewer.engine.scene.obstacle_distance import moved_out, signed_distance
+from supple.app.viewer.engine.scene.pusher import moved_out, signed_distance
 from supple.app.viewer.protocol.commands import MovePusher, SetSolver
 from supple.errors import SuppleError
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.engine.contact_points import contact_points
+from supple.app.viewer.engine.describe import contact_points
 from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import build_system

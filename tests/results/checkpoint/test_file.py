@@ -8,8 +8,7 @@ import pytest
 import supple as sp
 from supple.errors import OutputError
 from supple.model.state import State
-from supple.results.checkpoint.file import Checkpoint, RunFacts, read_checkpoint, write_checkpoint
-from supple.results.checkpoint.memories import MEMORIES
+from supple.results.checkpoint.file import MEMORIES, Checkpoint, RunFacts, read_checkpoint, write_checkpoint
 from supple.results.checkpoint.values import encoded
 from supple.solvers.implicit.stepping.integrators import INTEGRATORS, History
 

@@ -12,8 +12,7 @@ from cyclopts import App
 from cyclopts.exceptions import CycloptsError
 
 from supple import __version__
-from supple.app.cli.console import ShellConsole, set_up_log
-from supple.app.cli.exits import ExitCode, print_error
+from supple.app.cli.console import ExitCode, ShellConsole, print_error, set_up_log
 from supple.app.cli.interrupts import ended_as_by_ctrl_c
 from supple.errors import SuppleError
 from supple.results.progress import CompileBar

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
-from supple.app.cli.exits import print_error
+from supple.app.cli.console import print_error
 
 
 class Interrupts:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from supple.app.cli.exits import ExitCode, print_error
+from supple.app.cli.console import ExitCode, print_error
 from supple.app.cli.interrupts import Interrupts
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.resume import resume

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from supple.app.demos.demo import Claim, Demo, Measurement, height, spin_about, volume
-from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.elastic import StableNeoHookean
+from supple.materials.elastic import EdgesAndVolume, StableNeoHookean
 from supple.mesh import shapes
 from supple.results.frame import Frame
 from supple.scene.body import Body

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from supple.app.runs.checkpoints import frame_of
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal, differences, read_journal, versions
-from supple.app.runs.keeper import Keeper
+from supple.app.runs.keeper import Keeper, frame_of
 from supple.app.runs.run_folder import FolderSink
 from supple.errors import OutputError, SceneError
 from supple.results.checkpoint.file import Checkpoint, read_checkpoint

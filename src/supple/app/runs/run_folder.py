@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.runs.checkpoints import facts_of
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal
-from supple.app.runs.keeper import Keeper
+from supple.app.runs.keeper import Keeper, facts_of
 from supple.errors import OutputError
 from supple.results.frame import Frame
 from supple.results.readings.fields import checked_fields

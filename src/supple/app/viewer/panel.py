@@ -12,10 +12,9 @@ from supple.app.viewer.controls.mouse import Mouse, MouseControls
 from supple.app.viewer.controls.solver_controls import SolverControls
 from supple.app.viewer.controls.time_controls import TimeControls
 from supple.app.viewer.controls.upload_controls import UploadControls
-from supple.app.viewer.controls.view.keys import add_keys
 from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.controls.view.record_controls import RecordControls
-from supple.app.viewer.controls.view.view_controls import ViewControls
+from supple.app.viewer.controls.view.view_controls import ViewControls, add_keys
 from supple.app.viewer.protocol.commands import Reset, SetView, Step
 from supple.app.viewer.protocol.snapshots import Snapshot
 from supple.results.view.fields import FIELDS

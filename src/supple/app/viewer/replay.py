@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.viewer.controls.view.keys import add_keys
 from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.controls.view.record_controls import RecordControls
-from supple.app.viewer.controls.view.view_controls import ViewControls
+from supple.app.viewer.controls.view.view_controls import ViewControls, add_keys
 from supple.app.viewer.frame_rate import FrameRate
 from supple.results.recording.reader import Recording
 from supple.results.view.from_recording import model_of_recording, moment_of_frame

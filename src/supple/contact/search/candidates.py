@@ -11,15 +11,44 @@ from numpy.typing import NDArray
 from supple.contact.mesh.contact_mesh import ContactMesh
 from supple.contact.mesh.distances import edges_nearer, points_nearer
 from supple.contact.search.pair_kernels import (
+    RUNS,
     boxes_of_owners,
     find_edges,
     find_points,
     partner_lists,
+    sort_pairs,
     swept_boxes,
 )
-from supple.contact.search.room import Room
 from supple.numerics.adjacency import Adjacency
 from supple.numerics.geometry.box_tree import BoxTree, morton_codes
+
+
+class Room:
+    """Where each run of a search writes its pairs; grows as needed and is kept from search to search.
+
+    Attributes
+    ----------
+    start : (RUNS + 1,) where the rows of each run begin; pairs : (start[-1], 2) int32
+    counts : (RUNS,) what each run found, which may be more than fits
+    """
+
+    def __init__(self) -> None:
+        self.start = np.zeros(RUNS + 1, dtype=np.int64)
+        self.counts = np.zeros(RUNS, dtype=np.int64)
+        self.pairs = np.zeros((0, 2), dtype=np.int32)
+
+    def sorted(self, size: int) -> NDArray[np.int32]:
+        """The pairs of all runs (k, 2) in ascending order; the first are below `size`."""
+        found = self.counts.any()
+        return sort_pairs(self.pairs, self.start, self.counts, size) if found else np.zeros((0, 2), dtype=np.int32)
+
+    def is_too_small(self) -> bool:
+        """Whether some run found more than fits; then there is room for that, and more, for the next attempt."""
+        if (self.counts <= np.diff(self.start)).all():
+            return False
+        np.cumsum(self.counts + self.counts // 2 + 64, out=self.start[1:])
+        self.pairs = np.empty((self.start[-1], 2), dtype=np.int32)
+        return True
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.distances import point_triangle_square
+from supple.contact.search.candidates import Room
 from supple.contact.search.pair_kernels import RUNS, meets_partner
-from supple.contact.search.room import Room
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import (
     GROUP,

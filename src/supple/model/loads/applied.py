@@ -48,7 +48,7 @@ class LoadPattern:
     kind : "vector", a force w_i f on each vertex, with the value f (3,); "pressure", a third of -p A on each corner of
         a triangle of area vector A, with the value p; "spring", the forces of k / 2 (l - l0)^2,
         l = |sum w_i x_i + offset|, with the value l0; "drag", c / 3 (w - v_i) on each corner of a triangle, with the
-        value w (3,), see `supple.model.loads.wind`
+        value w (3,), see `supple.model.loads.pressure`
     work : as of `AppliedLoad`
     vertices : (v,), or (t, 3) triangles of a pressure or a drag
     weights : (v,) w; of no meaning for triangles

@@ -14,9 +14,8 @@ from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.model.loads.applied import AppliedLoad, DeadLoad, MassLoad, Setting, UniformLoad
 from supple.model.loads.growth import GrownTets
 from supple.model.loads.muscles import FibreTension
-from supple.model.loads.pressure import FollowerPressure, area_vectors
+from supple.model.loads.pressure import FollowerPressure, area_vectors, wind_drag
 from supple.model.loads.springs import PointSpring
-from supple.model.loads.wind import wind_drag
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force
 from supple.scene.loads.body_force import BodyForce

@@ -17,9 +17,35 @@ from numpy.typing import NDArray
 from supple.errors import OutputError
 from supple.materials.laws.internal import COLUMNS
 from supple.model.state import State
-from supple.results.checkpoint.memories import MEMORIES
 from supple.results.checkpoint.values import Known, check, decoded, described, encoded, restored
 from supple.runtime.replacing import whole_file
+from supple.solvers.implicit.stepping.conservation import EnergyMade
+from supple.solvers.implicit.stepping.integrators import History
+from supple.solvers.xpbd.assessment.assessment import Ledger
+from supple.solvers.xpbd.assessment.softening import MeasuredWork
+from supple.solvers.xpbd.contact.contact_rows import LoadedRows
+from supple.solvers.xpbd.contact.frame_forces import ShapeLoads
+from supple.solvers.xpbd.contact.memory import ContactMemory, ObstacleMemory, SurfaceMemory
+from supple.solvers.xpbd.damping.kelvin_voigt import ViscousMemory
+from supple.solvers.xpbd.memory import ControlMemory, XPBDMemory
+from supple.solvers.xpbd.sleep import SleepMemory
+
+MEMORIES: tuple[type, ...] = (
+    ContactMemory,
+    ControlMemory,
+    EnergyMade,
+    History,
+    Ledger,
+    LoadedRows,
+    MeasuredWork,
+    ObstacleMemory,
+    ShapeLoads,
+    SleepMemory,
+    SurfaceMemory,
+    ViscousMemory,
+    XPBDMemory,
+)
+
 
 _FORMAT = b"supple checkpoint 1\n"
 _FAMILY = b"supple checkpoint "

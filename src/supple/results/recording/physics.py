@@ -9,17 +9,16 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic import EdgesAndVolume
 from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS
 from supple.materials.laws.internal import count_of
-from supple.materials.laws.registry import RECORDED_FLOWS, RECORDED_LAWS
 from supple.materials.material import Hyperelastic
 from supple.materials.own.derivation import OwnLaw
 from supple.materials.own.formula import Formula
 from supple.materials.own.formula_law import FormulaLaw
 from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, Law, LawTets
-from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.registry import ELASTIC_MATERIALS, RECORDED_FLOWS, RECORDED_LAWS
 from supple.model.system import System
 from supple.results.checkpoint.values import Rows
 from supple.scene.contact_pairs import pair_table

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.forms import Name, Number
-from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic import EdgesAndVolume
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TETS, OnBody, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import lengths_and_directions
-from supple.scene.obstacles.polyhedra import hull, round_ball
-from supple.scene.obstacles.segment import SegmentObstacle
+from supple.scene.obstacles.polyhedra import SegmentObstacle, hull, round_ball
 from supple.scene.obstacles.shape import Shape, concave_contact
 
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import distances_from_corner
-from supple.scene.obstacles.polyhedra import prism
-from supple.scene.obstacles.segment import SegmentObstacle
+from supple.scene.obstacles.polyhedra import SegmentObstacle, prism
 from supple.scene.obstacles.shape import Shape, concave_contact
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from supple.app.cli.arguments import Steps, recording_at
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 
 if TYPE_CHECKING:
     from supple.results.check.report import CheckReport

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from supple.app.cli.arguments import CheckpointEvery, Overwrite, Steps, interval
 from supple.app.cli.commands.view import Open, Port
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 
 
 def demo(

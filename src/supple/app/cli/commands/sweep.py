@@ -48,7 +48,7 @@ def sweep(
     quiet
         Print neither progress nor summary.
     """
-    from supple.app.cli.exits import ExitCode
+    from supple.app.cli.console import ExitCode
     from supple.app.studies.plots import plot_study
     from supple.app.studies.study import TABLE, ignore_progress
     from supple.app.studies.study_file import load_study

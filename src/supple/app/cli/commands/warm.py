@@ -13,7 +13,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from supple.app.cli.exits import ExitCode
+from supple.app.cli.console import ExitCode
 from supple.errors import SceneError
 
 # The packages with kernels.

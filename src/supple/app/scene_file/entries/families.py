@@ -11,7 +11,7 @@ from supple.app.scene_file.validation_errors import suggestion
 from supple.errors import SolverError
 from supple.kinds.kind import declared
 from supple.materials.by_law import ByLaw
-from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic import EdgesAndVolume
 from supple.materials.j2_plastic import J2Plastic
 from supple.materials.material import Material
 from supple.materials.registry import UNRELAXED

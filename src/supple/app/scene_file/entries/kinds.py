@@ -12,9 +12,8 @@ from pydantic import Field, create_model, model_validator
 
 from supple.app.scene_file.entries.mesh_sources import MeshStore
 from supple.app.scene_file.model import Model
-from supple.kinds.descriptions import first_paragraph
 from supple.kinds.forms import Form
-from supple.kinds.kind import Kind, declared
+from supple.kinds.kind import Kind, declared, first_paragraph
 from supple.scene.located import at
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from supple.app.viewer.controls.view.overlay import Overlay, plain
 from supple.app.viewer.protocol.quantities import written
 from supple.app.viewer.protocol.snapshots import Snapshot
-from supple.results.readings.joint_readings import JointReading
+from supple.results.readings.frame_readings import JointReading
 from supple.results.view.colors import body_color
 
 _SECONDS = 10.0  # of simulated time in a plot

@@ -11,14 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.viewer.engine.contact_points import contact_points
-from supple.app.viewer.engine.describe import describe, measures, readings, strongest_forces
-from supple.app.viewer.engine.displayed_states import LONGEST_UNSEEN, between, within_step
-from supple.app.viewer.engine.pacing import Pacing
+from supple.app.viewer.engine.describe import contact_points, describe, measures, readings, strongest_forces
+from supple.app.viewer.engine.pacing import LONGEST_UNSEEN, Pacing, between, within_step
 from supple.app.viewer.engine.scene.changes import change
 from supple.app.viewer.engine.scene.live_scene import LiveScene
-from supple.app.viewer.engine.step_watch import StepWatch
-from supple.app.viewer.engine.warnings_as_notices import warnings_as_notices
+from supple.app.viewer.engine.step_watch import StepWatch, warnings_as_notices
 from supple.app.viewer.protocol import commands, limits
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.outbox import Outbox

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.app.viewer.protocol.parameters import Value
 from supple.model.diagnostics import Diagnostics
-from supple.results.readings.joint_readings import JointReading
+from supple.results.readings.frame_readings import JointReading
 from supple.results.recording.actions import RecordedJoint, RecordedStitches
 from supple.results.recording.scene import RecordedObstacle
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic import EdgesAndVolume
 from supple.materials.material import Elastic
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit, prange

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic import EdgesAndVolume
 from supple.materials.material import Elastic
 from supple.model.system import BodyRange, System
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.elastic import StableNeoHookean
+from supple.materials.elastic import EdgesAndVolume, StableNeoHookean
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Elastic, Material
 from supple.materials.per_tet import NO_REGION

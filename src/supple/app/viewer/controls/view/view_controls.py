@@ -3,20 +3,86 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.app.viewer.controls.controller import sequential
 from supple.app.viewer.controls.view.color_scale import ColorRange, arrows_html, bar_html
 from supple.app.viewer.controls.view.overlay import Overlay, set_theme
-from supple.app.viewer.controls.view.probe import Probe
-from supple.results.view.camera import PRESETS, follow, look_from
+from supple.app.viewer.protocol.quantities import written
+from supple.results.view.camera import PRESETS, fit, follow, look_from
 from supple.results.view.fields import FIELDS
 from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.results.view.stage import Stage
+
+
+class Probe:
+    """A label at the tet on which a visitor has clicked with Shift, which moves with it.
+
+    Parameters
+    ----------
+    server : of viser; stage : draws the bodies
+    """
+
+    def __init__(self, server: Any, stage: Stage) -> None:
+        self._server, self._stage = server, stage
+        self._tet: int | None = None
+        self._label: Any = None
+        stage.prepare_bodies(self._add_handlers)
+
+    def refresh(self) -> None:
+        """Update the label; it goes where no field is drawn, or the tet is gone."""
+        stage, tet = self._stage, self._tet
+        value = None if tet is None else stage.value_at(tet)
+        if tet is None or value is None or stage.field is None:
+            if self._label is not None:
+                self._label.remove()
+            self._label = self._tet = None
+            return
+        body = next(body.name for body in stage.model.bodies if body.tets.start <= tet < body.tets.stop)
+        text = f"{written(value, stage.field.unit)} · {body}"
+        place = tuple(stage.moment.finite_positions[stage.model.tets[tet]].mean(axis=0))
+        if self._label is None:
+            self._label = self._server.scene.add_label("/probe", text, position=place)
+        else:
+            self._label.text, self._label.position = text, place
+
+    def _add_handlers(self, handles: list[Any]) -> None:
+        for handle in handles:
+            handle.on_click(modifier="shift")(self._clicked)
+
+    async def _clicked(self, event: Any) -> None:
+        self._tet = self._stage.tet_on_ray(event.ray_origin, event.ray_direction)
+        self.refresh()
+
+
+# A key of viser, and what it does.
+Actions = Mapping[str, tuple[str, Callable[[Any], object]]]
+
+
+def add_keys(gui: Any, stage: Stage, actions: Actions) -> None:
+    """Add keys for the camera, and others.
+
+    Parameters
+    ----------
+    actions : by key, the name of an action, and what it does for a visitor
+    """
+    views: dict[str, tuple[str, Callable[[Any], object]]] = {
+        "F": ("Fit the picture to the bodies", lambda client: fit(client, stage.moment.finite_positions)),
+    }
+    for number, preset in enumerate(PRESETS, start=1):
+        views[str(number)] = (
+            f"View from: {preset}",
+            lambda client, preset=preset: look_from(client, preset, stage.model.view),
+        )
+    for key, (name, act) in (*actions.items(), *views.items()):
+        command = gui.add_command(name, hotkey=key)
+        command.on_trigger(sequential(lambda event, act=act: event.client is not None and act(event.client)))
+
 
 _AXES = ("x", "y", "z")
 _NOTHING = "nothing"

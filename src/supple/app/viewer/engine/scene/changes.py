@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from supple.app.viewer.engine.scene.grab_spring import make_spring
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.scene.new_bodies import check_size, new_body, place_for, unused_name
-from supple.app.viewer.engine.scene.obstacle_distance import moved_out
-from supple.app.viewer.engine.scene.pusher import Pusher
+from supple.app.viewer.engine.scene.pusher import Pusher, moved_out
 from supple.app.viewer.engine.scene.solvers import SOLVERS, kind_of, with_value
 from supple.app.viewer.protocol import commands, limits
 from supple.app.viewer.protocol.parameters import Value, find_parameter

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.distances import edge_edge_square
+from supple.contact.search.candidates import Room
 from supple.contact.search.pair_kernels import RUNS
-from supple.contact.search.room import Room
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import (
