@@ -40,7 +40,7 @@ def expression_of(psi: Callable[..., Any] | str, of: str, names: tuple[str, ...]
 
     Raises
     ------
-    SceneError : where it cannot be called with symbols, or is no formula of them.
+    SceneError : where it cannot be called with symbols, or is not a formula of them.
     """
     symbols = symbols_of(of, names)
     import sympy

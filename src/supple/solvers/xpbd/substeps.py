@@ -36,7 +36,7 @@ MOST_TURN = 0.1
 # the mean height H of a tet; and the ratio above which this is asked for. See docs/theory/rigid_bodies.md.
 MOST_SINKING, LEAST_RATIO = 1.5e-4, 4.0
 # Largest g h^2 / H, with the height H of the smallest rigid body's tet: a stack that sinks farther into itself at an
-# impact gains energy when it is parted again. See notes/measured_trials.md.
+# impact gains energy when it is separated again. See notes/measured_trials.md.
 MOST_FALL = 3e-3
 # By which a number from an earlier frame falls in every frame.
 FALL = 0.8

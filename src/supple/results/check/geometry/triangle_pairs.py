@@ -4,7 +4,8 @@ Two convex sets that share a corner and another point share the way between them
 corner in one of the two: so neighbours with one common corner meet elsewhere if and only if the opposite side of one
 meets the other. Neighbours with a common side meet elsewhere if and only if one is folded flat onto the other.
 
-A triangle without area is no surface; what is left of it here is its sides. Its tetrahedron is flat, and that is found.
+A triangle without area is not a surface; what is left of it here is its sides. Its tetrahedron is flat, which is
+found.
 """
 
 from supple.results.check.geometry.orientation import area_sign, volume_sign

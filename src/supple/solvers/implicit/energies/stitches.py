@@ -40,7 +40,7 @@ def spring_energies(springs: Springs, points: NDArray[np.float64]) -> NDArray[np
 
 
 def spring_gradients(springs: Springs, points: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """By the nodes [N], into out (k, 4, 3); the fourth is no node. A spring of zero length has no force."""
+    """By the nodes [N], into out (k, 4, 3); the fourth is not a node. A spring of zero length has no force."""
     d = springs.extensions(points)
     lengths = np.linalg.norm(d, axis=1)
     share = springs.rest_lengths / np.where(lengths > 0.0, lengths, np.inf)

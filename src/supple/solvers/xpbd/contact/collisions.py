@@ -185,12 +185,12 @@ class Collisions:
                         break
                     self.project_again(x, x_prev, time, h)
                 # What obstacles push may have passed through other bodies.
-                self.surfaces.check_parted(x)
+                self.surfaces.check_separated(x)
             for _ in range(most):
-                if self.surfaces.parted:
+                if self.surfaces.separated:
                     break
                 self.project_again(x, x_prev, time, h)
-                self.surfaces.check_parted(x)
+                self.surfaces.check_separated(x)
         return self.contacts
 
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
@@ -217,14 +217,14 @@ class Collisions:
         return np.zeros((len(self._owners.of_points), 3)) if self.surfaces is None else self.surfaces.positions
 
     @property
-    def parted(self) -> bool:
+    def separated(self) -> bool:
         """Whether nothing had passed through anything after the last `project`."""
-        return (self.surfaces is None or self.surfaces.parted) and not self._dipped
+        return (self.surfaces is None or self.surfaces.separated) and not self._dipped
 
-    def check_parted(self, x: NDArray[np.float64], time: float) -> None:
+    def check_separated(self, x: NDArray[np.float64], time: float) -> None:
         """Take notice of what has passed through something in the substep that ends at x (n, 3) [m], `time` [s]."""
         if self.surfaces is not None:
-            self.surfaces.check_parted(x)
+            self.surfaces.check_separated(x)
         self._dipped = self.obstacles.rigid_point_inside(x, time)
 
     def passed(self, x: NDArray[np.float64], labels: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -87,7 +87,7 @@ class SurfaceCollisions:
         self._smallest = np.zeros(n)
         # Whether nothing had passed through anything after the last projection; whether it moved anything; how much it
         # changed a gap, at most [m].
-        self.parted, self.moved, self.changed = True, False, 0.0
+        self.separated, self.moved, self.changed = True, False, 0.0
         # Of the last search: the rows of each kind that take part.
         self._chosen = [np.zeros(0, dtype=np.int64)] * 2
         self._prepared: list[PreparedRows | None] = [None] * 2
@@ -165,7 +165,7 @@ class SurfaceCollisions:
             self._list((self._x - self._before) * (self._dt / h))
             self._lists.number(self._rows)
         contacts, smallest = 0, np.inf
-        self.parted, self.moved = True, False
+        self.separated, self.moved = True, False
         self._look_near()
         self._rows.active[:] = False
         self._chosen = [chosen[:0] for chosen in self._chosen]
@@ -179,9 +179,9 @@ class SurfaceCollisions:
                 for k in range(MOST_PASSAGES):
                     if not self._find_passages(kind, part, h):
                         break
-                    # What was about to pass through is parted as an overlap is; otherwise it would remain that near.
+                    # What was about to pass through is separated as an overlap is; otherwise it would remain that near.
                     pushes, _ = self._solve(kind, h, 0.0 if k else limit)
-                    self.parted &= k < MOST_PASSAGES - 1
+                    self.separated &= k < MOST_PASSAGES - 1
                 contacts, smallest = contacts + pushes, min(smallest, gap, least)
         # Larger gaps in this frame are of no interest.
         self._least_gap = min(self._least_gap, smallest)
@@ -196,14 +196,14 @@ class SurfaceCollisions:
         """
         self._take(x, x_prev)
         self.changed = 0.0
-        sweeps = SWEEPS if self.parted else MORE_SWEEPS
+        sweeps = SWEEPS if self.separated else MORE_SWEEPS
         contacts = sum(self._solve(kind, h, 0.0, sweeps)[0] for kind in range(2))
         self._give(x, x_prev)
         return contacts
 
-    def check_parted(self, x: NDArray[np.float64]) -> None:
+    def check_separated(self, x: NDArray[np.float64]) -> None:
         """Take notice of what has passed through something in the substep that ends at x (n, 3) [m]."""
-        self.parted = not self._passages(x).any()
+        self.separated = not self._passages(x).any()
 
     def passed(self, x: NDArray[np.float64]) -> NDArray[np.int64]:
         """(k, 2) the pieces of which one has passed through the other in the substep that ends at x (n, 3) [m]."""

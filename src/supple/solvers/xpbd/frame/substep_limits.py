@@ -72,7 +72,7 @@ def _apply(ws: XPBDWorkspace, time: float, h: float) -> None:
         # Contacts turn bodies by small rotations; the turn that follows from their momenta ends a little elsewhere.
         ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
         if _to_world(ws):
-            ws.collisions.check_parted(ws.world, time)
+            ws.collisions.check_separated(ws.world, time)
 
 
 def _to_world(ws: XPBDWorkspace) -> bool:
@@ -85,7 +85,7 @@ def keep_volumes(ws: XPBDWorkspace, time: float, h: float) -> bool:
     searched = True  # whether the contacts that were projected last had been searched anew
     for k in range(MOST_PROJECTIONS):
         low = ws.guard.measure(ws.points, ENOUGH if k else 1.0)
-        if not low and searched and ws.collisions.parted:
+        if not low and searched and ws.collisions.separated:
             ws.guard.accept()
             return False
         if low:

@@ -153,7 +153,7 @@ def enter_contact(rows, r, p, triangles, t, where, n, gap, mu):
 
 @njit(forceinline=True)
 def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, stitched, rows):
-    """The contacts of point p with the pieces near it; returns the smallest distance that is no contact, or inf."""
+    """The contacts of point p with the pieces near it; returns the smallest distance that is not a contact, or inf."""
     first_run, last_run = runs
     run_starts, run_rows, listed = lists
     point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
