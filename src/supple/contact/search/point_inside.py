@@ -2,6 +2,11 @@
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.search.surfaces import ContactSurfaces
+from supple.numerics.geometry.box_tree import boxes_of_labels
 from supple.numerics.geometry.closest_points import closest_on_triangle, combine
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
@@ -75,3 +80,16 @@ def depths_inside(shapes, closed, allowed, boxes, out):
                     nearest = min(nearest, dot(d, d))
                 out[p] = max(out[p], math.sqrt(nearest))
         begin = end
+
+
+def find_depths(surfaces: ContactSurfaces, x: NDArray[np.float64], depth: NDArray[np.float64]) -> None:
+    """Write how deep points x (n, 3) are inside of other bodies, and of obstacles, to `depth` (2, n) [m]."""
+    s = surfaces
+    depth[:] = 0.0
+    if not (s.allowed & ~np.eye(len(s.allowed), dtype=np.bool_)).any():
+        return
+    both = boxes_of_labels(np.concatenate([x, x], axis=1), s.point_piece, len(s.closed))
+    boxes = both[:, :3].copy(), both[:, 3:].copy()
+    for kind, part in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
+        shapes = (x, s.point_piece, s.triangles[part], s.triangle_piece[part])
+        depths_inside(shapes, s.closed, s.allowed, boxes, depth[kind])

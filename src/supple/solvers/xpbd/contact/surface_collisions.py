@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.contact.search.excluded_pairs import stitched_points
-from supple.contact.search.point_inside import depths_inside
+from supple.contact.search.point_inside import find_depths
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.model.system import System
-from supple.numerics.geometry.box_tree import boxes_of_labels
 from supple.runtime.threads import threads_for
 from supple.solvers.xpbd.contact.contact_rows import ContactRows, LoadedRows, choose_rows, push_rows
 from supple.solvers.xpbd.contact.detection.edge_contacts import (
@@ -144,7 +143,7 @@ class SurfaceCollisions:
         if rows.loads:
             push_rows(self._x, self._before, self._movers, rows.described, h)
             self._settle()
-            self._give(x, x_prev)
+            self._moved.give(self._x, self._before, x, x_prev)
         return rows.loads
 
     def project(
@@ -186,7 +185,7 @@ class SurfaceCollisions:
         # Larger gaps in this frame are of no interest.
         self._least_gap = min(self._least_gap, smallest)
         if self.moved:
-            self._give(x, x_prev)
+            self._moved.give(self._x, self._before, x, x_prev)
         return contacts, smallest
 
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> int:
@@ -198,7 +197,7 @@ class SurfaceCollisions:
         self.changed = 0.0
         sweeps = SWEEPS if self.separated else MORE_SWEEPS
         contacts = sum(self._solve(kind, h, 0.0, sweeps)[0] for kind in range(2))
-        self._give(x, x_prev)
+        self._moved.give(self._x, self._before, x, x_prev)
         return contacts
 
     def check_separated(self, x: NDArray[np.float64]) -> None:
@@ -258,9 +257,6 @@ class SurfaceCollisions:
 
     def _settle(self) -> None:
         self._moved.settle(self._x, self._before, self._predicted)
-
-    def _give(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
-        self._moved.give(self._x, self._before, x, x_prev)
 
     def _solve(self, kind: int, h: float, limit: float, sweeps: int = SWEEPS) -> tuple[int, float]:
         """Project the chosen rows of one kind; returns how many push, and the smallest gap before the substep."""
@@ -347,19 +343,7 @@ class SurfaceCollisions:
         self._standing, loaded = loaded.chosen(standing), loaded.chosen(~standing)
         self._rows.restore(loaded, loaded.keys)
         if known < len(self._x):
-            self._find_overlaps()
+            find_depths(s, self._x, self._depth)
 
     def _list(self, motions: NDArray[np.float64]) -> None:
         self._lists.renew(self._x, self._before, motions, self._depth.max(axis=0))
-
-    def _find_overlaps(self) -> None:
-        """Set how deep each point is inside other pieces, from positions alone."""
-        s = self.surfaces
-        self._depth[:] = 0.0
-        if not (s.allowed & ~np.eye(len(s.allowed), dtype=np.bool_)).any():
-            return
-        both = boxes_of_labels(np.concatenate([self._x, self._x], axis=1), s.point_piece, len(s.closed))
-        boxes = both[:, :3].copy(), both[:, 3:].copy()
-        for kind, part in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
-            shapes = (self._x, s.point_piece, s.triangles[part], s.triangle_piece[part])
-            depths_inside(shapes, s.closed, s.allowed, boxes, self._depth[kind])
