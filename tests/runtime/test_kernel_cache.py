@@ -253,6 +253,12 @@ def test_the_name_of_an_entry_depends_on_the_options_of_the_kernel_and_on_how_it
     assert digest("class A:\n    B = 1") != digest("class A:\n    B = 2")
 
 
+def test_a_kernel_whose_cache_is_disabled_is_not_kept():
+    kernel = njit(cache=True)(kernel_with())
+    kernel._cache.disable()
+    assert kernel._cache.cache_path is None
+
+
 def test_names_of_a_module_and_constants_count(monkeypatch):
     from supple.numerics import mat3
     from supple.solvers.xpbd import integration

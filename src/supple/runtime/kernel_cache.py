@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from numba import prange
 from numba.core import config
-from numba.core.caching import _Cache
+from numba.core.caching import NullCache, _Cache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
@@ -162,7 +162,8 @@ class KernelCache(_Cache):
         """It is always enabled."""
 
     def disable(self) -> None:
-        raise NotImplementedError("leave out `cache=True`")
+        """From now on, the kernel is compiled in each process."""
+        self._kernel._cache = NullCache()  # pyright: ignore[reportAttributeAccessIssue]
 
     def flush(self) -> None:
         """Nothing is out of date: an entry is named by all that it depends on."""
