@@ -45,9 +45,6 @@ def compare_quickly(dispatcher: Any) -> None:
 class _LinkedLibrary(JITCodeLibrary):
     """Code to be linked into kernels. No machine code is made of it: what is not inlined is compiled in each kernel."""
 
-    def _optimize_final_module(self) -> None:
-        """Kernels are optimized with all that is linked into them."""
-
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
