@@ -39,7 +39,7 @@ class ParallelKernel:
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        several = _has_rows(arguments, self.rows) and has_several() and not _threads.lost
+        several = has_several() and not _threads.lost and _has_rows(arguments, self.rows)
         if not several or not _threads.lock.acquire(blocking=False):
             return self.serial(*arguments)
         try:

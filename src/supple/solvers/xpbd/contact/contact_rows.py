@@ -136,7 +136,8 @@ def _among(few: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.bool_]
 
 def loaded_rows(forces: NDArray[np.float64]) -> NDArray[np.int64]:
     """The rows that hold a force (k, 3), ascending."""
-    return np.flatnonzero(forces.any(axis=1))
+    # `any` over an axis of three takes half as long again.
+    return np.flatnonzero((forces[:, 0] != 0.0) | (forces[:, 1] != 0.0) | (forces[:, 2] != 0.0))
 
 
 @njit(cache=True)
