@@ -24,12 +24,13 @@ from supple.mesh.io import in_child
 from supple.mesh.io.libraries import meshio, trimesh, usd
 
 for line in sys.stdin:
-    library, path, memory, seconds = line.rstrip("\\n").split("\\t")
+    library, function, path, folder, memory, seconds = line.rstrip("\\n").split("\\t")
     child = os.fork()
     if child == 0:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        os.chdir(Path(path).parent)
-        os._exit(in_child.main(library, Path(path), int(memory), float(seconds), os.getppid()))
+        os.chdir(folder)
+        limits = int(memory), float(seconds), os.getppid()
+        os._exit(in_child.main(library, function, Path(path), Path(folder), limits))
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
@@ -50,7 +51,7 @@ def _server() -> subprocess.Popen[str]:
 
 def _run(command: list[str], **_: object) -> SimpleNamespace:
     server = _server()
-    print(*command[4:8], sep="\t", file=server.stdin, flush=True)
+    print(*command[4:10], sep="\t", file=server.stdin, flush=True)
     assert server.stdout is not None
     return SimpleNamespace(returncode=int(server.stdout.readline()))
 

@@ -12,6 +12,8 @@ import subprocess
 import sys
 import tempfile
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -35,66 +37,99 @@ def read_in_child(data: bytes, library: str, suffix: str) -> MeshFile:
     ------
     FormatError : its own one; or one that says how the library failed, or that it needed too much memory or time.
     """
+    with _folder(library) as folder:
+        file = folder / f"file{suffix}"
+        file.write_bytes(data)
+        sets = _run(library, "read_file", file, folder)["sets"]
+        with np.load(folder / "arrays.npz") as arrays:
+            soup = CellSoup(*(arrays[field] for field in CellSoup._fields))
+            named = [{each: arrays[f"{kind}_{k}"] for k, each in enumerate(sets[kind])} for kind in ("node", "tet")]
+        return MeshFile(soup, *named)
+
+
+def arrays_in_child(path: Path, library: str) -> tuple[dict[str, Any], dict[str, Any], Any]:
+    """What `read_series` of a library finds in a file: facts, arrays, and the positions (frames, n, 3), mapped.
+
+    Raises
+    ------
+    FormatError : as of `read_in_child`.
+    """
+    with _folder(library) as folder:
+        facts = _run(library, "read_series", path.absolute(), folder)
+        with np.load(folder / "arrays.npz") as arrays:
+            return facts, dict(arrays), np.load(folder / "positions.npy", mmap_mode="r")
+
+
+@contextmanager
+def _folder(library: str) -> Iterator[Path]:
     try:
-        return _read(data, library, suffix)
+        with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:
+            yield Path(name)
     except OSError as error:
         reason = error.strerror or error
         raise FormatError(f"{library} cannot work in {tempfile.gettempdir()}: {reason}; make room there") from None
 
 
-def _read(data: bytes, library: str, suffix: str) -> MeshFile:
-    with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:
-        folder = Path(name)
-        (folder / f"file{suffix}").write_bytes(data)
-        memory = _LEAST_MEMORY + _MEMORY_OF_A_BYTE * len(data)
-        seconds = _SECONDS + _SECONDS_OF_A_BYTE * len(data)
-        command = [sys.executable, "-P", "-m", "supple.mesh.io.in_child", library, str(folder / f"file{suffix}")]
-        environment = os.environ | {
-            "PYTHONPATH": os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry),
-            "OPENBLAS_NUM_THREADS": "1",  # each thread would reserve address space
-        }
-        try:
-            done = subprocess.run(
-                [*command, str(memory), str(seconds), str(os.getpid())],
-                env=environment,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                timeout=seconds,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise FormatError(f"{library} did not read it within {seconds:.0f} s: it is damaged") from None
-        answer_file = folder / "answer.json"
-        answer = json.loads(answer_file.read_text("utf-8")) if answer_file.exists() else {}
-        if "disk" in answer:
-            raise OSError(0, answer["disk"])
-        if done.returncode != 0 or "sets" not in answer:
-            reason = answer.get("error", "its process ended")
-            if not answer.get("ours"):
-                reason = f"it is damaged, or of a kind that {library} cannot read: {reason.replace(str(folder), '')}"
-            raise FormatError(shorten(reason, 300))
-        with np.load(folder / "arrays.npz") as arrays:
-            soup = CellSoup(*(arrays[field] for field in CellSoup._fields))
-            sets = [
-                {each: arrays[f"{kind}_{k}"] for k, each in enumerate(answer["sets"][kind])} for kind in ("node", "tet")
-            ]
-        return MeshFile(soup, *sets)
+def _run(library: str, function: str, source: Path, folder: Path) -> dict[str, Any]:
+    """The facts that the child writes; its arrays are files in the folder."""
+    size = source.stat().st_size
+    memory = _LEAST_MEMORY + _MEMORY_OF_A_BYTE * size
+    seconds = _SECONDS + _SECONDS_OF_A_BYTE * size
+    command = [sys.executable, "-P", "-m", "supple.mesh.io.in_child", library, function, str(source), str(folder)]
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry),
+        "OPENBLAS_NUM_THREADS": "1",  # each thread would reserve address space
+    }
+    try:
+        done = subprocess.run(
+            [*command, str(memory), str(seconds), str(os.getpid())],
+            env=environment,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=seconds,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise FormatError(f"{library} did not read it within {seconds:.0f} s: it is damaged") from None
+    answer_file = folder / "answer.json"
+    answer = json.loads(answer_file.read_text("utf-8")) if answer_file.exists() else {}
+    if "disk" in answer:
+        raise OSError(0, answer["disk"])
+    if done.returncode != 0 or "facts" not in answer:
+        reason = answer.get("error", "its process ended")
+        if not answer.get("ours"):
+            reason = f"it is damaged, or of a kind that {library} cannot read: {reason.replace(str(folder), '')}"
+        raise FormatError(shorten(reason, 300))
+    return answer["facts"]
 
 
-def main(library: str, path: Path, memory: int, seconds: float, parent: int) -> int:
-    """Read the file; beside it are then `answer.json` and the arrays. Returns 0, or 1 where the answer is an error."""
+def _contents(found: MeshFile) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A mesh file as facts and arrays."""
+    named = {"node": found.node_sets, "tet": found.tet_sets}
+    sets = {f"{kind}_{k}": rows for kind, own in named.items() for k, rows in enumerate(own.values())}
+    return {"sets": {kind: list(own) for kind, own in named.items()}}, {**found.soup._asdict(), **sets}
+
+
+def main(library: str, function: str, path: Path, folder: Path, limits: tuple[int, float, int]) -> int:
+    """Read the file; in the folder are then `answer.json` and the arrays. Returns 0, or 1 where the answer is an error.
+
+    limits : memory [bytes], time [s], the number of the process with which this one ends
+    """
+    memory, seconds, parent = limits
     end_with_parent(parent)
     limit_process(seconds, memory)
     # NumPy warns where a text ends before the numbers that it should have.
     warnings.simplefilter("error", DeprecationWarning)
     answer: dict[str, Any] = {}
     try:
-        found = importlib.import_module(f"supple.mesh.io.libraries.{library}").read_file(path)
-        named = {"node": found.node_sets, "tet": found.tet_sets}
-        sets = {f"{kind}_{k}": rows for kind, own in named.items() for k, rows in enumerate(own.values())}
-        np.savez(path.with_name("arrays.npz"), **found.soup._asdict(), **sets)
-        answer["sets"] = {kind: list(own) for kind, own in named.items()}
+        module = importlib.import_module(f"supple.mesh.io.libraries.{library}")
+        if function == "read_file":
+            facts, arrays = _contents(module.read_file(path))
+        else:
+            facts, arrays = module.read_series(path, folder / "positions.npy")
+        np.savez(folder / "arrays.npz", **arrays)
+        answer["facts"] = facts
     except FormatError as error:
         answer = {"error": error.reason, "ours": True}
     except MemoryError:
@@ -103,9 +138,11 @@ def main(library: str, path: Path, memory: int, seconds: float, parent: int) -> 
         answer = {"disk": error.strerror or str(error)}
     except (Exception, SystemExit) as error:  # of any kind: the library trusts its file
         answer = {"error": " ".join(f"{type(error).__name__}: {error}".split())}
-    path.with_name("answer.json").write_text(json.dumps(answer), "utf-8")
-    return 0 if "sets" in answer else 1
+    (folder / "answer.json").write_text(json.dumps(answer), "utf-8")
+    return 0 if "facts" in answer else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]), int(sys.argv[5])))
+    _, _library, _function, _path, _folder_name, *_limits = sys.argv
+    _limited = int(_limits[0]), float(_limits[1]), int(_limits[2])
+    sys.exit(main(_library, _function, Path(_path), Path(_folder_name), _limited))

@@ -73,7 +73,7 @@ def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int6
         points = vertex_array(soup.points, str(path))
         triangles = triangles_of(soup)
     except FormatError as error:
-        raise _located(path, error) from None
+        raise located(path, error) from None
     low, high = points.min(axis=0), points.max(axis=0)
     keep, index = merge_map(points, MERGE_TOLERANCE * float(np.linalg.norm(high - low)))
     triangles = index[triangles]
@@ -133,7 +133,7 @@ def read_tets(path: str | Path) -> TetFile:
         file = found if isinstance(found, MeshFile) else MeshFile(found)
         return TetFile(file.soup.points, tets_of(file.soup), path, file.node_sets, file.tet_sets)
     except FormatError as error:
-        raise _located(path, error) from None
+        raise located(path, error) from None
 
 
 def write_tets(path: str | Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
@@ -145,7 +145,7 @@ def write_tets(path: str | Path, vertices: NDArray[np.float64], tets: NDArray[np
         try:
             _write_whole(path, lambda temporary: write(temporary, vertices, tets))
         except FormatError as error:
-            raise _located(path, error) from None
+            raise located(path, error) from None
     elif extension in TET_READERS:
         data = TET_WRITERS[extension](vertices, tets)
         _write_whole(path, lambda temporary: temporary.write_bytes(data))
@@ -164,6 +164,7 @@ def _unknown_extension(path: Path, known: tuple[str, ...], hint: str) -> MeshErr
     return MeshError(f"{path}: {found} {listed}{hint}")
 
 
-def _located(path: Path, error: FormatError) -> MeshError:
+def located(path: Path, error: FormatError) -> MeshError:
+    """The error with the file, and the line where it is known."""
     where = f"{path}:{error.line}" if error.line is not None else f"{path}"
     return MeshError(f"{where}: {error.reason}")

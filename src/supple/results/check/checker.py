@@ -1,4 +1,4 @@
-"""`check_recording`: every check over every frame, in one pass through the file."""
+"""`check_recording` and `check_series`: every check over every frame, in one pass through the files."""
 
 from __future__ import annotations
 
@@ -8,22 +8,29 @@ from typing import Any
 
 import numpy as np
 
+from supple.mesh.io.series.open import open_series
+from supple.mesh.io.series.series import Series
 from supple.results.check.checks.budgets import Balance, Energy, Momentum, Spin
 from supple.results.check.checks.contact import Containment, Distance, Intersection, Obstacles
 from supple.results.check.checks.joints import Joints, Welds
 from supple.results.check.checks.plain_values import CONSTANTS, Converged, Finite, Sequence
 from supple.results.check.checks.records import Records
+from supple.results.check.checks.series import Cells, Gaps, Scale
 from supple.results.check.checks.tets import Inversion, RestShape, Rigidity, Volume
 from supple.results.check.checks.works import Works
-from supple.results.check.frame_check import FrameCheck, skipped
+from supple.results.check.frame_check import UNKNOWN, FrameCheck, skipped
 from supple.results.check.report import CheckReport, CheckResult
+from supple.results.check.series.recording import Given, SeriesRecording
 from supple.results.check.settings import CheckSettings
-from supple.results.check.snapshot import Scene, Snapshot
+from supple.results.check.snapshot import Scene
 from supple.results.recording.reader import Recording, opened
 
 CHECKS: tuple[type[FrameCheck], ...] = (
     Finite,
+    Cells,
     Sequence,
+    Gaps,
+    Scale,
     Converged,
     RestShape,
     Inversion,
@@ -52,9 +59,9 @@ def check_recording(
     Parameters
     ----------
     recording : an open recording, or its path (.vtkhdf).
+    progress : is called with how many frames were looked at, and how many there are to look at.
     settings : which checks, which frames, and what they allow, such as `only=["inversion"]`, `every=10` or
         `max_energy_gain=0.01`: the parameters of `CheckSettings`; without any, all checks on all frames.
-    progress : is called with how many frames were looked at, and how many there are to look at.
 
     Returns
     -------
@@ -65,28 +72,79 @@ def check_recording(
     OutputError : where the file cannot be read as a recording, or a setting is unusable.
     """
     wanted = CheckSettings(**settings)
-    with opened(recording) as source, np.errstate(all="ignore"):
+    with opened(recording) as source:
+        return _checked(source, wanted, progress)
+
+
+def check_series(
+    series: Series | str | Path,
+    given: Given | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    **settings: Any,
+) -> CheckReport:
+    """Verify the frames of any program: whatever their files, and what is given, determine.
+
+    The first frame stands for the shape at rest.
+
+    Parameters
+    ----------
+    series : an open series, or what it is in: a folder or pattern of meshes, a .pvd, .vtkhdf, USD, .glb or .npz file.
+    given : density, material, gravity and time step, as far as they are known.
+    progress, settings : as of `check_recording`.
+
+    Returns
+    -------
+    CheckReport : one result for each check; those that need more than is known are skipped, with the reason.
+
+    Raises
+    ------
+    MeshError : where the files cannot be read.
+    OutputError : where a setting is unusable.
+    """
+    wanted = CheckSettings(**settings)
+    opened_series = series if isinstance(series, Series) else open_series(series)
+    return _checked(SeriesRecording(opened_series, given or Given()), wanted, progress)
+
+
+def _checked(
+    source: Recording | SeriesRecording, wanted: CheckSettings, progress: Callable[[int, int], None] | None
+) -> CheckReport:
+    with np.errstate(all="ignore"):
         scene = Scene(source)
         sound = all(np.isfinite(getattr(source, name)).all() for name in CONSTANTS)
-        chosen = [check for check in CHECKS if check.name in wanted.chosen]
-        checks = {check.name: check(scene, wanted) for check in chosen if sound or check.sees_all}
+        chosen = [_check_of(name, source.knows) for name in wanted.chosen]
+        checks: dict[str, FrameCheck] = {}
+        for check in chosen:
+            if not check.needs - source.knows and (sound or check.sees_all):
+                checks[check.name] = check(scene, wanted)
         numbers = sorted({*range(0, len(source), wanted.every), len(source) - 1})
         seen = 0
         for done, number in enumerate(numbers):
-            at = Snapshot.of(scene, source[number])
+            at = scene.snapshot(number)
             seen += at.finite
             for check in checks.values():
-                if check.why_not is None and (at.finite or check.sees_all):
+                usable = at.finite and (at.moves or "times" not in check.needs)
+                if check.why_not is None and (usable or check.sees_all):
                     check.see(at)
             if progress is not None:
                 progress(done + 1, len(numbers))
-        results = tuple(_result(check.name, checks.get(check.name), seen) for check in chosen)
-        return CheckReport(source.path, len(source), len(numbers), results)
+        results = tuple(_result(check, checks.get(check.name), seen, source.knows) for check in chosen)
+        return CheckReport(source.path, len(source), len(numbers), results, source.notes)
 
 
-def _result(name: str, check: FrameCheck | None, seen: int) -> CheckResult:
+def _check_of(name: str, knows: frozenset[str]) -> type[FrameCheck]:
+    """The check of a name; of several, the first one whose needs are known."""
+    named = [check for check in CHECKS if check.name == name]
+    return next((check for check in named if not check.needs - knows), named[0])
+
+
+def _result(kind: type[FrameCheck], check: FrameCheck | None, seen: int, knows: frozenset[str]) -> CheckResult:
+    for need in UNKNOWN:
+        if need in kind.needs - knows:
+            return skipped(kind.name, UNKNOWN[need])
     if check is None:
-        return skipped(name, "rest shapes, masses or gravity are not finite")
+        return skipped(kind.name, "rest shapes, masses or gravity are not finite")
     if check.needs_frames and seen == 0:
-        return skipped(name, "no frame has finite positions and velocities")
+        return skipped(kind.name, "no frame can be used: see the checks that failed")
     return check.result()

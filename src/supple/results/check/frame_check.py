@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from supple.results.check.report import CheckResult, Verdict
 from supple.results.check.settings import CheckSettings
 from supple.results.check.snapshot import Scene, Snapshot
 from supple.results.recording.frame import RecordedFrame
 
+# What a check may need, and what its result says where the files do not contain it and nobody gives it.
+UNKNOWN = {
+    "recording": "only recordings of Supple contain what it needs",
+    "files": "all frames of a recording have the same cells",
+    "tets": "the files have no tets",
+    "times": "the time from frame to frame is not known; give --dt or --fps",
+    "masses": "masses are not known; it needs tets and --density",
+    "gravity": "gravity is not known; give --gravity, 0 0 0 where there is none",
+    "material": "the material is not known; it needs tets, --youngs and --poisson",
+    "free": "what holds the parts is not known; --free says that nothing but gravity acts on them",
+}
 # Units of numbers that count errors.
 COUNTED = ("numbers", "pairs", "pieces")
+
+
+class At(NamedTuple):
+    """Number and time [s] of a frame."""
+
+    number: int
+    time: float
 
 
 class Tally:
@@ -34,7 +52,7 @@ class Tally:
         self._rank: tuple[bool, float] | None = None
 
     def see(
-        self, at: Snapshot | RecordedFrame | None, value: float, failed: bool, where: str | Callable[[], str] = ""
+        self, at: Snapshot | RecordedFrame | At | None, value: float, failed: bool, where: str | Callable[[], str] = ""
     ) -> None:
         """Add a number of a frame, or of no frame (None). A frame may come several times in succession.
 
@@ -91,7 +109,7 @@ class FrameCheck:
     Attributes
     ----------
     name : one of `settings.NAMES`; sees_all : whether it also sees frames with numbers that are not finite
-    needs_frames : whether its result needs at least one frame
+    needs_frames : whether its result needs at least one frame; needs : keys of `UNKNOWN`
     unit : of its number; lowest : whether small numbers are the bad ones
     good, bad : texts of its result; `{worst}` in them stands for the worst number
     why_not : why it cannot be made; it then sees no further frames
@@ -100,6 +118,7 @@ class FrameCheck:
     name: ClassVar[str]
     sees_all: ClassVar[bool] = False
     needs_frames: ClassVar[bool] = True
+    needs: ClassVar[frozenset[str]] = frozenset()
     unit: ClassVar[str] = ""
     lowest: ClassVar[bool] = False
     good: str
@@ -116,6 +135,10 @@ class FrameCheck:
 
     def see(self, at: Snapshot) -> None:
         """Check a frame; frames come in order."""
+
+    def passed(self) -> CheckResult:
+        """The result where nothing failed and there is no number."""
+        return CheckResult(self.name, Verdict.PASS, self.good)
 
     def result(self) -> CheckResult:
         """The result of all frames."""

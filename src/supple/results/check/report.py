@@ -49,18 +49,19 @@ class CheckResult:
 
 @dataclass(frozen=True, repr=False)
 class CheckReport(Displayed):
-    """All checks of one recording.
+    """All checks of one recording or series.
 
     Attributes
     ----------
     path : of the recording; frames : how many it has; frames_checked : number of frames that were checked
-    results : one for each check, in order
+    results : one for each check, in order; notes : what was assumed of the files, one sentence each
     """
 
     path: Path
     frames: int
     frames_checked: int
     results: tuple[CheckResult, ...]
+    notes: tuple[str, ...] = ()
 
     def _facts(self) -> dict[str, str]:
         facts = {"frames": f"{self.frames_checked} of {self.frames}", "failed": str(len(self.failures))}
@@ -75,6 +76,28 @@ class CheckReport(Displayed):
     def failures(self) -> tuple[CheckResult, ...]:
         """The checks that failed."""
         return tuple(result for result in self.results if result.verdict is Verdict.FAIL)
+
+    @property
+    def skipped(self) -> dict[str, list[str]]:
+        """The names of the checks that were skipped, by the reason."""
+        found: dict[str, list[str]] = {}
+        for result in self.results:
+            if result.verdict is Verdict.SKIPPED:
+                found.setdefault(result.message, []).append(result.name)
+        return found
+
+    @property
+    def verdict(self) -> str:
+        """One line: what was checked, and what failed, first the check that failed first."""
+        checked = "all" if self.frames == self.frames_checked else f"{self.frames_checked} of"
+        begin = f"{self.path}: {checked} {self.frames} frames checked"
+        if self.ok:
+            passed = sum(result.verdict is Verdict.PASS for result in self.results)
+            return f"{begin}, {passed} checks passed"
+        failed = sorted(self.failures, key=lambda result: result.first_failure or 0)
+        first = failed[0]
+        at = "" if first.first_failure is None else f", first {first.name} in frame {first.first_failure}"
+        return f"{begin}, FAILED: {', '.join(result.name for result in failed)}{at}"
 
     def __getitem__(self, name: str) -> CheckResult:
         """The result of the check of that name."""

@@ -11,7 +11,9 @@ from supple.errors import OutputError
 
 NAMES = {
     "finite": "every recorded number is finite",
+    "cells": "every frame of a series has the points and cells of the first",
     "sequence": "times and numbers of frames go up by one step, and each frame follows from the one before",
+    "scale": "the unit of length does not change from frame to frame",
     "status": "every step converged",
     "rest shape": "no tet is inverted or flat at rest; volumes and masses are above zero",
     "inversion": "no tet is inverted or flat, by the exact sign of its determinant",

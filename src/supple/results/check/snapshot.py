@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
+from supple.materials.laws.internal import NEVER_FLOWED
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.results.check.geometry.orientation import volume_signs
 from supple.results.check.geometry.surface_pairs import meeting_pairs
 from supple.results.check.load_forces import ActuatorState, actuator_states, add_muscle_forces, load_forces
+from supple.results.check.series.recording import SeriesRecording
 from supple.results.check.stored_energies import elastic_energy, stitch_energy
 from supple.results.check.surfaces import Surfaces, seam_keys
 from supple.results.recording.frame import RecordedFrame
@@ -25,10 +27,12 @@ _MOST_PAIRS = 1000
 
 
 class Scene:
-    """The data that all frames of a recording share. Seams are among the surfaces' ignored pairs."""
+    """The data that all frames of a recording or series share. Seams are among the surfaces' ignored pairs."""
 
-    def __init__(self, recording: Recording) -> None:
-        self.recording = recording
+    def __init__(self, source: Recording | SeriesRecording) -> None:
+        # A series has the attributes of a recording that the checks of what it `knows` use.
+        self.recording = recording = cast(Recording, source)
+        self._source = source
         self.surfaces = Surfaces(recording)
         self.surfaces.ignored = np.union1d(self.surfaces.ignored, seam_keys(recording, self.surfaces))
 
@@ -49,15 +53,29 @@ class Scene:
         rest = self.recording.rest_positions
         return max(float(np.ptp(body.points(rest), axis=0).max()) for body in self.recording.bodies)
 
+    @property
+    def file_steps(self) -> NDArray[np.int64] | None:
+        """(frames,) numbers in the names of a series' files, or None."""
+        return self._source.numbers if isinstance(self._source, SeriesRecording) else None
+
+    def snapshot(self, number: int) -> Snapshot:
+        """A frame."""
+        source = self._source
+        if isinstance(source, SeriesRecording):
+            return Snapshot.of_series(self, source, number)
+        return Snapshot.of(self, source[number])
+
     def name(self, kind: Literal["vertex", "tet"], row: int) -> str:
-        """A vertex or tet as messages call it: its number within its body; of a skin, within that."""
+        """A vertex or tet as messages call it: its number within its body, or the file; of a skin, within that."""
         for body, first in self.surfaces.skins if kind == "vertex" else ():
             if body.skin is not None and first <= row < first + len(body.skin.corners):
                 return f"vertex {row - first} of {body.name}"
         for body in self.recording.bodies:
             rows = body.vertices if kind == "vertex" else body.tets
             if rows.start <= row < rows.stop:
-                return f"{kind} {row - rows.start} of {body.name}"
+                numbers = self.recording.file_numbers
+                number = row - rows.start if numbers is None else int(numbers[kind][row])
+                return f"{kind} {number} of {body.name}"
         return f"{kind} {row}"
 
 
@@ -72,6 +90,7 @@ class Snapshot:
     internal : (k, 11) internal variables of materials that flow, see `State`; active : growths and muscles
     load_values : vectors and numbers of the recorded loads, by name
     pressures, tensions : of cavities [Pa], and of spans of cables [N], by name
+    other : why it cannot be compared with the other frames of a series, or None
     """
 
     scene: Scene
@@ -86,6 +105,14 @@ class Snapshot:
     load_values: Mapping[str, NDArray[np.float64] | float] = field(default_factory=dict)
     pressures: Mapping[str, float] = field(default_factory=dict)
     tensions: Mapping[str, float] = field(default_factory=dict)
+    other: str | None = None
+
+    @classmethod
+    def of_series(cls, scene: Scene, series: SeriesRecording, number: int) -> Snapshot:
+        frame = series.frame(number)
+        nothing = np.zeros(0), np.zeros((0, 3, 4)), NEVER_FLOWED
+        time, velocities = float(series.times[number]), series.velocities(number)
+        return cls(scene, number, time, frame.positions, velocities, *nothing, other=frame.other)
 
     @classmethod
     def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
@@ -108,8 +135,32 @@ class Snapshot:
 
     @cached_property
     def finite(self) -> bool:
-        """Whether positions, velocities and poses are finite."""
-        return all(bool(np.isfinite(values).all()) for values in (self.positions, self.velocities, self.poses))
+        """Whether positions, velocities and poses are finite, and the frame can be compared with others."""
+        known = (
+            (self.positions, self.poses)
+            if "files" in self.scene.recording.knows
+            else (self.positions, self.poses, self.velocities)
+        )
+        return self.other is None and all(bool(np.isfinite(values).all()) for values in known)
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether velocities are finite: those of a series are not beside a frame that cannot be used."""
+        return bool(np.isfinite(self.velocities).all())
+
+    @cached_property
+    def volumes(self) -> NDArray[np.float64]:
+        """(bodies,) [m^3] of tets; of a body without tets what its surface encloses, NaN where that is open."""
+        recording = self.scene.recording
+        out = np.full(len(recording.bodies), np.nan)
+        for k, body in enumerate(recording.bodies):
+            if body.tets.stop > body.tets.start:
+                out[k] = float(recording.rest_volumes[body.tets] @ self.J[body.tets])
+            elif self.scene.surfaces.closed[k]:
+                x = self.positions[body.vertices]
+                a, b, c = (x - x.mean(axis=0))[body.triangles].transpose(1, 0, 2)
+                out[k] = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+        return out
 
     @cached_property
     def signs(self) -> NDArray[np.int8]:

@@ -42,11 +42,11 @@ class Surfaces:
     stitched : (k, 4) points of each stitch, some of them twice where it has fewer
     skins : (body, its first row) of bodies that touch with their skin, whose points follow vertices
     fixed : (obstacle, its points at time 0, its first row) of obstacles made of triangles; points : number of all rows
-    pieces : see `Piece`
+    pieces : see `Piece`; closed : whether all pieces of an owner are
     """
 
     def __init__(self, recording: Recording) -> None:
-        self.bodies = len(recording.bodies)
+        self.bodies, self._file_numbers = len(recording.bodies), recording.file_numbers
         self.names = tuple(thing.name for thing in (*recording.bodies, *recording.obstacles))
         triangles: list[NDArray[np.int64]] = []
         self.fixed: list[tuple[int, NDArray[np.float64], int]] = []
@@ -75,7 +75,8 @@ class Surfaces:
         self.allowed = _allowed(recording, self.bodies, len(self.names))
         self.stitched = self._stitched_points(recording)
         self.ignored = np.union1d(_ignored_keys(self.stitched, self.triangles), self._welded_keys(recording))
-        self.pieces = _pieces(recording, self.triangles, self.owners, row)
+        self.pieces = pieces = _pieces(recording, self.triangles, self.owners, row)
+        self.closed = [all(piece.closed for piece in pieces if piece.owner == k) for k in range(len(self.names))]
 
     def place(self, positions: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """All points (n + skins' + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
@@ -118,6 +119,10 @@ class Surfaces:
         """A triangle as messages call it: the row of its own body's surface."""
         owner = int(self.owners[row])
         kind = "" if owner < self.bodies else "obstacle "
+        if self._file_numbers is not None:
+            number = int(self._file_numbers["triangle"][row])
+            corners = "-".join(str(int(self._file_numbers["vertex"][k])) for k in self.triangles[row])
+            return f"triangle {corners if number < 0 else number} of {self.names[owner]}"
         return f"triangle {row - int(self.first_triangle[owner])} of {kind}{self.names[owner]}"
 
 
@@ -192,8 +197,10 @@ def seam_keys(recording: Recording, surfaces: Surfaces) -> NDArray[np.int64]:
     """Keys, as in `Surfaces.ignored`, of the pairs of triangles that meet in the first frame, belong to two things that
     are stitched to each other, and have a stitched corner."""
     stitched = surfaces.stitched
+    if not len(stitched):
+        return np.zeros(0, dtype=np.int64)
     frame = recording[0]
-    if not len(stitched) or not np.isfinite(frame.state.positions).all() or not np.isfinite(frame.obstacle_poses).all():
+    if not np.isfinite(frame.state.positions).all() or not np.isfinite(frame.obstacle_poses).all():
         return np.zeros(0, dtype=np.int64)
     x, triangles, owners = (
         surfaces.place(frame.state.positions, frame.obstacle_poses),

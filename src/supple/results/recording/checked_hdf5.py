@@ -17,6 +17,15 @@ from supple.results.recording.file import Series
 _MOST_EXPANSION = 1100
 
 
+def is_of_another_program(path: Path) -> bool:
+    """Whether a file is VTKHDF that Supple did not write."""
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            return "VTKHDF" in file and "supple" not in file
+    except (OSError, RuntimeError, ValueError):
+        return False
+
+
 class CheckedFile:
     """A file, opened for reading. Its errors name the file, what is wrong with it, and the remedy.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -67,6 +67,11 @@ _READ_BY_FRAME = ("VTKHDF/Points", "VTKHDF/PointData/velocities", "VTKHDF/CellDa
 class RecordedContents(RecordedScene):
     """The arrays and records of a recording's file; see `Recording` for its attributes."""
 
+    # All that a check may need; its messages number vertices, tets and triangles within bodies.
+    knows = frozenset({"recording", "tets", "times", "masses", "gravity", "material", "free"})
+    file_numbers: Mapping[str, NDArray[np.int64]] | None = None
+    notes: tuple[str, ...] = ()
+
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._file = CheckedFile(self.path)
@@ -112,15 +117,6 @@ class RecordedContents(RecordedScene):
         """The elastic laws of all tets."""
         of_tets = self.rest_positions, self.tets, self.rest_volumes
         return recorded_laws(self.physics, self.bodies, *of_tets, self.quadratic)
-
-    def nodes_of(self, body: RecordedBody) -> NDArray[np.int32]:
-        """(m, 4) or (m, 10) nodes of a body's tets, rows of all vertices."""
-        if self.quadratic is not None:
-            rows, nodes = self.quadratic
-            begin, end = np.searchsorted(rows, [body.tets.start, body.tets.stop])
-            if end > begin:
-                return nodes[begin:end]
-        return self.tets[body.tets]
 
     @property
     def internal_rows(self) -> int:

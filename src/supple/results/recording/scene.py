@@ -192,6 +192,15 @@ class RecordedScene:
         counts = {"n": len(self.rest_positions), "m": len(self.tets)}
         return counts | {"bodies": len(self.bodies), "obstacles": len(self.obstacles)}
 
+    def nodes_of(self, body: RecordedBody) -> NDArray[np.int32]:
+        """(m, 4) or (m, 10) nodes of a body's tets, rows of all vertices."""
+        if self.quadratic is not None:
+            rows, nodes = self.quadratic
+            begin, end = np.searchsorted(rows, [body.tets.start, body.tets.stop])
+            if end > begin:
+                return nodes[begin:end]
+        return self.tets[body.tets]
+
 
 _CLASSES: dict[str, type] = {
     kind.__name__: kind

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import Steps, recording_at
+from supple.app.cli.arguments import Seconds, Steps, recording_at
 from supple.app.cli.console import ExitCode
 
 if TYPE_CHECKING:
     from supple.results.check.report import CheckReport
 
 Names = Annotated[list[str] | None, Parameter(negative="", consume_multiple=False)]
+Flag = Annotated[bool, Parameter(negative="")]
+Vector = Annotated[tuple[float, float, float] | None, Parameter(negative="")]
+_SETTINGS = (
+    "every", "only", "skip", "max_volume_change", "max_orthogonality_error", "max_energy_gain", "max_momentum_change",
+)  # fmt: skip
+_GIVEN = ("density", "youngs", "poisson", "gravity", "dt", "free")
 
 
 def check(
-    recording: Path,
+    path: Path,
     /,
-    *,
+    *more: Path,
     every: Steps = None,
     only: Names = None,
     skip: Names = None,
@@ -27,15 +33,27 @@ def check(
     max_orthogonality_error: float | None = None,
     max_energy_gain: float | None = None,
     max_momentum_change: float | None = None,
+    density: float | None = None,
+    youngs: float | None = None,
+    poisson: float | None = None,
+    gravity: Vector = None,
+    dt: Seconds = None,
+    fps: float | None = None,
+    free: Flag = False,
     json: Path | None = None,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> ExitCode:
-    """Verify a recording, independently of the solver that wrote it. Exit code 0: all checks passed, 1: one failed.
+    """Verify the frames of any program, or a recording, independently of the solver that wrote it.
+
+    Exit code 0: all checks passed, 1: one failed, 2: the files cannot be read.
 
     Parameters
     ----------
-    recording
-        The recording (.vtkhdf), or the folder of its run.
+    path
+        A recording (.vtkhdf) or the folder of its run. Of other programs: a folder or pattern of meshes, one for each
+        frame; a .pvd, .npz, .vtkhdf, USD or .glb file; a folder with positions.npy.
+    more
+        Further files of the same series, as the shell expands a pattern.
     every
         Check every k-th frame and the last one.
     only
@@ -43,40 +61,74 @@ def check(
     skip
         Omit the check of this name; may be given several times.
     max_volume_change
-        Largest relative change of a body's volume. Without it: 0.5 where Poisson's ratio is 0.45 or more, otherwise
-        unlimited.
+        Largest relative change of a body's volume. Without it: 0.5 where Poisson's ratio is 0.45 or more, unlimited
+        below, 0.005 where the material is not known.
     max_orthogonality_error
         Largest |F^T F - 1| of a rigid body; 0.01 without it.
     max_energy_gain
         Largest relative growth of the energy where no external work is done; 0.05 without it.
     max_momentum_change
-        Largest relative change of momenta without an external force; 1e-6 without it.
+        Largest relative change of momenta without an external force; 1e-6 without it, 1e-3 of a series.
+    density
+        Of a series [kg/m^3].
+    youngs
+        Young's modulus of a series [Pa].
+    poisson
+        Poisson's ratio of a series.
+    gravity
+        Of a series, three numbers [m/s^2].
+    dt
+        From frame to frame of a series, in seconds, where its files have no times.
+    fps
+        Frames per second of a series, instead of dt.
+    free
+        Nothing but gravity acts on the parts of the series: momentum is checked.
     json
         Write the results to this file.
     quiet
         Print only failed checks.
     """
-    from supple.results.check.checker import check_recording
+    from supple.errors import OutputError
+    from supple.results.check.settings import CheckSettings
     from supple.runtime.replacing import refuse_to_replace
 
-    given = {
-        "every": every,
-        "only": only,
-        "skip": skip,
-        "max_volume_change": max_volume_change,
-        "max_orthogonality_error": max_orthogonality_error,
-        "max_energy_gain": max_energy_gain,
-        "max_momentum_change": max_momentum_change,
-    }
-    recording = recording_at(recording)
+    values = locals()
+    if fps is not None:
+        if dt is not None or not fps > 0.0:
+            raise OutputError(f"check: fps is {fps}; give a number above zero, or dt, not both")
+        values["dt"] = 1.0 / fps
+    settings = {key: values[key] for key in _SETTINGS if values[key] is not None}
+    given = {key: values[key] for key in _GIVEN if values[key]}
+    CheckSettings(**settings)
     if json is not None:
-        refuse_to_replace(recording, json)
-    report = check_recording(recording, **{key: value for key, value in given.items() if value is not None})
+        for each in (path, *more):
+            refuse_to_replace(each, json)
+    report = _report((path, *more), given, settings)
     if json is not None:
         report.save(json)
     if not quiet or not report.ok:
         _print(report, only_failures=quiet)
     return ExitCode.OK if report.ok else ExitCode.FAILED
+
+
+def _report(paths: tuple[Path, ...], given: dict[str, Any], settings: dict[str, Any]) -> CheckReport:
+    from supple.errors import OutputError
+    from supple.mesh.io.series.open import open_series
+    from supple.results.check.checker import check_recording, check_series
+    from supple.results.check.series.recording import Given
+    from supple.results.recording.checked_hdf5 import is_of_another_program
+
+    folder = paths[0].is_dir() and not (paths[0] / "recording.vtkhdf").exists()
+    if (
+        len(paths) == 1
+        and not folder
+        and paths[0].suffix.lower() in ("", ".vtkhdf")
+        and not is_of_another_program(paths[0])
+    ):
+        if given:
+            raise OutputError(f"{paths[0]}: a recording contains its {next(iter(given))}; omit the option")
+        return check_recording(recording_at(paths[0]), **settings)
+    return check_series(open_series(*paths), Given(**given), **settings)
 
 
 def _print(report: CheckReport, *, only_failures: bool) -> None:
@@ -87,16 +139,16 @@ def _print(report: CheckReport, *, only_failures: bool) -> None:
     from supple.results.check.report import Verdict
 
     colors = {Verdict.PASS: "green", Verdict.FAIL: "bold red", Verdict.SKIPPED: "dim"}
-    checked = "all" if report.frames == report.frames_checked else f"{report.frames_checked} of"
-    title = escape(f"{report.path}: {checked} {report.frames} frames checked")
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    console = ShellConsole()
+    console.print(f"[{colors[Verdict.PASS if report.ok else Verdict.FAIL]}]{escape(report.verdict)}[/]", soft_wrap=True)
+    table = Table(box=None, pad_edge=False)
     table.add_column("check", style="bold", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     table.add_column("found", overflow="fold")
     table.add_column("frame", justify="right", no_wrap=True)
     table.add_column("time [s]", justify="right", no_wrap=True)
     for result in report.results:
-        if only_failures and result.verdict is not Verdict.FAIL:
+        if result.verdict is Verdict.SKIPPED or (only_failures and result.verdict is not Verdict.FAIL):
             continue
         table.add_row(
             result.name,
@@ -105,4 +157,10 @@ def _print(report: CheckReport, *, only_failures: bool) -> None:
             "" if result.frame is None else str(result.frame),
             "" if result.time is None else f"{result.time:.6g}",
         )
-    ShellConsole().print(table)
+    console.print(table)
+    if only_failures:
+        return
+    for why, names in report.skipped.items():
+        console.print(f"[dim]skipped[/]  [bold]{escape(', '.join(names))}[/]: {escape(why)}", soft_wrap=True)
+    for note in report.notes:
+        console.print(f"[dim]note[/]  {escape(note)}", soft_wrap=True)

@@ -150,6 +150,7 @@ class Obstacles(FrameCheck):
     """Bodies and the obstacles that are formulas."""
 
     name = "obstacles"
+    needs = frozenset({"recording"})
     unit = "m"
     lowest = True
     good = "closest {worst}"

@@ -24,6 +24,7 @@ class Joints(FrameCheck):
     """
 
     name = "joints"
+    needs = frozenset({"recording"})
     good = "hold within {worst} of the size of what they join"
     bad = "a joint is off by {worst} of the size of what it joins"
 
@@ -157,6 +158,7 @@ class Welds(FrameCheck):
     """How far welded vertices are from where the affine motion of the rigid body since the first frame puts them."""
 
     name = "welds"
+    needs = frozenset({"recording"})
     good = "welded vertices stay in place within {worst} of the rigid body's size"
     bad = "a welded vertex is off by {worst} of the rigid body's size"
 

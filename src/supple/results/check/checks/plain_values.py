@@ -41,14 +41,16 @@ class Finite(FrameCheck):
             if count:
                 self.tally.see(None, count, True, what.replace("_", " "))
         names = [name for name in (*REPORT_NUMBERS, *REPORT_VECTORS) if name not in _MAY_BE_UNKNOWN]
-        self._series = {name: recording.series(name) for name in names}
+        reports = "recording" in recording.knows
+        self._series = {name: recording.series(name) for name in names} if reports else {}
 
     def see(self, at: Snapshot) -> None:
-        found = [(count, where) for count, where in self._bad(at) if count]
+        found = [(count, where) for count, where in self._bad(at) if count] if at.other is None else []
         self.tally.see(at, sum(count for count, _ in found), bool(found), found[0][1] if found else "")
 
     def _bad(self, at: Snapshot) -> Iterator[tuple[int, str]]:
-        for what, values in (("position", at.positions), ("velocity", at.velocities)):
+        moved = [("velocity", at.velocities)] if self._series else []
+        for what, values in (("position", at.positions), *moved):
             count = _bad_count(values)
             row = int(np.argmin(np.isfinite(values).all(axis=1)))
             yield count, f"{what} of {self.scene.name('vertex', row)}" if count else ""
@@ -67,6 +69,7 @@ class Sequence(FrameCheck):
     """Times and numbers of all frames; repetitions among the checked frames."""
 
     name = "sequence"
+    needs = frozenset({"recording"})
     needs_frames = False
     good = "frames follow each other"
     bad = "frames do not follow each other"
@@ -131,6 +134,7 @@ class Converged(FrameCheck):
     """The recorded status of every step."""
 
     name = "status"
+    needs = frozenset({"recording"})
     needs_frames = False
     good = "every step converged"
     bad = "a step did not converge"

@@ -19,6 +19,7 @@ class Records(FrameCheck):
     """Determinants tet by tet, the smallest of them, energies and momenta."""
 
     name = "records"
+    needs = frozenset({"recording"})
     good = "agree within {worst}"
     bad = "differ by {worst} from what the positions give"
 

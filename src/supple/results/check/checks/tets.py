@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.materials.elastic import StableNeoHookean
 from supple.materials.registry import ELASTIC_MATERIALS
@@ -14,6 +15,7 @@ from supple.results.check.stored_energies import growth_of
 
 NEARLY_INCOMPRESSIBLE = 0.45
 GENEROUS_VOLUME_CHANGE = 0.5
+SMALL_VOLUME_CHANGE = 0.005  # of a part whose material is not known
 _SAME_VOLUME = 1e-9
 
 
@@ -21,6 +23,7 @@ class RestShape(FrameCheck):
     """Tets, volumes and masses that no frame changes."""
 
     name = "rest shape"
+    needs = frozenset({"recording"})
     needs_frames = False
     unit = "m^3"
     lowest = True
@@ -56,6 +59,7 @@ class Inversion(FrameCheck):
     """The sign of every tet's determinant, exact or everywhere in a quadratic one; the smallest det F is reported."""
 
     name = "inversion"
+    needs = frozenset({"tets"})
     lowest = True
     good = "smallest det F {worst}"
     bad = "inverted or flat, det F {worst}"
@@ -75,14 +79,19 @@ class Volume(FrameCheck):
     bad = "changes by {worst} of a body's volume"
 
     def begin(self) -> None:
-        bodies = self.scene.recording.bodies
+        recording, closed = self.scene.recording, self.scene.surfaces.closed
+        bodies = recording.bodies
         self._limits = [self._limit(k) for k in range(len(bodies))]
-        self._rest = [float(self.scene.recording.rest_volumes[body.tets].sum()) for body in bodies]
+        self._rest: NDArray[np.float64] | None = None
+        if not any(closed[k] or body.tets.stop > body.tets.start for k, body in enumerate(bodies)):
+            self.why_not = "no part is closed or has tets"
 
     def _limit(self, number: int) -> float:
         if self.settings.max_volume_change is not None:
             return self.settings.max_volume_change
         recording = self.scene.recording
+        if "material" not in recording.knows:
+            return SMALL_VOLUME_CHANGE
         physics, tets = recording.physics, recording.bodies[number].tets
         known = physics.kind[tets] < len(ELASTIC_MATERIALS)
         if not known.all():
@@ -95,17 +104,24 @@ class Volume(FrameCheck):
         return GENEROUS_VOLUME_CHANGE if (poisson >= NEARLY_INCOMPRESSIBLE - 1e-9).all() else np.inf
 
     def see(self, at: Snapshot) -> None:
-        for k, body in enumerate(self.scene.recording.bodies):
-            volumes = self.scene.recording.rest_volumes[body.tets]
-            rest = float(volumes @ growth_of(at.active, len(at.J))[1][body.tets]) if at.active else self._rest[k]
-            change = abs(float(volumes @ at.J[body.tets]) / rest - 1.0)
-            self.tally.see(at, change, not change <= self._limits[k], body.name)
+        recording = self.scene.recording
+        if self._rest is None:  # of tets those at rest, of surfaces those of the first frame
+            sums = [float(recording.rest_volumes[body.tets].sum()) for body in recording.bodies]
+            self._rest = np.where(np.array(sums) != 0.0, sums, at.volumes)
+        for k, body in enumerate(recording.bodies):
+            rest = self._rest[k]
+            if at.active:
+                rest = float(recording.rest_volumes[body.tets] @ growth_of(at.active, len(at.J))[1][body.tets])
+            change = abs(at.volumes[k] / rest - 1.0)
+            if not np.isnan(change):
+                self.tally.see(at, change, not change <= self._limits[k], body.name)
 
 
 class Rigidity(FrameCheck):
     """|F^T F - 1| of every rigid body, with F the least-squares fit x = F X + t of its surface's vertices."""
 
     name = "rigidity"
+    needs = frozenset({"recording"})
     good = "largest error |F^T F - 1| {worst}"
     bad = "a rigid body is deformed by {worst}"
 

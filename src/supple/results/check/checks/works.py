@@ -59,6 +59,7 @@ class Works(FrameCheck):
     """
 
     name = "works"
+    needs = frozenset({"recording"})
     bad = "differ by {worst} from those of the frames"
 
     def begin(self) -> None:

@@ -1,0 +1,1 @@
+"""Series of meshes, one for each frame, as other programs write them."""

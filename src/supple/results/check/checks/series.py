@@ -1,0 +1,118 @@
+"""Checks of the order of frames, of what they are made of, and of their unit of length."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.results.check.frame_check import FrameCheck
+from supple.results.check.report import CheckResult
+from supple.results.check.snapshot import Snapshot
+
+# A time step differs from the others by more than this share of them.
+_SAME_STEP = 0.01
+# A step is twice as long as those before and after it, within this share of it; they agree with each other as well.
+_TWICE, _ALIKE = 0.05, 0.2
+# Motion that is slower than this share of the size per frame is round-off.
+_MOVING = 1e-6
+# Between two frames, sides become longer or shorter by no larger factor.
+_LARGEST_FACTOR = 2.0
+
+
+class Cells(FrameCheck):
+    """Every frame has the points and cells of the first one."""
+
+    name = "cells"
+    needs = frozenset({"files"})
+    sees_all = True
+    needs_frames = False
+    unit = "cells"
+    good = "every frame has the cells of the first"
+    bad = "a frame has other cells than the first"
+
+    def see(self, at: Snapshot) -> None:
+        self.tally.see(at, 0.0, at.other is not None, at.other or "")
+
+    def result(self) -> CheckResult:
+        return super().result() if self.tally.failed_frames else self.passed()
+
+
+class Gaps(FrameCheck):
+    """No frame is missing or is there twice: by numbers in names of files, by times, and by the motion itself.
+
+    Where one frame of a smooth motion is missing, all points move by the sum of the steps before and after.
+    """
+
+    name = "sequence"
+    needs = frozenset({"files"})
+    good = "no frame is missing or repeated"
+    bad = "a frame is missing or repeated"
+
+    def begin(self) -> None:
+        self._frames: list[Snapshot] = []
+        recording = self.scene.recording
+        for what, values in (("file", self.scene.file_steps), ("time", recording.times)):
+            if values is None or len(values) < 2:
+                continue
+            steps = np.diff(values)
+            usual = float(np.median(steps))
+            wrong = np.flatnonzero(~(np.abs(steps - usual) <= _SAME_STEP * abs(usual)) | ~(steps > 0))
+            if len(wrong) and self.settings.every == 1:
+                k = int(wrong[0])
+                a, b = values[k], values[k + 1]
+                self.tally.see(self.scene.snapshot(k + 1), 1.0, True, f"{what} {b:.9g} comes after {what} {a:.9g}")
+
+    def see(self, at: Snapshot) -> None:
+        if self._frames and at.number != self._frames[-1].number + 1:
+            self._frames = []
+        self._frames = [*self._frames[-3:], at]
+        if len(self._frames) < 4:
+            return
+        one, two, three = (
+            later.positions - earlier.positions
+            for earlier, later in zip(self._frames[:-1], self._frames[1:], strict=True)
+        )
+        length = float(np.linalg.norm(two))
+        neighbours = one + three
+        size = self.scene.size * np.sqrt(len(two))
+        mean = 0.5 * float(np.linalg.norm(neighbours))
+        if mean <= _MOVING * size:
+            return
+        alike = float(np.linalg.norm(one - three)) <= _ALIKE * mean
+        if alike and float(np.linalg.norm(two - neighbours)) <= _TWICE * length:
+            where = (
+                f"between frames {at.number - 2} and {at.number - 1} everything moves twice as far as before and after"
+            )
+            self.tally.see(self._frames[2], 1.0, True, where)
+        if alike and length == 0.0:
+            self.tally.see(self._frames[2], 1.0, True, f"repeats frame {at.number - 2} although everything moves")
+
+    def result(self) -> CheckResult:
+        return super().result() if self.tally.failed_frames else self.passed()
+
+
+class Scale(FrameCheck):
+    """The unit of length does not change: sides do not become twice as long, or half as long, from frame to frame."""
+
+    name = "scale"
+    good = "largest factor {worst} between the lengths of sides of two frames"
+    bad = "lengths of sides change by a factor of {worst}: is the unit another one?"
+
+    def begin(self) -> None:
+        triangles = self.scene.surfaces.triangles
+        # A thousand sides tell as much as a million.
+        self._sides = triangles[:: max(1, len(triangles) // 1000), :2]
+        self._last: NDArray[np.float64] | None = None
+
+    def see(self, at: Snapshot) -> None:
+        lengths = np.linalg.norm(at.points[self._sides[:, 0]] - at.points[self._sides[:, 1]], axis=1)
+        if self._last is not None:
+            longer = float(np.median(lengths)) / max(float(np.median(self._last)), 1e-300)
+            factor = max(longer, 1.0 / max(longer, 1e-300))
+            self.tally.see(at, factor, not factor < _LARGEST_FACTOR)
+        self._last = lengths
+
+    def result(self) -> CheckResult:
+        if self.tally.worst is None:
+            self.why_not = "there is one frame only"
+        return super().result()

@@ -1,0 +1,1 @@
+"""Series of other programs as the checks see them."""

@@ -1,0 +1,203 @@
+"""Generated series of soft bodies without faults, faults to plant in them, and writers of many formats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import meshio
+import numpy as np
+
+import supple as sp
+from supple.mesh.io import obj, ply, vtk_xml
+
+FRAMES, DT = 9, 1 / 60
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Positions (frames, n, 3), tets, and triangles of the boundary and of a sheet; `numbers` of the frames."""
+
+    positions: np.ndarray
+    tets: np.ndarray
+    triangles: np.ndarray
+    numbers: np.ndarray
+
+
+def clean(seed: int) -> Frames:
+    """Two boxes, one above the other, that move, turn and shear (which keeps volumes), a sheet between them, and a tet
+    that stands on the plane z = 0 beside them."""
+    random = np.random.default_rng(seed)
+    counts = tuple(int(k) for k in random.integers(1, 4, 3))
+    box = sp.shapes.box((1.0, 1.0, 1.0), counts)
+    v = np.array(box.vertices) + 0.5
+    side = 3
+    grid = np.stack(np.meshgrid(np.linspace(-1, 2, side + 1), np.linspace(-1, 2, side + 1), indexing="ij"), axis=-1)
+    sheet = np.column_stack([grid.reshape(-1, 2), np.full((side + 1) ** 2, 1.5)]) + random.uniform(-0.1, 0.1, 3)
+    row = lambda i, j: i * (side + 1) + j  # noqa: E731
+    cloth = np.array(
+        [t for i in range(side) for j in range(side)
+         for t in ([row(i, j), row(i + 1, j), row(i + 1, j + 1)], [row(i, j), row(i + 1, j + 1), row(i, j + 1)])]
+    )  # fmt: skip
+    alone = np.array([[4.0, 0, 0], [5, 0, 0], [4, 1, 0], [4, 0, 1]])
+    spin, shear = random.uniform(-2, 2), random.uniform(-0.3, 0.3)
+    frames = []
+    middle = FRAMES // 2
+    for k in range(FRAMES):
+        t = (k - middle) * DT
+        angle = spin * t
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        bend = np.array([[1, 0, shear * 3 * t], [0, 1, 0], [0, 0, 1]])
+        low = v @ (turn @ bend).T + [0.4 * t, 0, 0.7 * t]
+        high = v @ turn + [0.1, 0.2, 2.0 - 0.8 * t]
+        wave = sheet + np.array([0, 0, 0.3 * t])
+        frames.append(np.concatenate([low, high, wave, alone + np.array([0.2 * t, 0, 0])]))
+    surface = box.surface.triangles
+    n = len(v)
+    last = 2 * n + len(sheet)
+    tets = np.concatenate([box.tets, box.tets + n, [[last, last + 1, last + 2, last + 3]]])
+    facets = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]) + last
+    triangles = np.concatenate([surface, surface + n, cloth + 2 * n, facets])
+    return Frames(np.stack(frames), tets, triangles, np.arange(FRAMES))
+
+
+def inverted(frames: Frames) -> Frames:
+    """In the middle frame the apex of the tet that stands alone is below its base by 1e-9 of its size."""
+    x = frames.positions.copy()
+    x[FRAMES // 2, frames.tets[-1, 3], 2] = -1e-9
+    return replace(frames, positions=x)
+
+
+def crossing(frames: Frames) -> Frames:
+    """In one frame a vertex of the upper box is below the sheet."""
+    x = frames.positions.copy()
+    n = _corners(frames)
+    lowest = n + int(np.argmin(x[3, n : 2 * n, 2]))
+    x[3, lowest, 2] = x[3, 2 * n, 2] - 0.05
+    return replace(frames, positions=x)
+
+
+def passing(frames: Frames) -> Frames:
+    """From one frame to the next the sheet jumps through the upper box."""
+    x = frames.positions.copy()
+    x[5:, 2 * _corners(frames) : -4, 2] += 2.4
+    return replace(frames, positions=x)
+
+
+def drifting(frames: Frames) -> Frames:
+    """The lower box grows by 1 % in volume over all frames."""
+    x = frames.positions.copy()
+    n = _corners(frames)
+    for k in range(FRAMES):
+        center = x[k, :n].mean(axis=0)
+        x[k, :n] = center + (x[k, :n] - center) * (1.0 + 0.0101 * k / (FRAMES - 1)) ** (1 / 3)
+    return replace(frames, positions=x)
+
+
+def missing(frames: Frames) -> Frames:
+    keep = np.arange(FRAMES) != 4
+    return replace(frames, positions=frames.positions[keep], numbers=frames.numbers[keep])
+
+
+def rescaled(frames: Frames) -> Frames:
+    """From one frame on lengths are in centimetres."""
+    x = frames.positions.copy()
+    x[6:] *= 100.0
+    return replace(frames, positions=x)
+
+
+def broken(frames: Frames) -> Frames:
+    x = frames.positions.copy()
+    x[2, 3, 1] = np.nan
+    return replace(frames, positions=x)
+
+
+def _corners(frames: Frames) -> int:
+    """How many points each box has."""
+    return int(frames.tets[len(frames.tets) // 2 - 1].max()) + 1
+
+
+FAULTS = {
+    "inversion": inverted,
+    "intersection": crossing,
+    "volume": drifting,
+    "sequence": missing,
+    "scale": rescaled,
+    "finite": broken,
+}
+
+
+def write_npz(frames, folder):
+    np.savez(folder / "out.npz", positions=frames.positions, tets=frames.tets, triangles=frames.triangles)
+    return folder / "out.npz"
+
+
+def write_folder(frames, folder):
+    np.save(folder / "positions.npy", frames.positions)
+    np.save(folder / "tets.npy", frames.tets)
+    np.save(folder / "triangles.npy", frames.triangles)
+    return folder
+
+
+def write_mujoco(frames, folder):
+    path = folder / "flex.npz"
+    np.savez(
+        path, flexvert_xpos=frames.positions, flex_elem=frames.tets.ravel(), flex_dim=[3], tri_indices=frames.triangles
+    )
+    return path
+
+
+def _files(frames, folder, suffix, written):
+    for number, x in zip(frames.numbers, frames.positions, strict=True):
+        (folder / f"frame_{number:04}.{suffix}").write_bytes(written(x))
+    return folder
+
+
+def write_obj(frames, folder):
+    return _files(frames, folder, "obj", lambda x: obj.written(x, frames.triangles))
+
+
+def write_ply(frames, folder):
+    return _files(frames, folder, "ply", lambda x: ply.written(x, frames.triangles)) / "frame_*.ply"
+
+
+def _grid(frames, x, path):
+    meshio.Mesh(x, [("tetra", frames.tets), ("triangle", frames.triangles)]).write(path)
+
+
+def write_vtu(frames, folder):
+    for number, x in zip(frames.numbers, frames.positions, strict=True):
+        _grid(frames, x, folder / f"out.{number}.vtu")
+    return folder
+
+
+def write_vtk(frames, folder):
+    for number, x in zip(frames.numbers, frames.positions, strict=True):
+        _grid(frames, x, folder / f"out{number}.vtk")
+    return folder
+
+
+def write_pvd(frames, folder):
+    """Two parts for each time: the tets, and the sheet."""
+    sheet = frames.triangles[~np.isin(frames.triangles, frames.tets).any(axis=1)]
+    rows = []
+    for number, x in zip(frames.numbers, frames.positions, strict=True):
+        for part, cells in (("solid", frames.tets), ("sheet", sheet)):
+            used, own = np.unique(cells, return_inverse=True)
+            name = f"{part}_{number}.vtu"
+            (folder / name).write_bytes(vtk_xml.written_cells(x[used], own.reshape(cells.shape)))
+            rows.append(f'<DataSet timestep="{float(number * DT)!r}" part="{part}" file="{name}"/>')
+    path = folder / "out.pvd"
+    path.write_text(f'<VTKFile type="Collection"><Collection>{"".join(rows)}</Collection></VTKFile>')
+    return path
+
+
+SURFACES = {"obj": write_obj, "ply": write_ply}
+WRITERS = {
+    **SURFACES,
+    "vtu": write_vtu,
+    "vtk": write_vtk,
+    "pvd": write_pvd,
+    "npz": write_npz,
+    "npy": write_folder,
+    "mujoco": write_mujoco,
+}

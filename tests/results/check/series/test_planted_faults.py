@@ -1,0 +1,100 @@
+"""Every planted fault is found in every format, and no series without a fault fails."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from supple.app.cli.app import main
+from supple.results.check.checker import check_series
+
+from .generated import FAULTS, SURFACES, WRITERS, clean
+
+NAMES = list(FAULTS)
+
+
+def can_hold(kind, fault):
+    return not (kind in SURFACES and fault == "inversion")
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_a_series_passes_and_the_same_with_a_fault_fails(tmp_path, kind):
+    seed = list(WRITERS).index(kind)
+    frames = clean(seed)
+    good, bad = tmp_path / "good", tmp_path / "bad"
+    good.mkdir()
+    bad.mkdir()
+    report = check_series(WRITERS[kind](frames, good))
+    assert report.ok, report
+    assert (report["inversion"].verdict == "skipped") == (kind in SURFACES)
+    fault = next(name for name in NAMES[seed % len(NAMES) :] + NAMES if can_hold(kind, name))
+    report = check_series(WRITERS[kind](FAULTS[fault](frames), bad))
+    assert report[fault].verdict == "fail", report
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(25))
+def test_two_hundred_series(tmp_path, seed):
+    """For each seed, in each format: one without a fault, one with a fault of each kind."""
+    for kind, write in WRITERS.items():
+        for fault in (None, *NAMES):
+            if fault is not None and not can_hold(kind, fault):
+                continue
+            folder = tmp_path / f"{kind}_{fault}"
+            folder.mkdir()
+            frames = clean(seed)
+            report = check_series(write(frames if fault is None else FAULTS[fault](frames), folder))
+            if fault is None:
+                assert report.ok, (kind, report)
+            else:
+                assert report[fault].verdict == "fail", (kind, fault, report)
+
+
+def test_the_shell_checks_files_of_other_programs(tmp_path, capsys):
+    frames = clean(3)
+    WRITERS["obj"](FAULTS["volume"](frames), tmp_path)
+    paths = sorted(map(str, tmp_path.glob("*.obj")))
+    assert main(["check", *paths, "--json", str(tmp_path / "report.json")]) == 1
+    out = capsys.readouterr().out
+    assert "FAILED: volume" in out
+    assert "skipped  inversion: the files have no tets" in out
+    assert json.loads((tmp_path / "report.json").read_text())["ok"] is False
+    assert main(["check", str(tmp_path), "--max-volume-change", "0.02", "-q"]) == 0
+
+
+def test_momentum_and_energy_of_a_free_fall(tmp_path):
+    """A box in free fall keeps its energy; with a velocity that grows by itself, energy and momentum do not hold."""
+    box = clean(1)
+    n = int(box.tets[len(box.tets) // 2 - 1].max()) + 1
+    tets, x = box.tets[: len(box.tets) // 2], box.positions[0, :n]
+    times = np.arange(20) / 100.0
+    fall = x + 0.5 * times[:, None, None] ** 2 * np.array([0.0, 0.0, -9.81])
+    given = {"density": 1e3, "youngs": 1e5, "poisson": 0.4, "gravity": (0.0, 0.0, -9.81), "free": True}
+    from supple.results.check.series.recording import Given
+
+    for factor, verdict in ((1.0, "pass"), (1.5, "fail")):
+        np.savez(tmp_path / "fall.npz", positions=x + factor * (fall - x), tets=tets, times=times)
+        report = check_series(tmp_path / "fall.npz", Given(**given))
+        assert [report[name].verdict for name in ("momentum", "energy")] == [verdict] * 2, report
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "message"),
+    [
+        ("a.npz", b"no archive", "cannot be read as .npz"),
+        ("a.npz", b"", "it is empty"),
+        ("a.pvd", b"<VTKFile>", "it is not a .pvd file"),
+        ("a.pvd", b'<VTKFile><DataSet timestep="0" file="../../etc/passwd"/></VTKFile>', "outside of its folder"),
+        ("a.vtu.series", b"[[[[", "not a list of a series"),
+        ("f_1.obj", b"v 0 0 0", "it is one mesh"),
+        ("a.stuff", b"1", "nothing to check"),
+    ],
+)
+def test_malformed_files_are_one_line(tmp_path, capsys, name, data, message):
+    (tmp_path / name).write_bytes(data)
+    assert main(["check", str(tmp_path / name)]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert message in err
