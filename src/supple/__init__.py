@@ -18,7 +18,7 @@ supply(
     check="supple.results.check.checker:check_recording",
     export="supple.results.export.exporter:export",
     player="supple.results.player:player_of",
-    plot="supple.results.plots:Plot",
+    plot="supple.results.plots:plot",
     progress="supple.results.progress:ProgressBar",
 )
 

@@ -7,11 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import OutputError
+from supple.results.curves import write_curves
+from supple.results.recording.details import RecordedSensor
 from supple.results.recording.reader import Recording, opened
 from supple.results.view.colors import body_color
 from supple.runtime.figures import MOST_ENTRIES, legend_below, paper_figure, spans_decades
@@ -33,9 +36,12 @@ class Plot:
     Attributes
     ----------
     recording : that is plotted; it must be open
+    x, y : columns of its table; without them, all measurements over time
     """
 
     recording: Recording
+    x: str = "time"
+    y: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -53,23 +59,49 @@ class Plot:
         ------
         OutputError : where it cannot be written.
         """
-        return plot_recording(self.recording, path)
+        if self.y:
+            return write_curves(self.recording, self.x, self.y, Path(path))
+        return write_plot(self.recording, path)
 
 
-def plot_recording(recording: Recording | str | Path, output: str | Path) -> Path:
-    """Draw what a recording has measured over time to a PNG (or PDF, SVG) file.
+def plot(recording: Recording, x: str = "time", y: str | Sequence[str] = ()) -> Plot:
+    """What a recording has measured, which a notebook shows; see `Recording.plot`."""
+    return Plot(recording, x, (y,) if isinstance(y, str) else tuple(y))
+
+
+@overload
+def plot_recording(recording: Recording, output: None = None) -> Plot: ...
+
+
+@overload
+def plot_recording(recording: Recording | str | Path, output: str | Path) -> Path: ...
+
+
+def plot_recording(recording: Recording | str | Path, output: str | Path | None = None) -> Path | Plot:
+    """Draw what a recording has measured over time to a PNG (or PDF, SVG) file; without one, for a notebook.
 
     Energies, works, momenta, volumes, the smallest J, the time of each step; cavities, cables and sensors where there
     are some.
 
     Parameters
     ----------
-    recording : an open recording, or its path; output : the picture, replaced where it exists.
+    recording : an open recording, or its path.
+    output : the picture, replaced where it exists; None: nothing is written, and the last line of a notebook's cell
+        shows the plot of an open recording.
 
     Raises
     ------
     OutputError : where the recording cannot be read, or the picture cannot be written.
     """
+    if output is not None:
+        return write_plot(recording, output)
+    if not isinstance(recording, Recording):
+        raise OutputError(f"plot_recording: {recording}: give the file to write, or open it with read_recording")
+    return Plot(recording)
+
+
+def write_plot(recording: Recording | str | Path, output: str | Path) -> Path:
+    """Draw all measurements over time to a file; see `plot_recording`."""
     output = Path(output)
     with opened(recording) as source:
         more = _panels(source)
@@ -145,8 +177,14 @@ def _panels(recording: Recording) -> list[Callable[[Any, Recording], None]]:
     for name, label in _MAPPINGS.items():
         if name in mappings:
             panels.append(partial(_mapping, name=name, label=label))
-    panels += [_sensors] if recording.sensors else []
-    return [*panels, _strokes] if any(not sensor.is_grid for sensor in recording.sensors) else panels
+    given = [sensor for sensor in recording.sensors if sensor.kind != "driven"]
+    panels += [partial(_sensors, quantity=each) for each in dict.fromkeys(s.reading.quantity for s in given)]
+    return [*panels, _strokes] if any(_has_stroke(recording, sensor) for sensor in recording.sensors) else panels
+
+
+def _has_stroke(recording: Recording, sensor: RecordedSensor) -> bool:
+    numbers = recording.frame_values(sensor.series_name)
+    return sensor.kind == "driven" and bool(numbers[:, :3].any() and (np.nan_to_num(numbers[:, 4:]) != 0.0).any())
 
 
 def _works(axis, recording: Recording) -> None:
@@ -167,24 +205,22 @@ def _mapping(axis, recording: Recording, name: str, label: str) -> None:
     axis.set_ylabel(label)
 
 
-def _sensors(axis, recording: Recording) -> None:
+def _sensors(axis, recording: Recording, quantity: str) -> None:
     for sensor in recording.sensors:
-        values = recording.frame_values(f"sensors/{sensor.number}")
-        normal = values[..., 0].sum(axis=(1, 2)) if sensor.is_grid else values[:, 3]
-        axis.plot(recording.times, normal, label=sensor.name)
-    axis.set_ylabel("normal force on sensors [N]")
+        if sensor.reading.quantity == quantity and sensor.kind != "driven":
+            values = recording.frame_values(sensor.series_name)
+            axis.plot(recording.times, [sensor.reading.of_numbers(row).value for row in values], label=sensor.name)
+    axis.set_ylabel(quantity)
 
 
 def _strokes(axis, recording: Recording) -> None:
-    """The normal force on each force sensor against the way of its center of pressure since it was first pushed."""
+    """The force of each obstacle and pin that moves against its displacement."""
     for sensor in recording.sensors:
-        if not sensor.is_grid:
-            values = recording.frame_values(f"sensors/{sensor.number}")
-            pushed = values[values[:, 3] > 0.0]
-            way = np.linalg.norm(pushed[:, 4:] - pushed[:1, 4:], axis=1)
-            axis.plot(way, pushed[:, 3], marker=".", label=sensor.name)
-    axis.set_xlabel("displacement of the center of pressure [m]")
-    axis.set_ylabel("normal force [N]")
+        if _has_stroke(recording, sensor):
+            columns = sensor.reading.columns(recording.frame_values(sensor.series_name))
+            axis.plot(columns["displacement"], columns["force"], marker=".", label=sensor.name)
+    axis.set_xlabel("displacement [m]")
+    axis.set_ylabel("force on bodies [N]")
 
 
 def _momentum(axis, t: NDArray[np.float64], values: NDArray[np.float64], label: str) -> None:

@@ -32,7 +32,7 @@ from supple.scene.pins import Pin
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rigid.stiffness import with_stiffness
 from supple.scene.selection import InBox
-from supple.scene.sensors import Sensor
+from supple.scene.sensors import Sensor, SurfaceSensor
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
 from supple.scene.suggestion import suggestion
@@ -70,7 +70,7 @@ class Scene(Showable):
     loads : of every kind: `Force`, `SoftTarget`, tractions, pressures, forces per mass, wind, springs between points,
         muscles, and growths. The scene keeps the first two in `forces` and `soft_targets`.
     stitches : joints of bodies with each other, and with triangle obstacles.
-    sensors : of contact on surfaces; no two have the same name.
+    sensors : of contact, angles and distances; no two have the same name.
     cavities : closed inner surfaces filled with gas or liquid; cables : through points of bodies. No two cavities and
         no two cables have the same name.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
@@ -137,7 +137,7 @@ class Scene(Showable):
                 load.check(self.bodies)
         for i, sensor in enumerate(self.sensors):
             with at("sensors", i):
-                sensor.triangles(self.bodies)
+                sensor.check(self.bodies, [str(obstacle.name) for obstacle in self.obstacles])
                 _check_own_name("sensor", sensor, self.sensors[:i])
         for i, cavity in enumerate(self.cavities):
             with at("cavities", i):
@@ -167,6 +167,8 @@ class Scene(Showable):
         skins = {body.name for body in self.bodies if body.touches_with_skin and not isinstance(body, RigidBody)}
         for key, names in (("stitches", ("first", "second")), ("welds", ("body",)), ("sensors", ("body",))):
             for i, item in enumerate(getattr(self, key)):
+                if isinstance(item, Sensor) and not isinstance(item, SurfaceSensor):
+                    continue
                 for name in names:
                     if getattr(item, name) in skins:
                         with at(key, i, name):

@@ -1,8 +1,11 @@
-"""Sensors of contact on the surfaces of bodies."""
+"""Sensors: forces of contact on surfaces and between two things, angles and distances.
+
+What they feel is computed in `supple.results.readings.sensor_readings`.
+"""
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -11,20 +14,45 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import Counts, Name, Vector
+from supple.kinds.forms import Counts, Direction, Name, Vector
 from supple.kinds.kind import Kind
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TRIANGLES, Region, body_of, surface_region
+from supple.scene.loads.points import Point, PointForm, point_corners
+from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.selection import OnVertices, Selection, Vertices
+from supple.scene.suggestion import suggestion
 
 MOST_CELLS = 1_000_000
 
 
 class Sensor(Kind, ABC):
-    """The base class of sensors: a name, and a region of the surface of one body; see `OnSurface`."""
+    """The base class of sensors, which have a name."""
 
     name: str
+
+    @property
+    @abstractmethod
+    def bodies(self) -> tuple[str, ...]:
+        """The names of the bodies, and obstacles, that it belongs to."""
+
+    @abstractmethod
+    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+        """Raise `SceneError` where it does not fit these bodies, and the names of obstacles."""
+
+
+class SurfaceSensor(Sensor):
+    """The base class of sensors on a region of the surface of one body; see `OnSurface`."""
+
     body: str
     region: Region
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return (self.body,)
+
+    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+        self.triangles(bodies)
 
     def triangles(self, bodies: Sequence[PlacedBody]) -> NDArray[np.int64]:
         """The rows (t,) of the surface's triangles that it feels.
@@ -37,7 +65,7 @@ class Sensor(Kind, ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class ForceSensor(Sensor):
+class ForceSensor(SurfaceSensor):
     """The force of all contacts on a part of the surface of a body.
 
     Parameters
@@ -61,7 +89,7 @@ class ForceSensor(Sensor):
 
 
 @dataclass(frozen=True, eq=False)
-class Taxels(Sensor):
+class Taxels(SurfaceSensor):
     """A grid of cells on the surface of a body that feel normal and shear force.
 
     The grid is a parallelogram in the coordinates of the body's mesh at rest. What touches the surface belongs to the
@@ -99,4 +127,115 @@ class Taxels(Sensor):
             raise SceneError(f"{self.label}: cells is {self.cells!r}; give at most {MOST_CELLS} cells")
 
 
-SENSORS: tuple[type[Sensor], ...] = (ForceSensor, Taxels)
+@dataclass(frozen=True, eq=False)
+class ContactSensor(Sensor):
+    """The force of contact between two bodies, or a body and an obstacle.
+
+    Parameters
+    ----------
+    name : under which frames have it: `frame.sensors["grip"].force`, which acts on the first.
+    first, second : names of bodies or obstacles.
+
+    Raises
+    ------
+    SceneError : where both are the same.
+    """
+
+    kind: ClassVar[str] = "contact"
+    title: ClassVar[str] = "contact sensor"
+
+    name: Annotated[str, Name()]
+    first: Annotated[str, Name()]
+    second: Annotated[str, Name()]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.first == self.second:
+            raise SceneError(f"{self.label}: first and second are both {self.first!r}; give two names")
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return self.first, self.second
+
+    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+        known = [*(body.name for body in bodies), *obstacles]
+        for name in self.bodies:
+            if name not in known:
+                raise SceneError(f"{self.label}: there is no body or obstacle {name!r}; {suggestion(name, known)}")
+
+
+@dataclass(frozen=True, eq=False)
+class AngleSensor(OnVertices, Sensor):
+    """The angle by which vertices of a body have turned since they were placed.
+
+    It is that of the rotation that fits them best (Kabsch, "A solution for the best rotation to relate two sets of
+    vectors", 1976), in (-pi, pi] about an axis that is given, otherwise from 0 to pi.
+
+    Parameters
+    ----------
+    name : under which frames have it: `frame.sensors["bend"].angle`.
+    body : name of the body.
+    vertices : three or more, not on one line: indices into the body's mesh, or an `InBox`; None for a rigid body.
+    axis : (3,) about which the angle is measured, in the world; None for the axis of the rotation.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind.
+    """
+
+    kind: ClassVar[str] = "angle"
+    title: ClassVar[str] = "angle sensor"
+
+    name: Annotated[str, Name()]
+    body: Annotated[str, Name()]
+    vertices: Annotated[Selection | None, Vertices()] = None
+    axis: Annotated[ArrayLike | None, Direction()] = None
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return (self.body,)
+
+    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+        body = body_of(self.body, bodies, self.label)
+        self.check_kind_of_body(isinstance(body, RigidBody))
+        placed = body.place(body.points)
+        chosen = placed[self.select(placed)]
+        if np.linalg.matrix_rank(chosen - chosen.mean(axis=0), tol=1e-6 * float(np.ptp(placed))) < 2:
+            raise SceneError(
+                f"{self.label}: its {len(chosen)} vertices are on one line; select three or more that are not"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceSensor(Sensor):
+    """The distance of two points of bodies, or of a body and the world.
+
+    Parameters
+    ----------
+    name : under which frames have it: `frame.sensors["gap"].distance`.
+    first, second : ("finger", 12), a vertex of a body's mesh, or of a rigid body's surface; ("finger", (x, y, z)), a
+        place inside of it in its own coordinates [m], and anywhere for a rigid body; or (None, (x, y, z)), a fixed
+        place in the world.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind.
+    """
+
+    kind: ClassVar[str] = "distance"
+    title: ClassVar[str] = "distance sensor"
+
+    name: Annotated[str, Name()]
+    first: Annotated[Point, PointForm()]
+    second: Annotated[Point, PointForm()]
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return tuple(name for name, _ in (self.first, self.second) if name is not None)
+
+    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+        for key in ("first", "second"):
+            point_corners(getattr(self, key), bodies, f"{self.label}: {key}")
+
+
+SENSORS: tuple[type[Sensor], ...] = (ForceSensor, Taxels, ContactSensor, AngleSensor, DistanceSensor)

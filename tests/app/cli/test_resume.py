@@ -159,7 +159,14 @@ def test_a_demo_resumes(folder, capfd):
 
 
 @pytest.mark.parametrize(
-    ("every", "kept"), [("3", ["0", "6", "8"]), ("0", ["0", "8"]), ("1", ["0", "7", "8"]), ("100", ["0", "8"])]
+    ("every", "kept"),
+    [
+        ("3", ["0", "6", "8"]),
+        ("0", ["0", "8"]),
+        ("1", ["0", "7", "8"]),
+        ("100", ["0", "8"]),
+        ("1e-9s", ["0", "7", "8"]),
+    ],
 )
 def test_the_interval_of_checkpoints(folder, every, kept):
     assert main(["run", "scene.yaml", *QUIET, "--checkpoint-every", every]) == ExitCode.OK
@@ -173,8 +180,9 @@ def test_the_interval_of_checkpoints(folder, every, kept):
         (["resume", "nowhere"], "nowhere: is not a run folder"),
         (["resume", "meshes"], "meshes: is not a run folder"),
         (["resume", "scene.yaml"], "scene.yaml: is not a run folder"),
-        (["run", "scene.yaml", "--checkpoint-every", "-1"], "--checkpoint-every is -1"),
+        (["run", "scene.yaml", "--checkpoint-every", "-1"], "-1 is below zero"),
         (["run", "scene.yaml", "--checkpoint-every", "1.5"], "not a whole number"),
+        (["run", "scene.yaml", "--checkpoint-every", "xs"], "not a time such as 30s"),
         (["info", "meshes"], "meshes: is not a run folder"),
     ],
 )
@@ -221,7 +229,7 @@ def test_info_tells_the_story_of_a_run(folder, capsys, monkeypatch):
     assert rows["solver"].startswith("XPBD(substeps=5")
     assert rows["time"] == "8 steps of 0.0166667 s: 0.133333 s"
     assert rows["recording"].startswith("frames 0 to 4, t = 0.0666667 s; ")
-    assert rows["checkpoints"] == "frames 0, 2, 4; every 2 frames"
+    assert rows["checkpoints"] == "frames 0, 2, 4; every 2 frames or 30 s"
     assert rows["session 1"].startswith("interrupted; from frame 0 to 4; 20")
     assert rows["next"] == "supple resume out"
     assert f"numpy {np.__version__}" in rows["versions"]

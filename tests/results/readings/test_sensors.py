@@ -76,7 +76,7 @@ def test_recordings_and_tables_have_the_sensors(resting, tmp_path):
     frame, _, path = resting
     with sp.read_recording(path) as recording:
         last = recording[-1].sensors
-        assert list(last) == [sensor.name for sensor in SENSORS]
+        assert list(last) == [*(sensor.name for sensor in SENSORS), "floor"]
         for name, reading in frame.sensors.items():
             np.testing.assert_array_equal(last[name].numbers(), reading.numbers())
         assert not recording[0].sensors["all"].force.any()
@@ -169,3 +169,76 @@ def test_bad_sensors_are_one_line(make, message):
     with pytest.raises(sp.SceneError, match=message) as error:
         sp.Scene([sp.Body("block", MESH, RUBBER)], sensors=make())
     assert "\n" not in str(error.value)
+
+
+ALUMINIUM = 2700.0
+TURN = sp.Keyframes(times=[0.0, 1.0], angles=[0.0, 0.3], axis=(0, 0, 1))
+
+
+def test_angles_and_distances_are_those_of_the_motion():
+    plate = sp.RigidBody("plate", sp.shapes.box((0.2, 0.02, 0.2), (1, 1, 1)), density=ALUMINIUM, rotation=(0, 0.5, 0))
+    block = sp.Body("block", MESH, RUBBER, position=(1, 0, 0))
+    right = sp.InBox((1.09, -1, -1), (2, 1, 1))
+    sensors = [
+        sp.AngleSensor("about z", "plate", axis=(0, 0, -2)),
+        sp.AngleSensor("about y", "plate", axis=(0, 1, 0)),
+        sp.AngleSensor("any", "plate"),
+        sp.AngleSensor("end", "block", right),
+        sp.DistanceSensor("gap", ("plate", (0, 0, 0)), (None, (3, 4, 0))),
+        sp.DistanceSensor("width", ("block", 0), ("block", (0.1, -0.05, -0.1))),
+    ]
+    pins = [sp.Pin("plate", motion=TURN, name="turner"), sp.Pin("block", np.arange(len(MESH.vertices)))]
+    scene = sp.Scene([plate, block], pins=pins, sensors=sensors, gravity=(0, 0, 0))
+    *_, frame = sp.simulate(scene, sp.XPBD(substeps=2), dt=0.5, steps=2)
+    feel = frame.sensors
+    angles = [feel[name].angle for name in ("about z", "about y", "any", "end")]
+    np.testing.assert_allclose(angles, [-0.3, 0.0, 0.3, 0.0], atol=1e-7)
+    assert feel["gap"].distance == pytest.approx(5.0, rel=1e-9)
+    assert feel["width"].distance == pytest.approx(0.2, rel=1e-12)
+    assert feel["turner"].angle == pytest.approx(0.3, abs=1e-7)
+    assert feel["block.pin"].angle == 0.0
+
+
+@pytest.mark.parametrize("solver", [sp.Implicit(integrator="static"), sp.XPBD(substeps=60)])
+def test_a_pad_that_is_pressed_has_its_force_displacement_and_work(solver, tmp_path):
+    """The table's force is that of the floor, and the work what the pad stores, for an obstacle and for a pin."""
+    pad = sp.Body("pad", MESH, RUBBER, position=(0, 0.0501, 0))
+    down = sp.Keyframes(times=[0.0, 0.7], displacements=[[0, 0, 0], [0, -0.004, 0]])
+    top = sp.Pin("pad", sp.InBox((-1, 0.1, -1), (1, 1, 1)), motion=down, name="grip")
+    scene = sp.Scene(
+        [pad], [sp.HalfSpace(name="floor")], [top], (0, 0, 0), sensors=[sp.ContactSensor("pair", "pad", "floor")]
+    )
+    sink = sp.Recorder(tmp_path / "r.vtkhdf")
+    *_, frame = sp.simulate(scene, solver, dt=0.1, steps=10, sinks=[sink])
+    with sp.read_recording(sink.path) as recording:
+        table = export(recording, "csv")
+        recording.plot("grip.displacement", ["grip.force", "pair.force"]).save(tmp_path / "curve.svg")
+        with pytest.raises(sp.OutputError, match=r"no column 'grip\.forse' of numbers; did you mean 'grip\.force'\?"):
+            recording.plot("time", "grip.forse").save(tmp_path / "curve.svg")
+    rows = list(csv.DictReader(table.open()))
+    values = {name: float(rows[-1][name]) for name in rows[0] if name.startswith(("grip", "floor", "sensors"))}
+    assert values["grip.displacement"] == pytest.approx(0.004)
+    assert values["grip.force"] == pytest.approx(values["floor.force.y"], rel=0.02)
+    assert values["sensors.pair.y"] == pytest.approx(values["floor.force"], rel=1e-9)
+    assert values["floor.force.y"] == frame.sensors["floor"].force[1]
+    assert values["grip.work"] == pytest.approx(frame.report.elastic_energy, rel=0.1)
+    svg = (tmp_path / "curve.svg").read_text()
+    assert "grip.displacement [m]" in svg
+    assert "sensors.pair.force" in svg
+
+
+@pytest.mark.parametrize(
+    ("sensor", "reason"),
+    [
+        (sp.ContactSensor("a", "block", "flor"), "no body or obstacle 'flor'; did you mean 'floor'"),
+        (sp.AngleSensor("a", "block", [0, 1]), "2 vertices are on one line"),
+        (sp.AngleSensor("a", "block"), "give the vertices"),
+        (
+            sp.DistanceSensor("a", ("block", 9999), (None, (0, 0, 0))),
+            "first: vertex 9999 of body 'block' does not exist",
+        ),
+    ],
+)
+def test_sensors_that_do_not_fit_the_scene(sensor, reason):
+    with pytest.raises(sp.SceneError, match=reason):
+        sp.Scene([sp.Body("block", MESH, RUBBER)], [sp.HalfSpace(name="floor")], sensors=[sensor])

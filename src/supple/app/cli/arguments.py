@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -49,25 +51,41 @@ def pixels(_: Any, tokens: Sequence[Token]) -> tuple[int, int]:
     return int(width), int(height)
 
 
+@dataclass(frozen=True)
+class Checkpoints:
+    """When a run writes checkpoints: after so many frames, and so many seconds by the clock."""
+
+    frames: int | None = 100
+    seconds: float | None = 30.0
+
+
+ON_THE_WAY = Checkpoints()
+
+
+def checkpoints(_: Any, tokens: Sequence[Token]) -> Checkpoints:
+    """A number of frames, or a time such as 30s; 0 for none on the way."""
+    text = tokens[0].value
+    if text.endswith("s"):
+        try:
+            every = float(text[:-1])
+        except ValueError:
+            every = math.nan
+        if not 0.0 < every < math.inf:
+            raise ValueError(f"{text!r} is not a time such as 30s")
+        return Checkpoints(None, every)
+    frames = whole_number(_, tokens)
+    if frames < 0:
+        raise ValueError(
+            f"{frames} is below zero; give a number of frames, a time such as 30s, or 0 for none on the way"
+        )
+    return Checkpoints(frames) if frames else Checkpoints(None, None)
+
+
 Steps = Annotated[int | None, Parameter(converter=steps)]
 Pixels = Annotated[tuple[int, int] | None, Parameter(converter=pixels, n_tokens=1, accepts_keys=False)]
 Seconds = Annotated[float | None, Parameter(converter=seconds)]
-CheckpointEvery = Annotated[int | None, Parameter(converter=whole_number)]
+CheckpointEvery = Annotated[Checkpoints, Parameter(converter=checkpoints, n_tokens=1, accepts_keys=False)]
 Overwrite = Annotated[bool, Parameter(negative="")]
-
-
-def interval(given: int | None) -> int | None:
-    """The number of frames from checkpoint to checkpoint, or None where 0 is given; by default that of `RunFolder`.
-
-    Raises
-    ------
-    OutputError : where it is below zero.
-    """
-    from supple.app.runs.run_folder import CHECKPOINT_EVERY
-
-    if given is not None and given < 0:
-        raise OutputError(f"--checkpoint-every is {given}; give a number of frames, or 0 for none on the way")
-    return CHECKPOINT_EVERY if given is None else given or None
 
 
 def recording_at(path: Path) -> Path:

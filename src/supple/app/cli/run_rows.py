@@ -22,7 +22,9 @@ def run_rows(folder: Path) -> list[tuple[str, str]]:
     run = journal.run
     running = is_locked(folder)
     kept = [str(int(path.stem)) for path in reversed(paths.checkpoints())]
-    every = journal.checkpoint_every
+    every = [f"{n} frames" for n in [journal.checkpoint_every] if n] + [
+        f"{s:g} s" for s in [journal.checkpoint_seconds] if s
+    ]
     rows = [
         ("kind", "run folder"),
         ("scene", _scene(journal)),
@@ -30,7 +32,7 @@ def run_rows(folder: Path) -> list[tuple[str, str]]:
         ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
         ("seed", "none was given" if journal.seed is None else str(journal.seed)),
         ("recording", _recording(paths)),
-        ("checkpoints", f"frames {', '.join(kept)}" + ("" if every is None else f"; every {every} frames")),
+        ("checkpoints", f"frames {', '.join(kept)}" + ("" if not every else f"; every {' or '.join(every)}")),
     ]
     last = journal.sessions[-1]
     for number, session in enumerate(journal.sessions, start=1):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from supple.app.cli.arguments import ON_THE_WAY, Checkpoints
 from supple.app.cli.console import ExitCode, print_error
 from supple.app.cli.interrupts import Interrupts
 from supple.app.runs.contents import RunPaths
@@ -37,7 +38,7 @@ class Products:
     page, plot : whether to write index.html and plot.png to it; compress : whether to compress the complete recording
     fields : to record in addition
     quiet : print neither progress nor summary
-    checkpoint_every : number of frames from checkpoint to checkpoint; None: only at the start and the end
+    checkpoints : when they are written
     overwrite : replace an earlier run in the folder
     """
 
@@ -47,7 +48,7 @@ class Products:
     quiet: bool = False
     compress: bool = False
     fields: tuple[str, ...] = ()
-    checkpoint_every: int | None = None
+    checkpoints: Checkpoints = ON_THE_WAY
     overwrite: bool = False
 
     def files(self, *, wanted: bool = True) -> dict[str, Path]:
@@ -131,7 +132,8 @@ def run_session(
     folder = RunFolder(
         products.folder,
         solver,
-        checkpoint_every=products.checkpoint_every,
+        checkpoint_every=products.checkpoints.frames,
+        checkpoint_seconds=products.checkpoints.seconds,
         overwrite=products.overwrite,
         compress=products.compress,
         fields=products.fields,

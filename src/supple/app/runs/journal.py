@@ -97,7 +97,8 @@ class Journal:
     run : what it is
     origin : where the scene comes from: {"kind": "scene_file", ...}, {"kind": "demo", ...} or {"kind": "python"}
     seed : of the random numbers that the scene was made with, as the caller gave it
-    checkpoint_every : number of frames from checkpoint to checkpoint; None: only at the start and the end
+    checkpoint_every, checkpoint_seconds : number of frames, and time by the clock [s], from checkpoint to checkpoint;
+        both None: only at the start and the end
     compress : whether the complete recording is compressed
     sessions : in order
     fields : recorded in addition
@@ -110,6 +111,7 @@ class Journal:
     compress: bool
     sessions: tuple[Session, ...] = ()
     fields: tuple[str, ...] = ()
+    checkpoint_seconds: float | None = None
 
     def with_session(self, session: Session) -> Journal:
         """With one more session, after the earlier ones."""

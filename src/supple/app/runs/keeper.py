@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -71,6 +72,7 @@ class Keeper:
         self._last: Frame | None = None  # that was recorded
         self._good: Frame | None = None  # the last one that another step may start from
         self._checkpointed = checkpointed
+        self._checkpointed_at = time.monotonic()
         self._first_index: int | None = None  # of the session, once it is in the journal
         self._failure = ""  # the error that interrupted `begin` or `write`
 
@@ -96,8 +98,9 @@ class Keeper:
             self._last = frame
             if frame.report.status.can_go_on:
                 self._good = frame
-                every = self.journal.checkpoint_every
-                if every is not None and frame.index % every == 0:
+                every, seconds = self.journal.checkpoint_every, self.journal.checkpoint_seconds
+                late = seconds is not None and time.monotonic() - self._checkpointed_at >= seconds
+                if late or (every is not None and frame.index % every == 0):
                     self._write_checkpoint(frame)
 
     @contextmanager
@@ -162,7 +165,7 @@ class Keeper:
         """Write a frame that was recorded."""
         self.recorder.sync()  # a power failure must not leave a checkpoint without its frame
         write_checkpoint(self.paths.checkpoint(frame.index), checkpoint_of(frame, self.run))
-        self._checkpointed = frame.index
+        self._checkpointed, self._checkpointed_at = frame.index, time.monotonic()
         self.paths.remove_old_checkpoints()
         self.log.note(f"frame {frame.index}: checkpoint")
 

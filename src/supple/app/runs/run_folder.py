@@ -13,7 +13,8 @@ import numpy as np
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal
 from supple.app.runs.keeper import Keeper, facts_of
-from supple.errors import OutputError
+from supple.errors import OutputError, SceneError
+from supple.kinds.forms import POSITIVE
 from supple.results.frame import Frame
 from supple.results.readings.fields import checked_fields
 from supple.results.recording.recorder import Recorder
@@ -21,7 +22,7 @@ from supple.runtime.lock import FolderLock
 from supple.runtime.replacing import output_error, whole_file
 from supple.solvers.solver import Solver
 
-CHECKPOINT_EVERY = 100
+CHECKPOINT_EVERY, CHECKPOINT_SECONDS = 100, 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +74,9 @@ class RunFolder(FolderSink):
     ----------
     folder : is made where it is missing. While the run lasts, no other one can write to it.
     solver : that of the run
-    checkpoint_every : number of frames from checkpoint to checkpoint; None: only at the start and the end, also where
-        the run stops early. The first checkpoint and the latest two are kept.
+    checkpoint_every : number of frames from checkpoint to checkpoint; None: only by the clock, and at the start and the
+        end, also where the run stops early. The first checkpoint and the latest two are kept.
+    checkpoint_seconds : longest time from checkpoint to checkpoint by the clock [s]; None: only by frames
     overwrite : replace an earlier run in the folder; without it, a folder that contains a recording is an error
     compress : compress the recording when the run ends
     fields : to record in addition; see `Recorder`
@@ -93,6 +95,7 @@ class RunFolder(FolderSink):
         solver: Solver,
         *,
         checkpoint_every: int | None = CHECKPOINT_EVERY,
+        checkpoint_seconds: float | None = CHECKPOINT_SECONDS,
         overwrite: bool = False,
         compress: bool = False,
         fields: Sequence[str] = (),
@@ -108,7 +111,17 @@ class RunFolder(FolderSink):
             raise OutputError(
                 f"checkpoint_every is {checkpoint_every!r}; give a whole number of one or more, or None for none"
             )
-        self._solver, self._every, self._overwrite = solver, checkpoint_every, overwrite
+        if checkpoint_seconds is not None:
+            try:
+                POSITIVE.checked(checkpoint_seconds, "checkpoint_seconds")
+            except SceneError as error:
+                raise OutputError(str(error)) from None
+        self._solver, self._every, self._seconds, self._overwrite = (
+            solver,
+            checkpoint_every,
+            checkpoint_seconds,
+            overwrite,
+        )
         self._compress, self._seed, self._source = bool(compress), seed, source or SceneSource()
         self._fields = tuple(field.name for field in checked_fields(fields))
         self._refuse()
@@ -120,6 +133,7 @@ class RunFolder(FolderSink):
             origin=dict(self._source.origin),
             seed=self._seed,
             checkpoint_every=None if self._every is None else int(self._every),
+            checkpoint_seconds=None if self._seconds is None else float(self._seconds),
             compress=self._compress,
             fields=self._fields,
         )

@@ -23,8 +23,8 @@ def report_columns(recording: Recording) -> dict[str, NDArray[Any]]:
 
     A vector is three columns, `linear_momentum.x` and so on; a mapping of the details one, or three, for each of its
     names, such as `contact_forces.ball.x`. Of a recorded field that is a number, each body has its largest value, such
-    as `von_mises.ball.max`. A force sensor has `sensors.tip.x` and so on, `.normal` and `.center.x` and so on; taxels
-    have the sum `sensors.palm.normal` and the largest cell `sensors.palm.max`. NaN stands for None.
+    as `von_mises.ball.max`. What sensors, obstacles and pins have is in `supple.results.readings.reading`, such as
+    `sensors.tip.normal` and `plate.force`. NaN stands for None.
     """
     columns: dict[str, NDArray[Any]] = {
         "frame": recording.frame_values("index"),
@@ -45,7 +45,8 @@ def report_columns(recording: Recording) -> dict[str, NDArray[Any]]:
         if field.keys is None:
             columns[field.name] = values
     _add_fields(columns, recording)
-    _add_sensors(columns, recording)
+    for sensor in recording.sensors:
+        columns |= sensor.columns(recording.frame_values(sensor.series_name))
     columns["message"] = np.array(recording.messages)
     return columns
 
@@ -61,19 +62,6 @@ def _add_fields(columns: dict[str, NDArray[Any]], recording: Recording) -> None:
             frames = [frame.field(field.name) for frame in recording]
             for name in frames[0] if frames else ():
                 columns[f"{field.name}.{name}.max"] = np.array([values[name].max() for values in frames])
-
-
-def _add_sensors(columns: dict[str, NDArray[Any]], recording: Recording) -> None:
-    for sensor in recording.sensors:
-        values = recording.frame_values(f"sensors/{sensor.number}")
-        name = f"sensors.{sensor.name}"
-        if sensor.is_grid:
-            columns[f"{name}.normal"] = values[..., 0].sum(axis=(1, 2))
-            columns[f"{name}.max"] = values[..., 0].max(axis=(1, 2))
-        else:
-            _add_vectors(columns, name, values[:, :3])
-            columns[f"{name}.normal"] = values[:, 3]
-            _add_vectors(columns, f"{name}.center", values[:, 4:])
 
 
 def write_csv(recording: Recording, output: Path) -> None:

@@ -14,7 +14,9 @@ from supple.model.pin_reactions import balanced_reactions
 from supple.model.state import ContactPoints, SolverDetails, State
 from supple.model.system import System
 from supple.results.readings.by_body import ByBody
-from supple.results.readings.sensor_readings import Reading, sensor_readings
+from supple.results.readings.driven import driven_readings
+from supple.results.readings.reading import Reading
+from supple.results.readings.sensor_readings import sensor_readings
 from supple.results.readings.tet_readings import TetReadings
 
 
@@ -131,8 +133,10 @@ class FrameReadings(TetReadings):
 
     @cached_property
     def sensors(self) -> dict[str, Reading]:
-        """By name, what the scene's sensors feel: `ForceReading` or `TaxelReading`."""
-        return sensor_readings(self.system, self._x, self.contacts)
+        """By name, what the scene's sensors feel, such as `ForceReading`; then a `DrivenReading` of each obstacle and
+        pin, a pin without a name being "BODY.pin"."""
+        contacts = self.contacts if self.system.scene.sensors else None
+        return sensor_readings(self.system, self._x, contacts) | driven_readings(self)
 
     def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:
         return ByBody(values, {part.name: part.points for part in self.system.bodies}, {})

@@ -9,70 +9,31 @@ triangles.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from supple.model.state import ContactPoints
-from supple.model.system import System
-from supple.scene.sensors import ForceSensor, Sensor, Taxels
-
-
-@dataclass(frozen=True, eq=False)
-class ForceReading:
-    """What a `ForceSensor` feels.
-
-    Attributes
-    ----------
-    force : (3,) of all contacts, friction included [N]
-    normal : how hard they push along the inward normals of the triangles [N]
-    center : (3,) the mean place of this push [m]; NaN where nothing touches
-    """
-
-    force: NDArray[np.float64]
-    normal: float
-    center: NDArray[np.float64]
-
-    def numbers(self) -> NDArray[np.float64]:
-        """(7,) all of it, as recordings keep it."""
-        return np.concatenate([self.force, [self.normal], self.center])
-
-    @staticmethod
-    def of_numbers(numbers: NDArray[np.float64]) -> ForceReading:
-        return ForceReading(numbers[:3], float(numbers[3]), numbers[4:])
-
-
-@dataclass(frozen=True, eq=False)
-class TaxelReading:
-    """What `Taxels` feel.
-
-    Attributes
-    ----------
-    normal : (rows, columns) how hard each cell is pushed along the inward normal of the surface [N]
-    shear : (rows, columns, 2) the force along the surface, in the present direction of the grid's first side and across
-        it, towards the second side [N]
-    """
-
-    normal: NDArray[np.float64]
-    shear: NDArray[np.float64]
-
-    def numbers(self) -> NDArray[np.float64]:
-        """(rows, columns, 3) all of it, as recordings keep it."""
-        return np.concatenate([self.normal[:, :, None], self.shear], axis=2)
-
-    @staticmethod
-    def of_numbers(numbers: NDArray[np.float64]) -> TaxelReading:
-        return TaxelReading(numbers[:, :, 0], numbers[:, :, 1:])
-
-
-Reading = ForceReading | TaxelReading
+from supple.model.system import BodyRange, System
+from supple.results.readings.reading import (
+    READINGS,
+    AngleReading,
+    ContactReading,
+    DistanceReading,
+    ForceReading,
+    Reading,
+    TaxelReading,
+)
+from supple.scene.loads.points import Point, point_corners
+from supple.scene.rigid.pose import rotation_of
+from supple.scene.sensors import AngleSensor, ContactSensor, DistanceSensor, Sensor, SurfaceSensor, Taxels
 
 
 def numbers_shape(sensor: Sensor) -> tuple[int, ...]:
     """The shape of `numbers` of a sensor's readings."""
-    return (*sensor.cells, 3) if isinstance(sensor, Taxels) else (7,)
+    return (*sensor.cells, 3) if isinstance(sensor, Taxels) else READINGS[sensor.kind].shape
 
 
 class Touched(NamedTuple):
@@ -88,18 +49,48 @@ def sensor_readings(system: System, x: NDArray[np.float64], contacts: ContactPoi
     sensors = system.scene.sensors
     if not sensors:
         return {}
-    x, rest = system.points.positions(x), system.points.positions(system.rest_positions)
-    touched = _touched(system.triangles, x, contacts)
+    parts = {part.name: part for part in system.bodies}
     found: dict[str, Reading] = {}
+    touched: Touched | None = None
+    points, rest = system.points.positions(x), system.points.positions(system.rest_positions)
     for sensor in sensors:
-        part = next(each for each in system.bodies if each.name == sensor.body)
-        rows = part.triangles.start + sensor.triangles(system.scene.bodies)
-        own = Touched(touched.triangles[rows], touched.forces[rows], touched.normals[rows])
-        if isinstance(sensor, Taxels):
-            found[sensor.name] = _taxels(sensor, own, x, rest)
-        elif isinstance(sensor, ForceSensor):
-            found[sensor.name] = _force(own, x)
+        if isinstance(sensor, SurfaceSensor):
+            touched = touched or _touched(system.triangles, points, contacts)
+            rows = parts[sensor.body].triangles.start + sensor.triangles(system.scene.bodies)
+            own = Touched(touched.triangles[rows], touched.forces[rows], touched.normals[rows])
+            found[sensor.name] = (
+                _taxels(sensor, own, points, rest) if isinstance(sensor, Taxels) else _force(own, points)
+            )
+        elif isinstance(sensor, ContactSensor):
+            force = np.zeros(3) if contacts is None else contacts.force_between(sensor.first, sensor.second)
+            found[sensor.name] = ContactReading(force)
+        elif isinstance(sensor, AngleSensor):
+            found[sensor.name] = AngleReading(_angle(sensor, parts[sensor.body], x))
+        elif isinstance(sensor, DistanceSensor):
+            first, second = (_place(point, system, x) for point in (sensor.first, sensor.second))
+            found[sensor.name] = DistanceReading(float(np.linalg.norm(second - first)))
     return found
+
+
+def _angle(sensor: AngleSensor, part: BodyRange, x: NDArray[np.float64]) -> float:
+    body = part.body
+    start = body.place(body.points)
+    rows = sensor.select(start)
+    turn = Rotation.from_matrix(rotation_of(start[rows], body.embedded.positions(x[part.vertices])[rows]))
+    if sensor.axis is None:
+        return float(turn.magnitude())
+    # The part of the rotation about the axis: swing and twist (Dobrowolski, "Swing-twist decomposition in Clifford
+    # algebra", 2015).
+    *vector, scalar = turn.as_quat(canonical=True)
+    return 2.0 * float(np.arctan2(np.asarray(sensor.axis) @ vector, scalar))
+
+
+def _place(point: Point, system: System, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    name, corners, weights, offset = point_corners(point, system.scene.bodies, "")
+    if name is None:
+        return offset
+    part = next(part for part in system.bodies if part.name == name)
+    return weights @ x[part.vertices][corners]
 
 
 def _touched(triangles: NDArray[np.int32], x: NDArray[np.float64], contacts: ContactPoints | None) -> Touched:

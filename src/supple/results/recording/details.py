@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.model.state import SolverDetails
+from supple.results.readings.driven import driven_names
+from supple.results.readings.reading import READINGS, Columns, Reading
 from supple.results.readings.sensor_readings import numbers_shape
 from supple.results.recording.file import Series
 from supple.scene.scene import Scene
@@ -107,28 +109,48 @@ def _field_like(name: str, value: Any) -> RecordedField:
 
 @dataclass(frozen=True)
 class RecordedSensor:
-    """One sensor.
+    """One sensor of the scene, or an obstacle or pin, which has the kind "driven".
 
     Attributes
     ----------
-    number : in the scene; name : of the sensor
+    number : in the recording; name : of the sensor; kind : one of `READINGS`
     shape : of its numbers; see `numbers` of the readings
     """
 
     number: int
     name: str
+    kind: str
     shape: tuple[int, ...]
 
     @property
-    def is_grid(self) -> bool:
-        """Whether the sensor is a grid of taxels."""
-        return len(self.shape) == 3
+    def series_name(self) -> str:
+        """For `Recording.frame_values`."""
+        return f"sensors/{self.number}"
 
     @property
     def series(self) -> Series:
-        return Series(f"supple/frames/sensors/{self.number}", 1, self.shape)
+        return Series(f"supple/frames/{self.series_name}", 1, self.shape)
+
+    @property
+    def reading(self) -> type[Reading]:
+        """The class of its readings."""
+        return READINGS[self.kind]
+
+    def columns(self, numbers: NDArray[np.float64]) -> Columns:
+        """Columns of a table by name, of all frames' numbers."""
+        prefix = self.name if self.kind == "driven" else f"sensors.{self.name}"
+        return {f"{prefix}.{end}": column for end, column in self.reading.columns(numbers).items()}
+
+    def check(self) -> None:
+        """Raise `ValueError` where this is not what this version writes."""
+        grid = len(self.shape) == 3 and min(self.shape) > 0 and self.shape[2] == 3
+        kind = READINGS.get(self.kind)
+        if kind is None or not (grid if not kind.shape else self.shape == kind.shape):
+            raise ValueError(f"sensor {self.name!r} of the kind {self.kind!r} has numbers of the shape {self.shape}")
 
 
 def recorded_sensors(scene: Scene) -> tuple[RecordedSensor, ...]:
-    """The sensors of a scene."""
-    return tuple(RecordedSensor(k, sensor.name, numbers_shape(sensor)) for k, sensor in enumerate(scene.sensors))
+    """The sensors of a scene, then its obstacles and pins."""
+    given = [(sensor.name, sensor.kind, numbers_shape(sensor)) for sensor in scene.sensors]
+    driven = [(name, "driven", READINGS["driven"].shape) for name in driven_names(scene)]
+    return tuple(RecordedSensor(k, *each) for k, each in enumerate([*given, *driven]))

@@ -17,7 +17,7 @@ from supple.model.state import State
 from supple.results.frame import Report
 from supple.results.readings.by_body import ByBody
 from supple.results.readings.fields import checked_fields
-from supple.results.readings.sensor_readings import ForceReading, Reading, TaxelReading
+from supple.results.readings.reading import Reading
 from supple.results.readings.tet_readings import TetReadings
 from supple.results.recording.contents import RecordedContents
 from supple.results.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series
@@ -133,11 +133,11 @@ class RecordedFrame(TetReadings):
 
     @cached_property
     def sensors(self) -> dict[str, Reading]:
-        """By name, what the sensors felt."""
+        """By name, what the sensors felt, then what obstacles and pins did; see `Frame.sensors`."""
         found: dict[str, Reading] = {}
         for sensor in self.recording.sensors:
             numbers = self.recording._values(sensor.series.path)[self.number]
-            found[sensor.name] = (TaxelReading if sensor.is_grid else ForceReading).of_numbers(numbers)
+            found[sensor.name] = sensor.reading.of_numbers(numbers)
         return found
 
     @cached_property

@@ -80,13 +80,18 @@ class Recording(RecordedContents, Showable, Sequence[RecordedFrame]):
         """
         return supplied("check")(self, progress=progress, **settings)
 
-    def plot(self) -> Any:
+    def plot(self, x: str = "time", y: str | Sequence[str] = ()) -> Any:
         """What was measured over time: energies, works, momenta, volumes, the smallest J, the time of each step.
 
         Cavities, cables and sensors have panels where there are some. A notebook shows the plot where it is the last
         line of a cell; `recording.plot().save("plot.pdf")` writes it.
+
+        Parameters
+        ----------
+        x, y : columns of the table, `recording.plot("plate.displacement", "plate.force")`; with `y`, only these are
+            drawn.
         """
-        return supplied("plot")(self)
+        return supplied("plot")(self, x, y)
 
     def export(self, to: str, output: str | Path | None = None, **film: Any) -> Path:
         """Write the recording in another format; the path of what was written.

@@ -253,8 +253,9 @@ class Recorder:
             file.put(field.series.path, field.stored(getattr(report.details, field.name)))
         if len(frame.state.internal):
             file.put(INTERNAL, frame.state.internal)
+        readings = frame.sensors
         for sensor in recorded_sensors(frame.system.scene):
-            file.put(sensor.series.path, frame.sensors[sensor.name].numbers())
+            file.put(sensor.series.path, readings[sensor.name].numbers())
         for field in self._fields:
             series = field_series(field, len(frame.state.positions), len(frame.system.tets))
             with np.errstate(over="ignore"):  # beyond single precision, a value is infinite

@@ -105,6 +105,11 @@ class Obstacle(Kind, ABC):
             return self.surface_mesh
         return SurfaceMesh(*self.triangles())
 
+    @cached_property
+    def center(self) -> NDArray[np.float64]:
+        """(3,) at time 0: a point of the plane of a half-space, otherwise the mean of the corners [m]."""
+        return self.triangles()[0].mean(axis=0) if self.plane is None else self.plane[0]
+
     @property
     def checked_by_triangles(self) -> bool:
         """Whether checks compare bodies with `triangles`: the surface, or one about a solid that is not convex."""

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import CheckpointEvery, Overwrite, Steps, interval
+from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Overwrite, Steps
 from supple.app.cli.commands.view import Open, Port
 from supple.app.cli.console import ExitCode
 
@@ -23,7 +23,7 @@ def demo(
     trace: Path | None = None,
     page: bool = True,
     plot: bool = True,
-    checkpoint_every: CheckpointEvery = None,
+    checkpoint_every: CheckpointEvery = ON_THE_WAY,
     overwrite: Overwrite = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
     live: Annotated[bool, Parameter(name="--live", negative="")] = False,
@@ -51,7 +51,8 @@ def demo(
     plot
         Write plot.png: energies, momentum, volume ratio and smallest J over time.
     checkpoint_every
-        Number of frames from checkpoint to checkpoint; 0: only at the start and the end. 100 without this.
+        Number of frames from checkpoint to checkpoint, or a time such as 30s; 0: only at the start and the end.
+        Without this, 100 frames or 30 s, whichever is shorter.
     overwrite
         Replace an earlier run in the folder.
     quiet
@@ -116,7 +117,7 @@ def demo(
         page,
         plot,
         quiet,
-        checkpoint_every=interval(checkpoint_every),
+        checkpoints=checkpoint_every,
         overwrite=overwrite,
     )
     products.refuse_a_run()

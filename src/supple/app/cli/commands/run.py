@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import CheckpointEvery, Overwrite, Seconds, Steps, interval
+from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Overwrite, Seconds, Steps
 
 if TYPE_CHECKING:
     from supple.app.scene_file.loader import Run
@@ -28,7 +28,7 @@ def run(
     page: bool | None = None,
     plot: bool | None = None,
     fields: str | None = None,
-    checkpoint_every: CheckpointEvery = None,
+    checkpoint_every: CheckpointEvery = ON_THE_WAY,
     overwrite: Overwrite = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> int:
@@ -64,7 +64,8 @@ def run(
         Fields to record in addition, separated by commas, such as von_mises,contact_force; without this, as the scene
         file specifies. Their cost in bytes is printed before the run.
     checkpoint_every
-        Number of frames from checkpoint to checkpoint; 0: only at the start and the end. 100 without this.
+        Number of frames from checkpoint to checkpoint, or a time such as 30s; 0: only at the start and the end.
+        Without this, 100 frames or 30 s, whichever is shorter.
     overwrite
         Replace an earlier run in the folder.
     quiet
@@ -78,7 +79,7 @@ def run(
     from supple.app.scene_file.loader import load_run
     from supple.app.scene_file.resolved import resolved_scene
 
-    products = Products(output, quiet=quiet, checkpoint_every=interval(checkpoint_every), overwrite=overwrite)
+    products = Products(output, quiet=quiet, checkpoints=checkpoint_every, overwrite=overwrite)
     products.refuse_a_run()
     if trace is not None:
         from supple.runtime.replacing import refuse_to_replace

@@ -12,12 +12,14 @@ from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.tetmesh import TetMesh
 from supple.results.frame import Frame
+from supple.results.readings.reading import AngleReading
 from supple.scene.body import Body
 from supple.scene.loads.cavity import Cavity
 from supple.scene.loads.over_time import Curve
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
+from supple.scene.sensors import AngleSensor
 from supple.solvers.implicit.solver import Implicit
 
 # Cells of one chamber along the finger: two walls, two cells of air, and the slot to the next one.
@@ -62,17 +64,16 @@ def scene(divided: tuple[int, int, int] = MESH) -> Scene:
     finger = Body("finger", bellows(2, WALL, divided).to_order(2), silicone)
     wall = Pin("finger", InBox((-1, -1, -1), (1e-6, 1, 1)), name="wall")
     air = Cavity("finger", pressure=Curve([0.0, STEPS], [0.0, HIGHEST]))
-    return Scene([finger], pins=[wall], cavities=[air], gravity=(0, 0, 0))
+    end = finger.mesh.vertices[:, 0].max()
+    tip = AngleSensor("tip", "finger", InBox((end - 1e-9, -1, -1), (1, 1, 1)), axis=(0, 0, -1))
+    return Scene([finger], pins=[wall], cavities=[air], sensors=[tip], gravity=(0, 0, 0))
 
 
 def bend(frame: Frame) -> float:
     """By which the end of the finger has turned, towards its flat side [degrees]."""
-    rest, x = frame.system.rest_positions, frame.positions["finger"]
-    tip = rest[:, 0] > rest[:, 0].max() - 1e-9
-    a, b = (places[tip] - places[tip].mean(axis=0) for places in (rest, x))
-    U, _, Vt = np.linalg.svd(b.T @ a)
-    R = U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt
-    return float(-np.degrees(np.arctan2(R[1, 0], R[0, 0])))
+    tip = frame.sensors["tip"]
+    assert isinstance(tip, AngleReading)
+    return float(np.degrees(tip.angle))
 
 
 class _Measurement(Measurement):

@@ -165,13 +165,13 @@ def spin(system: System, part: BodyRange, state: State) -> NDArray[np.float64]:
 
 
 def readings(live: LiveScene) -> tuple[Reading, ...]:
-    """The normal force of each sensor, the pressure of each cavity, and the largest tension of each cable."""
+    """The number of each sensor, the pressure of each cavity, and the largest tension of each cable."""
     report, system = live.report, live.system
     found = []
     if system.scene.sensors:
         contacts = None if report.contacts is None else report.contacts()
         for name, reading in sensor_readings(system, live.state.positions, contacts).items():
-            found.append(Reading(name, "N", float(np.sum(reading.normal))))
+            found.append(Reading(name, reading.unit, reading.value))
     for name, cavity in cavity_readings(report.details).items():
         found.append(Reading(name, "Pa", cavity.pressure))
     for name, cable in cable_readings(report.details).items():

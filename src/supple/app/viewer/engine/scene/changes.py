@@ -320,7 +320,7 @@ def without_body(scene: Scene, name: str) -> Scene:
         loads=[load for load in scene.loads if name not in load.bodies],
         cavities=[cavity for cavity in scene.cavities if name not in cavity.bodies],
         cables=[cable for cable in scene.cables if name not in cable.bodies],
-        sensors=[sensor for sensor in scene.sensors if sensor.body != name],
+        sensors=[sensor for sensor in scene.sensors if name not in sensor.bodies],
         soft_targets=[target for target in scene.soft_targets if target.body != name],
         stitches=[stitch for stitch in scene.stitches if name not in (stitch.first, stitch.second)],
         joints=[joint for joint in scene.joints if name not in (joint.first, joint.second)],
