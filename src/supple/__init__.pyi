@@ -79,7 +79,6 @@ from .scene.rigid.rigid_body import RigidBody as RigidBody
 from .scene.scene import Scene as Scene
 from .scene.selection import InBox as InBox
 from .scene.sensors import AngleSensor as AngleSensor
-from .scene.sensors import ContactSensor as ContactSensor
 from .scene.sensors import DistanceSensor as DistanceSensor
 from .scene.sensors import ForceSensor as ForceSensor
 from .scene.sensors import Taxels as Taxels

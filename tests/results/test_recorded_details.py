@@ -78,7 +78,8 @@ def test_a_recording_grows_only_with_its_frames(tmp_path):
         list(sp.simulate(scene, sp.Implicit(), 1 / 60, steps, sinks=[sp.Recorder(path)]))
         sizes[steps] = path.stat().st_size
     points, tets = 16, 12
-    numbers = 3 * (3 + 3 + 2) + 60  # vectors by name, and single numbers of a report
+    driven = 7 * (len(scene.obstacles) + len(scene.pins))
+    numbers = 3 * (3 + 3 + 2) + 60 + driven  # vectors by name, and single numbers of a report
     assert sizes[40] - sizes[20] <= 20 * 8 * (6 * points + tets + 12 * 2 + numbers + recording_module.MESSAGE_BYTES / 8)
 
 

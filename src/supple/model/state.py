@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from typing import Any
 
@@ -93,6 +93,12 @@ class ContactPoints:
         forward = forces[(self.first == a) & (self.second == b)].sum(axis=0)
         backward = forces[(self.first == b) & (self.second == a)].sum(axis=0)
         return np.asarray(forward - backward)
+
+    def of_pair(self, one: str, other: str) -> ContactPoints:
+        """The same contacts; those that are not between the two have no force."""
+        a, b = self._number(one), self._number(other)
+        theirs = ((self.first == a) & (self.second == b)) | ((self.first == b) & (self.second == a))
+        return replace(self, forces=self.forces * theirs[:, None], friction=self.friction * theirs[:, None])
 
     def by_pair(self) -> dict[tuple[str, str], NDArray[np.float64]]:
         """`force_between` of every two that touch, in both orders: by (on, by), (3,) [N]."""

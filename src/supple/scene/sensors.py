@@ -1,4 +1,4 @@
-"""Sensors: forces of contact on surfaces and between two things, angles and distances.
+"""Sensors: forces of contact on surfaces, angles and distances.
 
 What they feel is computed in `supple.results.readings.sensor_readings`.
 """
@@ -66,7 +66,7 @@ class SurfaceSensor(Sensor):
 
 @dataclass(frozen=True, eq=False)
 class ForceSensor(SurfaceSensor):
-    """The force of all contacts on a part of the surface of a body.
+    """The force of all contacts, or of those with one other thing, on a part of the surface of a body.
 
     Parameters
     ----------
@@ -74,6 +74,7 @@ class ForceSensor(SurfaceSensor):
     body : name of the body.
     region : None for the whole surface, an `InBox` that holds all three corners of a triangle at the start, or rows of
         `mesh.surface.triangles`.
+    by : name of the body or obstacle whose contacts are felt; None for all.
 
     Raises
     ------
@@ -86,6 +87,19 @@ class ForceSensor(SurfaceSensor):
     name: Annotated[str, Name()]
     body: Annotated[str, Name()]
     region: Annotated[Region, TRIANGLES] = None
+    by: Annotated[str | None, Name()] = None
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return (self.body,) if self.by is None else (self.body, self.by)
+
+    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+        super().check(bodies, obstacles)
+        known = [name for name in (*(body.name for body in bodies), *obstacles) if name != self.body]
+        if self.by is not None and self.by not in known:
+            raise SceneError(
+                f"{self.label}: there is no other body or obstacle {self.by!r}; {suggestion(self.by, known)}"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,43 +139,6 @@ class Taxels(SurfaceSensor):
             raise SceneError(f"{self.label}: first and second are parallel or zero; give two sides of a grid")
         if self.cells[0] * self.cells[1] > MOST_CELLS:
             raise SceneError(f"{self.label}: cells is {self.cells!r}; give at most {MOST_CELLS} cells")
-
-
-@dataclass(frozen=True, eq=False)
-class ContactSensor(Sensor):
-    """The force of contact between two bodies, or a body and an obstacle.
-
-    Parameters
-    ----------
-    name : under which frames have it: `frame.sensors["grip"].force`, which acts on the first.
-    first, second : names of bodies or obstacles.
-
-    Raises
-    ------
-    SceneError : where both are the same.
-    """
-
-    kind: ClassVar[str] = "contact"
-    title: ClassVar[str] = "contact sensor"
-
-    name: Annotated[str, Name()]
-    first: Annotated[str, Name()]
-    second: Annotated[str, Name()]
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.first == self.second:
-            raise SceneError(f"{self.label}: first and second are both {self.first!r}; give two names")
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return self.first, self.second
-
-    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
-        known = [*(body.name for body in bodies), *obstacles]
-        for name in self.bodies:
-            if name not in known:
-                raise SceneError(f"{self.label}: there is no body or obstacle {name!r}; {suggestion(name, known)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,4 +215,4 @@ class DistanceSensor(Sensor):
             point_corners(getattr(self, key), bodies, f"{self.label}: {key}")
 
 
-SENSORS: tuple[type[Sensor], ...] = (ForceSensor, Taxels, ContactSensor, AngleSensor, DistanceSensor)
+SENSORS: tuple[type[Sensor], ...] = (ForceSensor, Taxels, AngleSensor, DistanceSensor)

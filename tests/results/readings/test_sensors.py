@@ -206,13 +206,13 @@ def test_a_pad_that_is_pressed_has_its_force_displacement_and_work(solver, tmp_p
     down = sp.Keyframes(times=[0.0, 0.7], displacements=[[0, 0, 0], [0, -0.004, 0]])
     top = sp.Pin("pad", sp.InBox((-1, 0.1, -1), (1, 1, 1)), motion=down, name="grip")
     scene = sp.Scene(
-        [pad], [sp.HalfSpace(name="floor")], [top], (0, 0, 0), sensors=[sp.ContactSensor("pair", "pad", "floor")]
+        [pad], [sp.HalfSpace(name="floor")], [top], (0, 0, 0), sensors=[sp.ForceSensor("pair", "pad", by="floor")]
     )
     sink = sp.Recorder(tmp_path / "r.vtkhdf")
     *_, frame = sp.simulate(scene, solver, dt=0.1, steps=10, sinks=[sink])
     with sp.read_recording(sink.path) as recording:
         table = export(recording, "csv")
-        recording.plot("grip.displacement", ["grip.force", "pair.force"]).save(tmp_path / "curve.svg")
+        recording.plot("grip.displacement", ["grip.force", "pair.normal"]).save(tmp_path / "curve.svg")
         with pytest.raises(sp.OutputError, match=r"no column 'grip\.forse' of numbers; did you mean 'grip\.force'\?"):
             recording.plot("time", "grip.forse").save(tmp_path / "curve.svg")
     rows = list(csv.DictReader(table.open()))
@@ -224,13 +224,13 @@ def test_a_pad_that_is_pressed_has_its_force_displacement_and_work(solver, tmp_p
     assert values["grip.work"] == pytest.approx(frame.report.elastic_energy, rel=0.1)
     svg = (tmp_path / "curve.svg").read_text()
     assert "grip.displacement [m]" in svg
-    assert "sensors.pair.force" in svg
+    assert "sensors.pair.normal" in svg
 
 
 @pytest.mark.parametrize(
     ("sensor", "reason"),
     [
-        (sp.ContactSensor("a", "block", "flor"), "no body or obstacle 'flor'; did you mean 'floor'"),
+        (sp.ForceSensor("a", "block", by="flor"), "no other body or obstacle 'flor'; did you mean 'floor'"),
         (sp.AngleSensor("a", "block", [0, 1]), "2 vertices are on one line"),
         (sp.AngleSensor("a", "block"), "give the vertices"),
         (

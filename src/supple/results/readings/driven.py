@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
 from supple.model.pin_reactions import pin_labels
+from supple.model.state import SolverDetails, State
+from supple.model.system import System
 from supple.results.readings.reading import DrivenReading
 from supple.scene.rigid.pose import rotation_of
 from supple.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from supple.results.readings.frame_readings import FrameReadings
 
 _UNKNOWN = np.full(3, np.nan)
 _EQUAL = 1e-9  # displacements of a pin's vertices, over its size
@@ -33,35 +31,30 @@ def driven_names(scene: Scene) -> list[str]:
     return names
 
 
-def driven_readings(frame: FrameReadings) -> dict[str, DrivenReading]:
-    """By name, what the obstacles and pins of a frame do."""
-    system, time, details = frame.system, frame.state.time, frame.report.details
+def driven_readings(
+    system: System, state: State, details: SolverDetails, reactions: Callable[[], Mapping[str, NDArray[np.float64]]]
+) -> dict[str, DrivenReading]:
+    """By name, what the obstacles and pins of a system do.
+
+    reactions : the forces of pins by label; where it raises `SceneError`, they are not known
+    """
     pushes, drags = (getattr(details, name, {}) for name in ("contact_forces", "friction_forces"))
     names = driven_names(system.scene)
     found: dict[str, DrivenReading] = {}
     for name, obstacle in zip(names, system.obstacles, strict=False):
-        R, t = obstacle.pose(time)
-        key = str(obstacle.name)
-        force = -(pushes[key] + drags[key]) if key in pushes and key in drags else _UNKNOWN
-        center = obstacle.center
-        found[name] = DrivenReading(R @ center + t - center, float(Rotation.from_matrix(R).magnitude()), force + 0.0)
-    if system.pins:
-        reaction = _reactions(frame)
-        for name, pin, label in zip(names[len(found) :], system.pins, pin_labels(system), strict=True):
-            there = frame.state.positions[pin.vertices]
-            found[name] = DrivenReading(
-                (there - pin.anchors).mean(axis=0), _turned(pin.anchors, there), reaction(label)
-            )
-    return found
-
-
-def _reactions(frame: FrameReadings) -> Callable[[str], NDArray[np.float64]]:
-    """The reaction of a pin by its label; NaN where the solver and the material do not give it."""
+        R, t = obstacle.pose(state.time)
+        key, center = str(obstacle.name), obstacle.center
+        force = 0.0 - (pushes[key] + drags[key]) if key in pushes and key in drags else _UNKNOWN
+        found[name] = DrivenReading(R @ center + t - center, float(Rotation.from_matrix(R).magnitude()), force)
     try:
-        known = frame.reactions
+        forces = reactions() if system.pins else {}
     except SceneError:
-        known = {}
-    return lambda label: known.get(label, _UNKNOWN)
+        forces = {}
+    for name, pin, label in zip(names[len(found) :], system.pins, pin_labels(system), strict=True):
+        there = state.positions[pin.vertices]
+        moved = (there - pin.anchors).mean(axis=0)
+        found[name] = DrivenReading(moved, _turned(pin.anchors, there), forces.get(label, _UNKNOWN))
+    return found
 
 
 def _turned(before: NDArray[np.float64], after: NDArray[np.float64]) -> float:

@@ -136,7 +136,8 @@ class FrameReadings(TetReadings):
         """By name, what the scene's sensors feel, such as `ForceReading`; then a `DrivenReading` of each obstacle and
         pin, a pin without a name being "BODY.pin"."""
         contacts = self.contacts if self.system.scene.sensors else None
-        return sensor_readings(self.system, self._x, contacts) | driven_readings(self)
+        driven = driven_readings(self.system, self.state, self.report.details, lambda: self.reactions)
+        return sensor_readings(self.system, self._x, contacts) | driven
 
     def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:
         return ByBody(values, {part.name: part.points for part in self.system.bodies}, {})

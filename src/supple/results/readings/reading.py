@@ -124,36 +124,6 @@ class TaxelReading(Reading):
 
 
 @dataclass(frozen=True, eq=False)
-class ContactReading(Reading):
-    """What a `ContactSensor` feels.
-
-    Attributes
-    ----------
-    force : (3,) of contact on the first by the second, friction included [N]
-    """
-
-    quantity: ClassVar[str] = "force between two [N]"
-    shape: ClassVar[tuple[int, ...]] = (3,)
-
-    force: NDArray[np.float64]
-
-    @property
-    def value(self) -> float:
-        return float(np.linalg.norm(self.force))
-
-    def numbers(self) -> NDArray[np.float64]:
-        return self.force
-
-    @classmethod
-    def of_numbers(cls, numbers: NDArray[np.float64]) -> ContactReading:
-        return ContactReading(numbers)
-
-    @classmethod
-    def columns(cls, numbers: NDArray[np.float64]) -> Columns:
-        return vector_columns("", numbers) | {"force": np.linalg.norm(numbers, axis=1)}
-
-
-@dataclass(frozen=True, eq=False)
 class AngleReading(Reading):
     """What an `AngleSensor` feels: `angle`, since the body was placed [rad]."""
 
@@ -256,7 +226,6 @@ class DrivenReading(Reading):
 READINGS: dict[str, type[Reading]] = {
     "force": ForceReading,
     "taxels": TaxelReading,
-    "contact": ContactReading,
     "angle": AngleReading,
     "distance": DistanceReading,
     "driven": DrivenReading,

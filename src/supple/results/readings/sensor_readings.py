@@ -20,7 +20,6 @@ from supple.model.system import BodyRange, System
 from supple.results.readings.reading import (
     READINGS,
     AngleReading,
-    ContactReading,
     DistanceReading,
     ForceReading,
     Reading,
@@ -28,7 +27,7 @@ from supple.results.readings.reading import (
 )
 from supple.scene.loads.points import Point, point_corners
 from supple.scene.rigid.pose import rotation_of
-from supple.scene.sensors import AngleSensor, ContactSensor, DistanceSensor, Sensor, SurfaceSensor, Taxels
+from supple.scene.sensors import AngleSensor, DistanceSensor, ForceSensor, Sensor, SurfaceSensor, Taxels
 
 
 def numbers_shape(sensor: Sensor) -> tuple[int, ...]:
@@ -51,19 +50,19 @@ def sensor_readings(system: System, x: NDArray[np.float64], contacts: ContactPoi
         return {}
     parts = {part.name: part for part in system.bodies}
     found: dict[str, Reading] = {}
-    touched: Touched | None = None
+    touched: dict[str | None, Touched] = {}  # by the one other thing that is felt
     points, rest = system.points.positions(x), system.points.positions(system.rest_positions)
     for sensor in sensors:
         if isinstance(sensor, SurfaceSensor):
-            touched = touched or _touched(system.triangles, points, contacts)
+            by = sensor.by if isinstance(sensor, ForceSensor) else None
+            if by not in touched:
+                felt = contacts if by is None or contacts is None else contacts.of_pair(sensor.body, by)
+                touched[by] = _touched(system.triangles, points, felt)
             rows = parts[sensor.body].triangles.start + sensor.triangles(system.scene.bodies)
-            own = Touched(touched.triangles[rows], touched.forces[rows], touched.normals[rows])
+            own = Touched(*(each[rows] for each in touched[by]))
             found[sensor.name] = (
                 _taxels(sensor, own, points, rest) if isinstance(sensor, Taxels) else _force(own, points)
             )
-        elif isinstance(sensor, ContactSensor):
-            force = np.zeros(3) if contacts is None else contacts.force_between(sensor.first, sensor.second)
-            found[sensor.name] = ContactReading(force)
         elif isinstance(sensor, AngleSensor):
             found[sensor.name] = AngleReading(_angle(sensor, parts[sensor.body], x))
         elif isinstance(sensor, DistanceSensor):
