@@ -18,6 +18,7 @@ NAMES = {
     "rest shape": "no tet is inverted or flat at rest; volumes and masses are above zero",
     "inversion": "no tet is inverted or flat, by the exact sign of its determinant",
     "intersection": "no two surfaces meet, by exact tests of their triangles",
+    "tunnelling": "no surface passes through another one between two frames",
     "obstacles": "no body is in a half-space or a round solid, or outside its room",
     "containment": "nothing is completely inside another thing",
     "distance": "the distance of surfaces is above zero",

@@ -119,6 +119,7 @@ def _corners(frames: Frames) -> int:
 FAULTS = {
     "inversion": inverted,
     "intersection": crossing,
+    "tunnelling": passing,
     "volume": drifting,
     "sequence": missing,
     "scale": rescaled,

@@ -7,8 +7,10 @@ import json
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.app.cli.app import main
 from supple.results.check.checker import check_series
+from supple.results.check.series.recording import Given
 
 from .generated import FAULTS, SURFACES, WRITERS, clean
 
@@ -72,8 +74,6 @@ def test_momentum_and_energy_of_a_free_fall(tmp_path):
     times = np.arange(20) / 100.0
     fall = x + 0.5 * times[:, None, None] ** 2 * np.array([0.0, 0.0, -9.81])
     given = {"density": 1e3, "youngs": 1e5, "poisson": 0.4, "gravity": (0.0, 0.0, -9.81), "free": True}
-    from supple.results.check.series.recording import Given
-
     for factor, verdict in ((1.0, "pass"), (1.5, "fail")):
         np.savez(tmp_path / "fall.npz", positions=x + factor * (fall - x), tets=tets, times=times)
         report = check_series(tmp_path / "fall.npz", Given(**given))
@@ -98,3 +98,21 @@ def test_malformed_files_are_one_line(tmp_path, capsys, name, data, message):
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert message in err
+
+
+def test_what_passes_between_frames(tmp_path):
+    """A box that jumps through one with the same grid, points on points; one that turns beside a wall does not."""
+    box, thin = sp.shapes.box((1, 1, 1), (2, 2, 2)), sp.shapes.box((1, 0.2, 1), (2, 1, 2))
+    x, wall = np.array(box.vertices), np.array(thin.vertices)
+    tets = np.concatenate([box.tets, thin.tets + len(x)])
+    jump = np.stack([np.concatenate([x + np.array([0, y, 0]), wall]) for y in (1.0, 1.0, -1.0, -1.0)])
+    angles = np.arange(8) * 0.1 - 0.35
+    arcs = []
+    for angle in angles:
+        turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        arcs.append(np.concatenate([x @ turn.T, wall - np.array([0, 0.81, 0])]))
+    for frames, verdict in ((jump, "fail"), (np.stack(arcs), "pass")):
+        np.savez(tmp_path / "a.npz", positions=frames, tets=tets)
+        report = check_series(tmp_path / "a.npz", only=["intersection", "tunnelling"])
+        assert report["intersection"].verdict == "pass"
+        assert report["tunnelling"].verdict == verdict, report

@@ -9,7 +9,7 @@ from supple.runtime.kernel_cache import njit
 
 
 @njit
-def _counts(a, b, owners, allowed, ignored, total):
+def counts(a, b, owners, allowed, ignored, total):
     """Whether a pair of triangles is looked at: its owners may touch each other, and it is not ignored itself."""
     if not allowed[owners[a], owners[b]]:
         return False
@@ -21,7 +21,7 @@ def _counts(a, b, owners, allowed, ignored, total):
 
 
 @njit
-def _push(stack, top, i, j):
+def push(stack, top, i, j):
     if top == len(stack):
         larger = np.empty((2 * len(stack), 2), dtype=np.int64)
         larger[:top] = stack
@@ -55,22 +55,22 @@ def meeting_pairs(x, triangles, owners, allowed, ignored, low, high, order, node
                     b = order[q]
                     if not boxes_meet(low, high, low, high, a, b):
                         continue
-                    if _counts(a, b, owners, allowed, ignored, len(triangles)) and triangles_meet(
+                    if counts(a, b, owners, allowed, ignored, len(triangles)) and triangles_meet(
                         x, triangles[a], triangles[b]
                     ):
                         if found < len(out):
                             out[found, 0], out[found, 1] = a, b
                         found += 1
         elif i == j:
-            stack, top = _push(stack, top, nodes[i, 2], nodes[i, 2])
-            stack, top = _push(stack, top, nodes[i, 3], nodes[i, 3])
-            stack, top = _push(stack, top, nodes[i, 2], nodes[i, 3])
+            stack, top = push(stack, top, nodes[i, 2], nodes[i, 2])
+            stack, top = push(stack, top, nodes[i, 3], nodes[i, 3])
+            stack, top = push(stack, top, nodes[i, 2], nodes[i, 3])
         elif leaf_j or (not leaf_i and nodes[i, 1] - nodes[i, 0] >= nodes[j, 1] - nodes[j, 0]):
-            stack, top = _push(stack, top, nodes[i, 2], j)
-            stack, top = _push(stack, top, nodes[i, 3], j)
+            stack, top = push(stack, top, nodes[i, 2], j)
+            stack, top = push(stack, top, nodes[i, 3], j)
         else:
-            stack, top = _push(stack, top, i, nodes[j, 2])
-            stack, top = _push(stack, top, i, nodes[j, 3])
+            stack, top = push(stack, top, i, nodes[j, 2])
+            stack, top = push(stack, top, i, nodes[j, 3])
     return found
 
 
@@ -95,15 +95,15 @@ def closest_pair(x, triangles, owners, allowed, ignored, low, high, order, nodes
                         continue
                     if _neighbours(triangles[a], triangles[b]):
                         continue
-                    if not _counts(a, b, owners, allowed, ignored, len(triangles)):
+                    if not counts(a, b, owners, allowed, ignored, len(triangles)):
                         continue
                     apart = triangles_apart(x, triangles[a], triangles[b])
                     if apart < best:
                         best, first, second = apart, a, b
         elif i == j:
-            stack, top = _push(stack, top, nodes[i, 2], nodes[i, 3])
-            stack, top = _push(stack, top, nodes[i, 2], nodes[i, 2])
-            stack, top = _push(stack, top, nodes[i, 3], nodes[i, 3])
+            stack, top = push(stack, top, nodes[i, 2], nodes[i, 3])
+            stack, top = push(stack, top, nodes[i, 2], nodes[i, 2])
+            stack, top = push(stack, top, nodes[i, 3], nodes[i, 3])
         else:
             split_i = leaf_j or (not leaf_i and nodes[i, 1] - nodes[i, 0] >= nodes[j, 1] - nodes[j, 0])
             far, near = (
@@ -114,8 +114,8 @@ def closest_pair(x, triangles, owners, allowed, ignored, low, high, order, nodes
                 node_low, node_high, node_low, node_high, near[0], near[1]
             ):
                 far, near = near, far
-            stack, top = _push(stack, top, far[0], far[1])
-            stack, top = _push(stack, top, near[0], near[1])
+            stack, top = push(stack, top, far[0], far[1])
+            stack, top = push(stack, top, near[0], near[1])
     return best, first, second
 
 

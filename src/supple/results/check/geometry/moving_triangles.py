@@ -1,0 +1,180 @@
+"""Whether two triangles whose corners move on straight paths pass through each other on the way.
+
+A corner and a triangle, or two sides, meet where four points are in one plane, at a root of a cubic polynomial of time,
+and the place is in the triangle, or on both sides. These are signs of polynomials: in the basis of Bernstein, a
+polynomial whose coefficients have one sign has it everywhere on the interval. Intervals are halved until the signs of
+all polynomials are known beyond round-off. What is left then, a path through a side or a corner to within 1e-9 of its
+length, counts as passing where the four points turn over.
+
+Source: Farin, "Curves and Surfaces for CAGD" (Bernstein polynomials); the tests are those of Provot (1997).
+"""
+
+import numpy as np
+
+from supple.results.check.geometry.triangle_pairs import triangles_meet
+from supple.runtime.kernel_cache import njit
+
+_DEPTH, _MOST_STEPS = 30, 400
+_EPSILON = 2.0**-52
+
+
+@njit
+def _cross(u, v):
+    return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+
+
+@njit
+def _dot(u, v):
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@njit
+def _between(x0, x1, a, b, t):
+    """x_b - x_a at time t."""
+    s = 1.0 - t
+    return (
+        s * (x0[b, 0] - x0[a, 0]) + t * (x1[b, 0] - x1[a, 0]),
+        s * (x0[b, 1] - x0[a, 1]) + t * (x1[b, 1] - x1[a, 1]),
+        s * (x0[b, 2] - x0[a, 2]) + t * (x1[b, 2] - x1[a, 2]),
+    )
+
+
+@njit
+def _normal(u0, v0, u1, v1):
+    """Coefficients of u x v for u, v that are linear in time."""
+    m, n = _cross(u0, v1), _cross(u1, v0)
+    return _cross(u0, v0), (0.5 * (m[0] + n[0]), 0.5 * (m[1] + n[1]), 0.5 * (m[2] + n[2])), _cross(u1, v1)
+
+
+@njit
+def _range(m, n):
+    """Smallest and largest coefficient of m . n, both of second degree."""
+    a = _dot(m[0], n[0])
+    b = 0.5 * (_dot(m[0], n[1]) + _dot(m[1], n[0]))
+    c = (_dot(m[0], n[2]) + 4.0 * _dot(m[1], n[1]) + _dot(m[2], n[0])) / 6.0
+    d = 0.5 * (_dot(m[1], n[2]) + _dot(m[2], n[1]))
+    e = _dot(m[2], n[2])
+    return min(a, b, c, d, e), max(a, b, c, d, e)
+
+
+@njit
+def _size(u0, u1):
+    return max(abs(u0[0]), abs(u0[1]), abs(u0[2]), abs(u1[0]), abs(u1[1]), abs(u1[2]))
+
+
+@njit
+def _minus(m, n):
+    return (
+        (m[0][0] - n[0][0], m[0][1] - n[0][1], m[0][2] - n[0][2]),
+        (m[1][0] - n[1][0], m[1][1] - n[1][1], m[1][2] - n[1][2]),
+        (m[2][0] - n[2][0], m[2][1] - n[2][1], m[2][2] - n[2][2]),
+    )
+
+
+@njit
+def _state(x0, x1, four, sides, begin, end, largest):
+    """Of one interval: 0 where nothing passes, 1 where something does, 2 where that is not known, 3 where it is not
+    known and the four points turn over.
+
+    four : the corner and the triangle's corners, or the ends of two sides; sides : which of the two
+    """
+    a, b, c, d = four
+    if sides:  # u and v along the sides, w between them
+        u0, u1 = _between(x0, x1, a, b, begin), _between(x0, x1, a, b, end)
+        v0, v1 = _between(x0, x1, c, d, begin), _between(x0, x1, c, d, end)
+        w0, w1 = _between(x0, x1, a, c, begin), _between(x0, x1, a, c, end)
+    else:  # u and v along the triangle b, c, d, w from it to the corner a
+        u0, u1 = _between(x0, x1, b, c, begin), _between(x0, x1, b, c, end)
+        v0, v1 = _between(x0, x1, b, d, begin), _between(x0, x1, b, d, end)
+        w0, w1 = _between(x0, x1, b, a, begin), _between(x0, x1, b, a, end)
+    n = _normal(u0, v0, u1, v1)
+    size = max(_size(u0, u1), _size(v0, v1), _size(w0, w1))
+    error = 32.0 * _EPSILON * size * size * (size + largest)
+    first, last = _dot(n[0], w0), _dot(n[2], w1)
+    second = (2.0 * _dot(n[1], w0) + _dot(n[0], w1)) / 3.0
+    third = (_dot(n[2], w0) + 2.0 * _dot(n[1], w1)) / 3.0
+    lowest, highest = min(first, second, third, last), max(first, second, third, last)
+    if lowest > error or highest < -error or (lowest >= -error and highest <= error):  # or in one plane all the time
+        return 0
+    # Shares along u and v of the place, times |n|^2.
+    along_u, along_v = _normal(w0, v0, w1, v1), _normal(u0, w0, u1, w1)
+    if sides:
+        along_v = _normal(w0, u0, w1, u1)
+    error_4 = 64.0 * _EPSILON * size * size * size * (size + largest)
+    p_low, p_high = _range(along_u, n)
+    q_low, q_high = _range(along_v, n)
+    if p_high < -error_4 or q_high < -error_4:
+        return 0
+    if sides:
+        r_low, r_high = _range(_minus(n, along_u), n)
+        s_low, s_high = _range(_minus(n, along_v), n)
+    else:
+        r_low, r_high = _range(_minus(_minus(n, along_u), along_v), n)
+        s_low, s_high = r_low, r_high
+    if r_high < -error_4 or s_high < -error_4:
+        return 0
+    over = (first > error and last < -error) or (first < -error and last > error)
+    if over and min(p_low, q_low, r_low, s_low) > error_4:
+        return 1
+    return 3 if over else 2
+
+
+@njit
+def points_pass(x0, x1, four, sides):
+    """Whether a corner (the first of four rows) passes through a triangle, or a side (two rows) through another."""
+    largest = 0.0
+    for row in four:
+        for k in range(3):
+            largest = max(largest, abs(x0[row, k]), abs(x1[row, k]))
+    state = _state(x0, x1, four, sides, 0.0, 1.0, largest)
+    if state < 2:
+        return state == 1
+    begin, depth = np.zeros(2 * _DEPTH + 4), np.zeros(2 * _DEPTH + 4, dtype=np.int64)
+    top, steps = 1, 0
+    while top > 0 and steps < _MOST_STEPS:
+        steps += 1
+        top -= 1
+        t, level = begin[top], depth[top]
+        width = 0.5**level
+        state = _state(x0, x1, four, sides, t, t + width, largest)
+        if state == 1:
+            return True
+        if state == 0:
+            continue
+        if level == _DEPTH:
+            if state == 3:
+                return True
+            continue
+        begin[top], depth[top] = t + 0.5 * width, level + 1
+        begin[top + 1], depth[top + 1] = t, level + 1
+        top += 2
+    return False
+
+
+@njit
+def _is_in(row, t):
+    return row == t[0] or row == t[1] or row == t[2]
+
+
+@njit
+def triangles_pass(x0, x1, s, t):
+    """Whether two triangles, three rows each, pass through each other between x0 and x1, where they do not meet."""
+    passing = False
+    for i in range(3):
+        if not _is_in(s[i], t) and points_pass(x0, x1, (s[i], t[0], t[1], t[2]), False):
+            passing = True
+            break
+        if not _is_in(t[i], s) and points_pass(x0, x1, (t[i], s[0], s[1], s[2]), False):
+            passing = True
+            break
+        a, b = s[i], s[(i + 1) % 3]
+        if _is_in(a, t) or _is_in(b, t):
+            continue
+        for j in range(3):
+            c, d = t[j], t[(j + 1) % 3]
+            if not _is_in(c, s) and not _is_in(d, s) and points_pass(x0, x1, (a, b, c, d), True):
+                passing = True
+                break
+        if passing:
+            break
+    return passing and not triangles_meet(x0, s, t) and not triangles_meet(x1, s, t)
