@@ -69,7 +69,7 @@ class RowContact:
         ws.previous, ws.velocities = self.begin_nodes[:n], self.speeds[:n]
         self._poses = ObstaclePoses(system.obstacles)
         self._shapes = RowShapes(system, self._poses)
-        self.lists = Lists(surface, self._shapes, self.gap)
+        self.lists = Lists(system, surface, self._shapes, self.gap)
         self.tets = Tets.of(system, count)
         self._rows = Rows.room(1024)
         self._chosen = np.zeros(0, dtype=np.bool_)

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from trials.xpbd_rows.pairs import SHAPE, Pairs, describe_pairs, near_pairs
 from trials.xpbd_rows.search import PatchSearch
@@ -20,10 +21,10 @@ from trials.xpbd_rows.surface import RowSurface
 
 # Of the mean edge: how far nodes may leave their expected places; and the share of it from which lists are renewed
 # before a substep rather than after it, and from which a node is searched together with those that must be.
-WIDE, NEAR = 0.13, 0.05
+WIDE, NEAR = .13, .05
 SOON, TOGETHER = 0.7, 0.5
 # Of the mean edge: how far the fastest node goes while the wide list is valid; the number of substeps of the near list.
-WAY, STEPS = 0.6, 6
+WAY, STEPS = .6, 6
 
 
 class _Expected:
@@ -42,10 +43,10 @@ class Lists:
     gap : the distance that surfaces keep [m]; skin : the distance from shapes [m]
     """
 
-    def __init__(self, surface: RowSurface, shapes: RowShapes, gap: float) -> None:
+    def __init__(self, system: System, surface: RowSurface, shapes: RowShapes, gap: float) -> None:
         self._surface, self._shapes, self._gap = surface, shapes, gap
         self._edge = surface.edge_length
-        self._search = PatchSearch(surface)
+        self._search = PatchSearch(system, surface)
         self._left = np.zeros(surface.count, dtype=np.bool_)
         self.searches, self.lists = 0.0, 0
         self.forget()

@@ -20,7 +20,7 @@ from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
 from supple.contact.mesh.obstacles import ObstacleRange, with_obstacles
 from supple.model.system import System
 from supple.numerics.adjacency import Adjacency, adjacency
-from supple.numerics.geometry.box_tree import BoxTree, boxes_of_triangles
+from supple.numerics.sparse.partition import bisected_groups
 from supple.scene.contact_pairs import pair_table
 from supple.solvers.xpbd.assessment.surfaces import colliding_pairs
 from supple.solvers.xpbd.contact.settings import XPBDContact
@@ -152,25 +152,18 @@ def _excluded(mesh: ContactMesh) -> tuple[Adjacency, Adjacency]:
 
 
 def _patches(mesh: ContactMesh, nodes: NDArray[np.int32], rest: NDArray[np.float64]) -> Patches:
-    """Runs of triangles along the Morton curve of each thing at rest."""
+    """Groups of near triangles of each thing at rest."""
     own = mesh.owner[mesh.triangles[:, 0]]
-    tree = BoxTree.over(boxes_of_triangles(rest[nodes], mesh.triangles), own)
-    order = tree.order
-    of_owner = own[order]
-    place = np.arange(len(order)) - np.searchsorted(of_owner, of_owner) if (np.diff(of_owner) >= 0).all() else None
-    if place is None:
-        # Things are in the order of their places; a run begins where the owner changes.
-        begins = np.append(True, of_owner[1:] != of_owner[:-1])
-        place = np.arange(len(order)) - np.flatnonzero(begins)[np.cumsum(begins) - 1]
-    number = (np.cumsum(place % PATCH == 0) - 1).astype(np.int32)
-    q = int(number[-1]) + 1 if len(number) else 0
-    patch_of_triangle = np.empty(len(order), dtype=np.int32)
-    patch_of_triangle[order] = number
+    centers = rest[nodes][mesh.triangles].mean(axis=1)
+    groups = bisected_groups(centers, own, max(1, -(-len(own) // PATCH)))
+    q = len(groups)
+    patch_of_triangle = np.empty(len(own), dtype=np.int32)
+    owner = np.empty(q, dtype=np.int32)
+    for number, group in enumerate(groups):
+        patch_of_triangle[group], owner[number] = number, own[group[0]]
     patch_of_edge = _first(mesh.triangle_edges, patch_of_triangle, len(mesh.edges))
     patch_of_point = _first(mesh.triangles, patch_of_triangle, len(nodes))
-    owner = np.zeros(q, dtype=np.int32)
-    owner[number] = of_owner
-    triangles = adjacency(patch_of_triangle, np.arange(len(order)), q)
+    triangles = adjacency(patch_of_triangle, np.arange(len(own)), q)
     edges = adjacency(patch_of_edge, np.arange(len(mesh.edges)), q)
     points = adjacency(patch_of_point, np.arange(len(nodes)), q)
     of_patch = adjacency(np.repeat(patch_of_triangle, 3), nodes[mesh.triangles].ravel(), q)
