@@ -138,3 +138,33 @@ def test_random_piles_never_cross() -> None:
         for frame in sp.simulate(scene, RowsXPBD(accuracy=0.1), dt=1 / 60, steps=15):
             assert not crossing(frame, scene)
             assert frame.report.min_det_F > 0.0
+
+
+def test_rigid_boxes_stand_and_slide():
+    tower = [
+        sp.RigidBody(
+            f"box{k}",
+            shapes.box_surface((0.1, 0.1, 0.1), (2, 2, 2)),
+            density=1000.0,
+            position=(0.002 * k, 0.051 + 0.102 * k, 0),
+            friction=0.5,
+        )
+        for k in range(4)
+    ]
+    *_, last = sp.simulate(sp.Scene(tower, obstacles=[sp.HalfSpace(friction=0.5)]), RowsXPBD(substeps=20), 1 / 60, 40)
+    assert last.report.kinetic_energy < 1e-4
+    centers = np.array([last.positions[body.name].mean(axis=0) for body in tower])
+    assert np.abs(centers[:, [0, 2]] - [[0.002 * k, 0.0] for k in range(4)]).max() < 3e-4
+    normal = np.array([-np.sin(0.4), np.cos(0.4), 0.0])
+    slope = sp.HalfSpace(point=(0, 0, 0), normal=normal, friction=0.3)
+    box = sp.RigidBody(
+        "box",
+        shapes.box_surface((0.1, 0.1, 0.1), (2, 2, 2)),
+        density=1000.0,
+        position=0.0501 * normal,
+        rotation=(0, 0, 0.4),
+        friction=0.3,
+    )
+    *_, last = sp.simulate(sp.Scene([box], obstacles=[slope]), RowsXPBD(substeps=20), 1 / 60, 60)
+    way = np.linalg.norm(last.positions["box"].mean(axis=0) - 0.05 * normal)
+    assert way == pytest.approx(0.5 * 9.81 * (np.sin(0.4) - 0.3 * np.cos(0.4)), rel=0.02)

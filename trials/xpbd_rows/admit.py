@@ -19,9 +19,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.adjacency import Adjacency
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.rigid.motion import solve_symmetric
+from trials.xpbd_rows.bodies import Bodies, push_node, softness
 from trials.xpbd_rows.pairs import POINT, SHAPE, along
 from trials.xpbd_rows.tets import determinant, least_J, share_of_tet
 
@@ -34,10 +36,23 @@ KEEP_DISTANCE, KEEP_J = 0.1, 0.2
 
 
 class Cuts(NamedTuple):
-    """Room for what was cut: nodes (c, 4) of pairs and tets, and the share (c,) of their motion that is left."""
+    """Room for what was cut: nodes (c, 4) of pairs and tets, their rows or -1, and the shares of motion left."""
 
     nodes: NDArray[np.int32]
+    rows: NDArray[np.int64]
     shares: NDArray[np.float64]
+
+    @classmethod
+    def room(cls, c: int) -> Cuts:
+        """For c cuts."""
+        return cls(np.zeros((c, 4), np.int32), np.zeros(c, np.int64), np.zeros(c))
+
+
+class Movers(NamedTuple):
+    """What nodes on rigid bodies need: the bodies, and the nodes of each of them."""
+
+    bodies: Bodies
+    nodes: Adjacency
 
 
 class Marks(NamedTuple):
@@ -63,6 +78,31 @@ def _shorten(base, points, i, share, marks, count, turn):
         moved = moved or place != points[i, j]
         points[i, j] = place
     return _note(i, marks, count, turn) if moved else count
+
+
+@njit
+def _shorten_all(base, points, i, share, movers, marks, count, turn):
+    """`_shorten`, of the whole body if the node is on one."""
+    b = movers.bodies.body[i]
+    if b < 0:
+        return _shorten(base, points, i, share, marks, count, turn)
+    for k in range(movers.nodes.start[b], movers.nodes.start[b + 1]):
+        count = _shorten(base, points, movers.nodes.items[k], share, marks, count, turn)
+    return count
+
+
+@njit
+def _carry(base, points, i, back, ahead, n, movers, marks, count, turn):
+    """Move a node, or its whole body, along n: `back` at the beginning and `ahead` at the end [m]."""
+    b = movers.bodies.body[i]
+    first, last = (0, 1) if b < 0 else (movers.nodes.start[b], movers.nodes.start[b + 1])
+    for k in range(first, last):
+        v = i if b < 0 else movers.nodes.items[k]
+        for j in range(3):
+            base[v, j] += back * n[j]
+            points[v, j] += ahead * n[j]
+        count = _note(v, marks, count, turn)
+    return count
 
 
 @njit
@@ -106,7 +146,7 @@ def _plane(base, points, rows, e, n, margin):
 
 
 @njit(cache=True)
-def admit(base, points, rows, count, tets, low, moved, keep, nearest, marks, cuts):
+def admit(base, points, movers, rows, count, tets, low, moved, keep, nearest, marks, cuts):
     """Shorten motions from `base` (N, 3) in `points` (N, 4) until the guarantee holds; see the module.
 
     Parameters
@@ -138,18 +178,21 @@ def admit(base, points, rows, count, tets, low, moved, keep, nearest, marks, cut
             for i in range(4):
                 v = tets.nodes[t, i]
                 if points[v, 3] > 0.0:
-                    changed = _shorten(base, points, v, share, marks, changed, rounds)
+                    changed = _shorten_all(base, points, v, share, movers, marks, changed, rounds)
                 if cut < len(cuts.nodes):
                     cuts.nodes[cut, i] = v
             if cut < len(cuts.nodes):
-                cuts.shares[cut] = share
+                cuts.shares[cut], cuts.rows[cut] = share, -1
                 cut += 1
         for e in range(count):
             if marks.planes[e] or rows.kinds[e] == SHAPE:
                 continue
             n = row(rows.normals, e)
             remains = least_distance(rows.distances[e], nearest)
-            if _apart(points, rows, e, n) >= remains:
+            bends = 0.0
+            for i in range(4):
+                bends = max(bends, movers.bodies.bends[rows.nodes[e, i]])
+            if _apart(points, rows, e, n) >= max(remains, min(remains + 2.0 * bends, (1.0 - 1e-6) * rows.distances[e])):
                 continue
             marks.planes[e] = True
             margin = 0.5 * remains
@@ -165,16 +208,14 @@ def admit(base, points, rows, count, tets, low, moved, keep, nearest, marks, cut
                 begin, end = sign * (along(base, v, n) - where), sign * (along(points, v, n) - where)
                 if begin < margin:
                     # What goes where it is told pushes this node before it.
-                    for j in range(3):
-                        base[v, j] += sign * (margin - begin) * n[j]
-                        points[v, j] += sign * max(0.0, margin - end) * n[j]
-                    changed = _note(v, marks, changed, rounds)
+                    back, ahead = sign * (margin - begin), sign * max(0.0, margin - end)
+                    changed = _carry(base, points, v, back, ahead, n, movers, marks, changed, rounds)
                 elif end < margin:
                     share = max(0.0, min(1.0, (begin - margin) / (begin - end))) * (1.0 - 1e-12)
                     least = min(least, share)
-                    changed = _shorten(base, points, v, share, marks, changed, rounds)
+                    changed = _shorten_all(base, points, v, share, movers, marks, changed, rounds)
             if cut < len(cuts.nodes):
-                cuts.shares[cut] = least
+                cuts.shares[cut], cuts.rows[cut] = least, e
                 cut += 1
     marks.stamp[:] = 0
     return cut, rounds
@@ -207,10 +248,11 @@ def count_crossing(points, rows, count, nearest):
 
 
 @njit(cache=True)
-def widen(points, rows, count, gap, most, marks):
+def widen(points, movers, loose, rows, count, gap, most, marks):
     """Widen gaps of pushing pairs that are too narrow by at most `most` [m]; put nodes back onto walls.
 
-    No velocity follows. Returns how many nodes of `marks.changed` moved.
+    No velocity follows. Bodies are shifted by their inverse masses `loose` (b,). Returns how many nodes of
+    `marks.changed` moved.
     """
     moved = 0
     for e in range(count):
@@ -228,15 +270,14 @@ def widen(points, rows, count, gap, most, marks):
             continue
         for i in range(1 if rows.kinds[e] == SHAPE else 4):
             v = rows.nodes[e, i]
-            g = points[v, 3] * rows.weights[e, i] * rows.masses[e] * lack
-            for j in range(3):
-                points[v, j] += g * n[j]
-            moved = _note(v, marks, moved, -1)
+            b = movers.bodies.body[v]
+            g = (loose[b] if b >= 0 else points[v, 3]) * rows.weights[e, i] * rows.masses[e] * lack
+            moved = _carry(points, points, v, 0.0, g, n, movers, marks, moved, -1)
     return moved
 
 
 @njit(cache=True)
-def share_motion(points, begin, velocities, cuts, count):
+def share_motion(points, movers, rows, begin, velocities, cuts, count):
     """Give back what the cuts took: the velocities of the four nodes go over to those of their common rigid motion.
 
     By the share that was cut. In the metric of the masses, the rigid motion is the projection of the motion, so that
@@ -245,6 +286,10 @@ def share_motion(points, begin, velocities, cuts, count):
     """
     for e in range(count):
         part = 1.0 - cuts.shares[e]
+        if _has_body(movers.bodies, cuts.nodes, e):
+            if cuts.rows[e] >= 0:
+                _stop_approach(points, movers.bodies, rows, cuts.rows[e], velocities, part)
+            continue
         total = cx = cy = cz = px = py = pz = 0.0
         told = 0
         for i in range(4):
@@ -271,6 +316,39 @@ def share_motion(points, begin, velocities, cuts, count):
             turned = cross(spin, (begin[v, 0] - cx, begin[v, 1] - cy, begin[v, 2] - cz))
             for j in range(3):
                 velocities[v, j] += part * (mean[j] + turned[j] - velocities[v, j])
+
+
+@njit
+def _has_body(bodies, nodes, e):
+    return max(
+        max(bodies.body[nodes[e, 0]], bodies.body[nodes[e, 1]]), max(bodies.body[nodes[e, 2]], bodies.body[nodes[e, 3]])
+    ) >= 0  # fmt: skip
+
+
+@njit
+def _stop_approach(points, bodies, rows, e, velocities, part):
+    """Take back a part of the approach of a row by opposite impulses; those on bodies go to their twists."""
+    n, speed = row(rows.normals, e), 0.0
+    for i in range(4):
+        v = rows.nodes[e, i]
+        b = bodies.body[v]
+        u = row(velocities, v)
+        if b >= 0:
+            t = bodies.twists
+            turned = cross((t[b, 3], t[b, 4], t[b, 5]), row(bodies.arms, v))
+            u = (u[0] + t[b, 0] + turned[0], u[1] + t[b, 1] + turned[1], u[2] + t[b, 2] + turned[2])
+        speed += rows.weights[e, i] * dot(n, u)
+    soft = softness(points, bodies, rows.nodes, e, (*row(rows.weights, e), rows.weights[e, 3]), n)
+    if not speed < 0.0 or not soft > 0.0:
+        return
+    for i in range(4):
+        v = rows.nodes[e, i]
+        f = -part * speed / soft * rows.weights[e, i]
+        if bodies.body[v] >= 0:
+            push_node(points, bodies, v, (f * n[0], f * n[1], f * n[2]))
+        else:
+            for j in range(3):
+                velocities[v, j] += points[v, 3] * f * n[j]
 
 
 @njit

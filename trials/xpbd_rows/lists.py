@@ -21,10 +21,10 @@ from trials.xpbd_rows.surface import RowSurface
 
 # Of the mean edge: how far nodes may leave their expected places; and the share of it from which lists are renewed
 # before a substep rather than after it, and from which a node is searched together with those that must be.
-WIDE, NEAR = .13, .05
+WIDE, NEAR = 0.13, 0.05
 SOON, TOGETHER = 0.7, 0.5
 # Of the mean edge: how far the fastest node goes while the wide list is valid; the number of substeps of the near list.
-WAY, STEPS = .6, 6
+WAY, STEPS = 0.6, 6
 
 
 class _Expected:

@@ -4,10 +4,10 @@ Let x = M X + r be the places of a body whose places at rest are X, for any matr
 
     |x_P - x_Q| >= s |X_P - X_Q| - |r_P - r_Q| >= s |X_P - X_Q| - e G(P, Q)
 
-with s the least singular value of M, e the largest norm of F - M in tets through which a way from P to Q goes, and G its
-length at rest. For a point and a triangle, or two edges, with nearest places along the unit vector n at rest, this is at
-least s min(n . (X_i - X_j) - (e / s) G(i, j)) over the nodes i, j of both sides, because G may be taken as linear in the
-weights of the nodes. The minimum over all pairs of a patch and its neighbours is tabulated over e / s. Pairs that are
+with s the least singular value of M, e the largest norm of F - M in tets through which a way from P to Q goes, and G
+its length at rest. For a point and a triangle, or two edges, with nearest places along the unit vector n at rest, this
+is at least s min(n . (X_i - X_j) - (e / s) G(i, j)) over the nodes i, j of both sides, because G may be taken as linear in
+the weights of the nodes. The minimum over all pairs of two neighbouring patches is tabulated over e / s. Pairs that are
 too near at rest for that stay in a fixed list.
 
 Source: after Zheng and James, "Energy-based Self-Collision Culling for Arbitrary Mesh Deformations" (2012).
@@ -30,7 +30,7 @@ from trials.xpbd_rows.surface import RowSurface
 
 # e / s of the columns of the table; the column and the share of the mean edge by which a pair is fixed.
 STEP, LEVELS = 0.05, 14
-FIXED_AT, FIXED_BELOW = 6, .36
+FIXED_AT, FIXED_BELOW = 6, 0.36
 
 
 class OwnPairs(NamedTuple):
@@ -83,12 +83,20 @@ def own_pairs(system: System, surface: RowSurface) -> OwnPairs:
     rest = surface.simplices.rest.copy()
     rest[: len(system.rest_positions)] = system.rest_positions
     least = np.full((len(neighbours), LEVELS), np.inf)
-    bodies = p.owner < len(system.bodies)
+    bodies = (p.owner < len(system.bodies)) & s.collide[p.owner, p.owner]
     room = 1024
     while True:
         fixed = np.empty((room, 3), dtype=np.int32), np.empty((room, 3), dtype=np.int32)
         counts = _measure(
-            rest, s, p, system.tets, (start, neighbours, tet_start, tets), bodies, FIXED_BELOW * surface.edge_length, least, fixed
+            rest,
+            s,
+            p,
+            system.tets,
+            (start, neighbours, tet_start, tets),
+            bodies,
+            FIXED_BELOW * surface.edge_length,
+            least,
+            fixed,
         )
         if max(counts) <= room:
             break
@@ -99,7 +107,8 @@ def own_pairs(system: System, surface: RowSurface) -> OwnPairs:
     edge_start, edge_items = adjacency(edges[:, 0], np.arange(len(edges)), len(neighbours))
     return OwnPairs(
         start, neighbours, tet_start, tets, least,
-        point_start, np.ascontiguousarray(points[point_items, 1:]), edge_start, np.ascontiguousarray(edges[edge_items, 1:]),
+        point_start, np.ascontiguousarray(points[point_items, 1:]),
+        edge_start, np.ascontiguousarray(edges[edge_items, 1:]),
     )  # fmt: skip
 
 
@@ -294,7 +303,7 @@ def keeps_apart(own, slot, a, b, means, spread, singular, reach):
 
 @njit
 def _norm(A, B, least):
-    """An upper bound of the spectral norm of the difference D of two matrices, in rows; at most `least`, if it is below.
+    """An upper bound of the spectral norm of the difference D of two matrices; `least`, if it is below.
 
     The Frobenius norm of D^T D bounds the square of the spectral norm better than that of D itself.
     """

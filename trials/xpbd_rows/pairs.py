@@ -26,7 +26,8 @@ class Pairs(NamedTuple):
 
     Attributes
     ----------
-    nodes : (k, 4); kinds : (k,) int8; shapes : (k,) of pairs with a shape, its number
+    nodes : (k, 4); kinds : (k,) int8
+    shapes : (k,) of pairs with a shape, its number; of pairs with a triangle, that of the triangle
     keys : (k,) the parts of the pair as one number, by which impulses are handed on to the next list
     pushes : (k,) whether the pair pushes; pairs of one body that are near each other at rest are only kept apart
     friction : (k,) its coefficient
@@ -101,7 +102,7 @@ def describe_pairs(first, points, edges, simplices, far, pairs):
             pairs.nodes[k, 0] = s.nodes[p]
             for j in range(3):
                 pairs.nodes[k, 1 + j] = s.triangles[t, j]
-            pairs.kinds[k] = POINT
+            pairs.kinds[k], pairs.shapes[k] = POINT, t
             pairs.keys[k] = np.int64(p) * base + t
         else:
             a, b = edges[e - len(points), 0], edges[e - len(points), 1]

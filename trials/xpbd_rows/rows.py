@@ -12,10 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.mat3 import dot, row
+from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from trials.xpbd_rows.pairs import SHAPE, Pairs, along, is_loaded, room_between, weights_of
+from trials.xpbd_rows.bodies import softness
+from trials.xpbd_rows.pairs import EDGES, POINT, SHAPE, Pairs, along, is_loaded, room_between, weights_of
 from trials.xpbd_rows.shapes import Walls
+
+# Edges at a smaller angle [rad] do not push each other.
+PARALLEL = 0.05
 
 
 class Rows(NamedTuple):
@@ -26,7 +30,7 @@ class Rows(NamedTuple):
     pairs : (r,) the number of each row's pair; nodes : (r, 4) its nodes, kinds : (r,) its kind
     weights : (r, 4) c_i; places : (r, 3) q (see `pairs`); normals : (r, 3) n
     targets, distances : (r,) the least n . r, and d [m]
-    masses : (r,) 1 / sum w_i c_i^2, the impulse [kg m] that changes r by one; 0 where nothing can move or pushes
+    masses : (r,) the impulse [kg m] along n that changes n . r by one, see `softness`; 0 where nothing moves or pushes
     friction : (r,); impulses : (r, 3), accumulated [kg m]
     """
 
@@ -53,12 +57,13 @@ class Rows(NamedTuple):
 
 
 @njit(cache=True)
-def detect(begin, end, near, pairs, walls, reach, targets, chosen, moved, first, rows):
+def detect(begin, end, bodies, first_of, near, pairs, walls, reach, targets, chosen, moved, first, rows):
     """Append the rows of all pairs that are not sure to keep `reach` [m] on the way; returns the number of rows.
 
     Parameters
     ----------
     begin : (N, >= 3) x_n; end : (N, 4) places to which nodes would go, and inverse masses
+    first_of : see `Simplices.first`
     near : (m,) the pairs that are asked; walls : of the last of these, those with shapes
     targets : the gap that surfaces keep, and that from shapes [m]
     chosen : (k,) the pairs that are rows already; out
@@ -94,20 +99,55 @@ def detect(begin, end, near, pairs, walls, reach, targets, chosen, moved, first,
         if kind != SHAPE and not loaded and room_between(begin, end, pairs.nodes, k, kind, n) > reach:
             continue
         chosen[k] = True
-        softness = 0.0
         for i in range(4):
             rows.nodes[count, i] = pairs.nodes[k, i]
             rows.weights[count, i] = c[i]
-            softness += end[pairs.nodes[k, i], 3] * c[i] * c[i]
         for j in range(3):
             rows.normals[count, j], rows.places[count, j] = n[j], place[j]
             rows.impulses[count, j] = pairs.impulses[k, j]
         rows.pairs[count], rows.kinds[count] = k, kind
         rows.targets[count], rows.distances[count] = target, d
-        rows.masses[count] = 1.0 / softness if softness > 0.0 and pairs.pushes[k] else 0.0
+        soft = softness(end, bodies, rows.nodes, count, c, n)
+        pushes = pairs.pushes[k]
+        if kind == EDGES:
+            pushes = pushes and _cross(begin, pairs.nodes, k, c)
+        elif kind == POINT:
+            pushes = pushes and _is_own(c, pairs.shapes[k], first_of)
+        rows.masses[count] = 1.0 / soft if soft > 0.0 and pushes else 0.0
         rows.friction[count] = pairs.friction[k]
         count += 1
     return count
+
+
+@njit
+def _is_own(c, t, first_of):
+    """Whether the nearest place of triangle t is in its interior, or on a side or corner of which it is the first.
+
+    So one place of a surface pushes a point once.
+    """
+    if c[1] == 0.0 and c[2] == 0.0:
+        return first_of[t, 2]
+    if c[2] == 0.0 and c[3] == 0.0:
+        return first_of[t, 0]
+    if c[3] == 0.0 and c[1] == 0.0:
+        return first_of[t, 1]
+    if c[1] == 0.0:
+        return first_of[t, 4]
+    if c[2] == 0.0:
+        return first_of[t, 5]
+    return first_of[t, 3] if c[3] == 0.0 else True
+
+
+@njit
+def _cross(x, nodes, k, c):
+    """Whether the nearest places of two edges are within both, and the edges are not parallel.
+
+    Otherwise a point and a triangle carry the load. The nearest places of parallel edges jump along them.
+    """
+    inside = min(min(c[0], c[1]), min(-c[2], -c[3]))
+    a, b = subtract(row(x, nodes[k, 1]), row(x, nodes[k, 0])), subtract(row(x, nodes[k, 3]), row(x, nodes[k, 2]))
+    n = cross(a, b)
+    return inside > 1e-6 and dot(n, n) > PARALLEL**2 * dot(a, a) * dot(b, b)
 
 
 def no_walls() -> Walls:

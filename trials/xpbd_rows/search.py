@@ -131,7 +131,9 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, own, 
                 # Deformed too little for anything but what is near at rest.
                 for i in range(own.point_start[slot], own.point_start[slot + 1]):
                     k, t = own.points[i, 0], own.points[i, 1]
-                    if not _point_near(x, way, s.nodes[k], s.triangles, t, reach) or in_list(s.excluded_triangles, k, t):
+                    if not _point_near(x, way, s.nodes[k], s.triangles, t, reach) or in_list(
+                        s.excluded_triangles, k, t
+                    ):
                         continue
                     if points < len(out_points):
                         out_points[points, 0], out_points[points, 1] = k, t

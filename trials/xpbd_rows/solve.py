@@ -13,14 +13,16 @@ import math
 
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
+from trials.xpbd_rows.bodies import place, push_node, turn_body
 from trials.xpbd_rows.pairs import SHAPE, is_loaded, weights_of
 
 
 @njit
-def vector(x, rows, e):
-    """r of a row at places x."""
+def vector(x, bodies, rows, e):
+    """r of a row at places x and the twists of bodies."""
     a, b, c, d = rows.weights[e, 0], rows.weights[e, 1], rows.weights[e, 2], rows.weights[e, 3]
-    p, q, r, s = row(x, rows.nodes[e, 0]), row(x, rows.nodes[e, 1]), row(x, rows.nodes[e, 2]), row(x, rows.nodes[e, 3])
+    p, q = place(x, bodies, rows.nodes[e, 0]), place(x, bodies, rows.nodes[e, 1])
+    r, s = place(x, bodies, rows.nodes[e, 2]), place(x, bodies, rows.nodes[e, 3])
     o = row(rows.places, e)
     return (
         a * p[0] + b * q[0] + c * r[0] + d * s[0] - o[0],
@@ -30,18 +32,22 @@ def vector(x, rows, e):
 
 
 @njit
-def displace(points, rows, e, f):
-    """Move the nodes of a row by the impulse f on its first side and its opposite on the second."""
+def displace(points, bodies, rows, e, f):
+    """Move what a row pushes by the impulse f on its first side and its opposite on the second."""
     for i in range(4):
-        v = rows.nodes[e, i]
-        g = points[v, 3] * rows.weights[e, i]
-        for j in range(3):
-            points[v, j] += g * f[j]
+        c = rows.weights[e, i]
+        if c != 0.0:
+            push_node(points, bodies, rows.nodes[e, i], (c * f[0], c * f[1], c * f[2]))
 
 
 @njit
-def _turn(points, begin, rows, e, moment):
-    """Put a couple with this moment about x_n on the four nodes, if all of them can move."""
+def _turn(points, bodies, begin, rows, e, moment):
+    """Put a couple with this moment about x_n on a rigid body, or on the four nodes, if all of them can move."""
+    for i in range(4):
+        b = bodies.body[rows.nodes[e, i]]
+        if b >= 0:
+            turn_body(bodies, b, moment)
+            return
     cx = cy = cz = 0.0
     for i in range(4):
         v = rows.nodes[e, i]
@@ -73,7 +79,7 @@ def _turn(points, begin, rows, e, moment):
 
 
 @njit(cache=True)
-def solve(points, begin, rows, count, tolerance, most):
+def solve(points, bodies, begin, rows, count, tolerance, most):
     """Sweep over the rows until no sweep changes an n . r by more than the tolerance [m], at most so many times.
 
     Returns the number of sweeps, and the largest change in the last one [m].
@@ -87,7 +93,7 @@ def solve(points, begin, rows, count, tolerance, most):
             if mass == 0.0:
                 continue
             n, f = row(rows.normals, e), row(rows.impulses, e)
-            r = vector(points, rows, e)
+            r = vector(points, bodies, rows, e)
             s, before = dot(n, r), dot(f, n)
             push = max(0.0, before + (rows.targets[e] - s) * mass)
             if push == 0.0 and before == 0.0:
@@ -103,18 +109,18 @@ def solve(points, begin, rows, count, tolerance, most):
             share = limit / size if size > limit else 1.0
             t = (share * t[0], share * t[1], share * t[2])
             new = (push * n[0] + t[0], push * n[1] + t[1], push * n[2] + t[2])
-            displace(points, rows, e, subtract(new, f))
+            displace(points, bodies, rows, e, subtract(new, f))
             if rows.kinds[e] != SHAPE:
                 m, d = cross(n, subtract(t, held)), rows.distances[e]
                 if m[0] != 0.0 or m[1] != 0.0 or m[2] != 0.0:
-                    _turn(points, begin, rows, e, (-d * m[0], -d * m[1], -d * m[2]))
+                    _turn(points, bodies, begin, rows, e, (-d * m[0], -d * m[1], -d * m[2]))
             for j in range(3):
                 rows.impulses[e, j] = new[j]
     return sweeps, residual
 
 
 @njit(cache=True)
-def push_kept(points, velocities, near, pairs, walls, gap, h):
+def push_kept(points, bodies, velocities, near, pairs, walls, gap, h):
     """Begin a substep with the impulses that are kept, along the normals of now; those that no longer hold are zero."""
     shape = len(near) - len(walls.gaps)
     for m in range(len(near)):
@@ -145,10 +151,13 @@ def push_kept(points, velocities, near, pairs, walls, gap, h):
         if pairs.kinds[k] != SHAPE:
             c, _ = weights_of(points, pairs.nodes, k, pairs.kinds[k])
         for i in range(4):
-            v = pairs.nodes[k, i]
-            g = points[v, 3] * c[i] / h
+            v, g = pairs.nodes[k, i], c[i]
+            f = (g * pairs.impulses[k, 0], g * pairs.impulses[k, 1], g * pairs.impulses[k, 2])
+            if bodies.body[v] >= 0:
+                push_node(points, bodies, v, f)
+                continue
             for j in range(3):
-                velocities[v, j] += g * pairs.impulses[k, j]
+                velocities[v, j] += points[v, 3] * f[j] / h
 
 
 @njit(cache=True)

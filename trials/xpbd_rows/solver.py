@@ -1,7 +1,7 @@
 """The trial solver: `XPBD` with contact by rows and one guarantee. Private: tests and benchmarks alone use it.
 
-Scenes of soft bodies, half-spaces, rooms, triangle obstacles, pins and stitches; no rigid bodies, joints and actuators,
-nothing sleeps, and contact forces are not reported. See notes/xpbd_rows.md.
+Scenes of soft and rigid bodies, half-spaces, rooms, triangle obstacles, pins, stitches and joints (which are solved
+before the rows, once a substep); nothing sleeps, and contact forces are not reported. See notes/xpbd_rows.md.
 """
 
 from __future__ import annotations
@@ -66,6 +66,7 @@ class RowsXPBD(XPBD):
         used = self._first_choice(ws, state, dt, memory)
         h = dt / used.count
         ws.begin_frame(state.time, h)
+        ws.joints.begin_frame(state, np.zeros(len(ws.system.bodies), dtype=np.bool_))
         ws.rows.begin_frame(state.time, dt, ws.origins[0].copy())
         targets, lengths = pin_targets(ws.system, state.time, h, used.count), cycles(used.count)
         damping = damping_in(ws, h)
@@ -130,6 +131,7 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
     # Whole multiples of 1/1024 m: differences with positions within 8,000 km of it are exact.
     ws.origins[:] = np.round(x.mean(axis=0) * 1024.0) / 1024.0
     ws.points[:, :3] = x - ws.origins
+    ws.rigid.place(ws.points[:, :3])
     ws.velocities[:] = state.velocities[old]
     ws.anchors.place(ws.extended, ws.origins, state.time)
     ws.grow(state.time)

@@ -24,6 +24,7 @@ from supple.numerics.sparse.partition import bisected_groups
 from supple.scene.contact_pairs import pair_table
 from supple.solvers.xpbd.assessment.surfaces import colliding_pairs
 from supple.solvers.xpbd.contact.settings import XPBDContact
+from supple.solvers.xpbd.rigid.bodies import RigidBodies
 
 # Triangles of a patch. With 8 or 32, searches of `bears` take 10 to 20 % longer.
 PATCH = 16
@@ -62,6 +63,7 @@ class Simplices(NamedTuple):
     collide : (p, p) which owners may touch; friction : (p, p)
     excluded_triangles : of each point, excluded_edges : of each edge, what it never touches (see `StitchFilter`)
     rest : (N, 3) places at rest [m]
+    first : (f, 6) whether a triangle is the first of those with its corner j, and with the side across from it
     """
 
     nodes: NDArray[np.int32]
@@ -73,6 +75,7 @@ class Simplices(NamedTuple):
     excluded_triangles: Adjacency
     excluded_edges: Adjacency
     rest: NDArray[np.float64]
+    first: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +86,8 @@ class RowSurface:
     ----------
     count : number of nodes; first : the first node of obstacles
     anchors : (o, 3) of the obstacles' nodes at time 0 [m]; of_anchor : (o,) their obstacle
+    body : (N,) the rigid body of each node, or -1; embedded : nodes on rigid bodies, the last ones, by their control
+        points (k, 4) and weights (k, 4)
     """
 
     simplices: Simplices
@@ -92,9 +97,13 @@ class RowSurface:
     anchors: NDArray[np.float64]
     of_anchor: NDArray[np.int64]
     edge_length: float
+    body: NDArray[np.int32]
+    embedded: tuple[NDArray[np.int32], NDArray[np.float64]]
 
 
-def row_surface(system: System, anchors: int, settings: XPBDContact | None, edge_length: float) -> RowSurface:
+def row_surface(
+    system: System, rigid: RigidBodies, anchors: int, settings: XPBDContact | None, edge_length: float
+) -> RowSurface:
     """The surfaces of a system in the solver's numbering, whose arrays have rows for `anchors` after the vertices."""
     n = len(system.masses)
     extended, ranges = with_obstacles(system)
@@ -102,8 +111,6 @@ def row_surface(system: System, anchors: int, settings: XPBDContact | None, edge
     collide = colliding_pairs(system, settings, joined=True)
     mesh = contact_mesh(extended, solid, collide, extended.rest_positions)
     single = mesh.points.single
-    if (single < 0).any():
-        raise NotImplementedError("rows of rigid bodies")
     # The obstacles' nodes are numbered by their range; obstacles without triangles have none.
     node_of = np.full(len(extended.masses), -1, dtype=np.int32)
     node_of[:n] = np.arange(n)
@@ -111,11 +118,19 @@ def row_surface(system: System, anchors: int, settings: XPBDContact | None, edge
     for part in solid:
         node_of[part.vertices] = np.arange(count, count + len(part.vertices))
         count += len(part.vertices)
-    nodes = node_of[single].astype(np.int32)
+    first_embedded, inside = count, np.flatnonzero(single < 0)
+    count += len(inside)
+    embedded = mesh.points.taken(inside)
+    control, weights = embedded.vertices.reshape(-1, 4), embedded.weights.reshape(-1, 4)
+    nodes = np.where(single >= 0, node_of[single], 0).astype(np.int32)
+    nodes[inside] = np.arange(first_embedded, count)
     owner = np.full(count, -1, dtype=np.int32)
     owner[nodes] = mesh.owner
     rest = np.zeros((count, 3))
-    rest[nodes] = extended.rest_positions[single]
+    rest[nodes] = mesh.points.positions(extended.rest_positions)
+    body = np.full(count, -1, dtype=np.int32)
+    body[:n] = np.where(rigid.of_vertex >= 0, rigid.of_vertex, rigid.welded_to)
+    body[first_embedded:] = rigid.of_vertex[control[:, 0]]
     simplices = Simplices(
         nodes,
         np.ascontiguousarray(nodes[mesh.triangles]),
@@ -125,6 +140,7 @@ def row_surface(system: System, anchors: int, settings: XPBDContact | None, edge
         np.ascontiguousarray(pair_table(system.scene).friction),
         *_excluded(mesh),
         rest,
+        _is_first(mesh),
     )
     return RowSurface(
         simplices,
@@ -134,7 +150,18 @@ def row_surface(system: System, anchors: int, settings: XPBDContact | None, edge
         np.concatenate([np.zeros((0, 3)), *(part.anchors for part in solid)]),
         _numbers(solid),
         edge_length,
+        body,
+        (np.ascontiguousarray(control), np.ascontiguousarray(weights)),
     )
+
+
+def _is_first(mesh: ContactMesh) -> NDArray[np.bool_]:
+    """See `Simplices.first`."""
+    out = np.zeros((len(mesh.triangles), 6), dtype=np.bool_)
+    for column, parts in ((0, mesh.triangles), (3, mesh.triangle_edges)):
+        order = np.unique(parts.ravel(), return_index=True)[1]
+        out[order // 3, column + order % 3] = True
+    return out
 
 
 def _numbers(ranges: tuple[ObstacleRange, ...]) -> NDArray[np.int64]:
