@@ -6,9 +6,9 @@ Let x = M X + r be the places of a body whose places at rest are X, for any matr
 
 with s the least singular value of M, e the largest norm of F - M in tets through which a way from P to Q goes, and G
 its length at rest. For a point and a triangle, or two edges, with nearest places along the unit vector n at rest, this
-is at least s min(n . (X_i - X_j) - (e / s) G(i, j)) over the nodes i, j of both sides, because G may be taken as linear in
-the weights of the nodes. The minimum over all pairs of two neighbouring patches is tabulated over e / s. Pairs that are
-too near at rest for that stay in a fixed list.
+is at least s min(n . (X_i - X_j) - (e / s) G(i, j)) over the nodes i, j of both sides, because G may be taken as linear
+in the weights of the nodes. The minimum over all pairs of two neighbouring patches is tabulated over e / s. Pairs that
+are too near at rest for that stay in a fixed list.
 
 Source: after Zheng and James, "Energy-based Self-Collision Culling for Arbitrary Mesh Deformations" (2012).
 """
