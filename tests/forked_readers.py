@@ -21,7 +21,8 @@ import meshio, trimesh
 with contextlib.suppress(ImportError):
     from pxr import Sdf, Tf, Usd, UsdGeom
 from supple.mesh.io import in_child
-from supple.mesh.io.libraries import meshio, trimesh, usd
+from supple.mesh.io.libraries import glb_series, meshio, trimesh, usd, usd_series, vtkhdf_series
+import h5py
 
 for line in sys.stdin:
     library, function, path, folder, memory, seconds = line.rstrip("\\n").split("\\t")

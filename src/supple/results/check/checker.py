@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +133,8 @@ def _checked(
             if progress is not None:
                 progress(done + 1, len(numbers))
         results = tuple(_result(check, checks.get(check.name), seen, source.knows) for check in chosen)
+        if "times" not in source.knows:
+            results = tuple(replace(result, time=None) for result in results)
         return CheckReport(source.path, len(source), len(numbers), results, source.notes)
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from dataclasses import dataclass, replace
 
+import h5py
 import meshio
 import numpy as np
 
@@ -192,7 +195,87 @@ def write_pvd(frames, folder):
     return path
 
 
-SURFACES = {"obj": write_obj, "ply": write_ply}
+def write_usd(frames, folder):
+    """One TetMesh for the tets, one Mesh for the sheet, with a time sample for each frame."""
+    from pxr import Usd, UsdGeom, Vt
+
+    path = folder / "out.usdc"
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetTimeCodesPerSecond(60)
+    sheet = frames.triangles[~np.isin(frames.triangles, frames.tets).any(axis=1)]
+    for name, cells in (("solid", frames.tets), ("sheet", sheet)):
+        used, own = np.unique(cells, return_inverse=True)
+        own = own.reshape(cells.shape).astype(np.int32)
+        if name == "solid":
+            mesh = UsdGeom.TetMesh.Define(stage, "/solid")
+            mesh.CreateTetVertexIndicesAttr(Vt.Vec4iArray.FromNumpy(own))
+        else:
+            mesh = UsdGeom.Mesh.Define(stage, "/sheet")
+            mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(own), 3, dtype=np.int32)))
+            mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(own.ravel()))
+        points = mesh.CreatePointsAttr()
+        for number, x in zip(frames.numbers, frames.positions, strict=True):
+            points.Set(Vt.Vec3fArray.FromNumpy(x[used].astype(np.float32)), Usd.TimeCode(int(number)))
+    stage.GetRootLayer().Save()
+    return path
+
+
+def write_glb(frames, folder):
+    """One mesh with a morph target for each frame but the first; corners of triangles are points of their own."""
+    x = frames.positions[:, frames.triangles.ravel()].astype("<f4")
+    count, targets = x.shape[1], len(x) - 1
+    weights = np.eye(len(x), targets, -1, dtype="<f4")
+    arrays = [x[0], *(x[1:] - x[0]), (frames.numbers * DT).astype("<f4"), weights]
+    views, accessors, blob = [], [], b""
+    for array in arrays:
+        views.append({"buffer": 0, "byteOffset": len(blob), "byteLength": array.nbytes})
+        vectors = array.ndim == 2 and array is not weights
+        accessors.append({"bufferView": len(views) - 1, "componentType": 5126, "type": "VEC3" if vectors else "SCALAR",
+                          "count": len(array) if vectors else array.size})  # fmt: skip
+        blob += array.tobytes()
+    assert accessors[0]["count"] == count
+    document = {
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0},
+                                    "targets": [{"POSITION": k} for k in range(1, targets + 1)]}]}],
+        "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}],
+                        "samplers": [{"input": targets + 1, "output": targets + 2}]}],
+        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": len(blob)}],
+    }  # fmt: skip
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(blob), b"BIN\0") + blob
+    path = folder / "out.glb"
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    return path
+
+
+def write_vtkhdf(frames, folder):
+    """An UnstructuredGrid with steps that share their cells, as VTK writes it."""
+    path = folder / "out.vtkhdf"
+    steps, n = frames.positions.shape[:2]
+    m, t = len(frames.tets), len(frames.triangles)
+    with h5py.File(path, "w") as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = (2, 0)
+        root.attrs["Type"] = np.bytes_("UnstructuredGrid")
+        root["Points"] = frames.positions.reshape(-1, 3)
+        root["NumberOfPoints"], root["NumberOfCells"] = [n], [m + t]
+        root["NumberOfConnectivityIds"] = [4 * m + 3 * t]
+        root["Connectivity"] = np.concatenate([frames.tets.ravel(), frames.triangles.ravel()])
+        root["Offsets"] = np.concatenate([[0], np.cumsum([4] * m + [3] * t)])
+        root["Types"] = np.array([10] * m + [5] * t, dtype=np.uint8)
+        own = root.create_group("Steps")
+        own.attrs["NSteps"] = steps
+        own["Values"] = frames.numbers * DT
+        own["PointOffsets"] = np.arange(steps) * n
+        own["PartOffsets"] = np.zeros(steps, dtype=np.int64)
+        own["CellOffsets"] = own["ConnectivityIdOffsets"] = np.zeros((steps, 1), dtype=np.int64)
+    return path
+
+
+SURFACES = {"obj": write_obj, "ply": write_ply, "glb": write_glb}
 WRITERS = {
     **SURFACES,
     "vtu": write_vtu,
@@ -201,4 +284,6 @@ WRITERS = {
     "npz": write_npz,
     "npy": write_folder,
     "mujoco": write_mujoco,
+    "usd": write_usd,
+    "vtkhdf": write_vtkhdf,
 }

@@ -63,8 +63,8 @@ def _tets_of(stage) -> CellSoup:
         if not prim.IsA(UsdGeom.TetMesh):
             continue
         mesh = UsdGeom.TetMesh(prim)
-        x = _rows_of(mesh.GetPointsAttr(), time, np.float64, 3)
-        rows = _rows_of(mesh.GetTetVertexIndicesAttr(), time, np.int64, 4)
+        x = rows_of(mesh.GetPointsAttr(), time, np.float64, 3)
+        rows = rows_of(mesh.GetTetVertexIndicesAttr(), time, np.int64, 4)
         if len(rows) and not (rows.min() >= 0 and rows.max() < len(x)):
             raise FormatError(f"{prim.GetPath()}: a tet names a point outside of 0 to {len(x) - 1}")
         world = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time))
@@ -75,7 +75,7 @@ def _tets_of(stage) -> CellSoup:
     return CellSoup.of_rows(np.concatenate(points), np.concatenate(tets), TETRA)
 
 
-def _rows_of(attribute, time, kind: type, columns: int) -> NDArray:
+def rows_of(attribute, time, kind: type, columns: int) -> NDArray:
     """The values of an attribute as (n, columns) numbers. A file may declare any type for it, also an unknown one."""
     value = attribute.Get(time)
     rows = np.asarray([] if value is None else value)

@@ -13,13 +13,19 @@ from xml.etree import ElementTree
 import numpy as np
 
 from supple.errors import MeshError
+from supple.mesh.io.libraries.usd import USD_SUFFIXES
 from supple.mesh.io.series.arrays import is_array_folder, read_folder, read_npz
 from supple.mesh.io.series.file_series import MAX_FRAMES, READERS, FileSeries
 from supple.mesh.io.series.series import Series
+from supple.mesh.io.series.whole_files import read_glb_series, read_usd_series, read_vtkhdf_series
 from supple.mesh.io.text import file_contents
 
 WHOLE: dict[str, Callable[[Path], Series]] = {
     ".npz": read_npz,
+    ".glb": read_glb_series,
+    ".vtkhdf": read_vtkhdf_series,
+    ".hdf": read_vtkhdf_series,
+    **dict.fromkeys(USD_SUFFIXES, read_usd_series),
 }
 _NUMBER = re.compile(r"(\d+)(?!.*\d)")
 

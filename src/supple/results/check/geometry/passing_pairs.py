@@ -8,7 +8,7 @@ from supple.results.check.geometry.surface_pairs import counts, push
 from supple.runtime.kernel_cache import njit
 
 
-@njit(cache=True)
+@njit
 def boxes_of_nodes(low, high, order, nodes):
     """The boxes (n, 3) of the nodes of a tree, around boxes (t, 3) at another time than it was built for."""
     node_low, node_high = np.empty((len(nodes), 3)), np.empty((len(nodes), 3))

@@ -131,7 +131,7 @@ def _wound(tets: Ints, piece: Ints, x: NDArray[np.float64], notes: list[str]) ->
     """
     if len(tets) == 0:
         return tets
-    negative = volume_signs(np.ascontiguousarray(x), tets) < 0
+    negative = volume_signs(np.ascontiguousarray(x), tets.astype(np.int32)) < 0
     share = np.bincount(piece, negative) / np.maximum(np.bincount(piece), 1)
     mixed = (share >= _EITHER_WINDING) & (share <= 1.0 - _EITHER_WINDING)
     turned = np.where(mixed[piece], negative, share[piece] > 0.5)
