@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from supple.errors import MeshError
 from supple.mesh.io.cells import CellSoup, FormatError, MeshFile
 from supple.mesh.io.mesh_files import SURFACE_READERS, TET_READERS, located
-from supple.mesh.io.series.series import Cells, OtherCells, Series, cells_of
+from supple.mesh.io.series.series import Cells, OtherCells, Series
+from supple.mesh.io.tets_and_triangles import cells_of
 from supple.mesh.io.text import file_contents
 
 READERS = TET_READERS | SURFACE_READERS
