@@ -62,7 +62,11 @@ def bake(job: dict[str, Any], folder: Path) -> dict[str, Any]:
         statuses[str(frame.report.status)] += 1
         print(f"frame {number} of {count}", flush=True)
     for k, ways in enumerate(positions):
-        np.save(folder / f"positions_{k}.npy", np.array(ways))
+        whole = np.array(ways)
+        with np.load(folder / job["bodies"][k]["arrays"]) as arrays:
+            # Where a pinned vertex is in a tet that others hold, too, the tets would carry it a little elsewhere.
+            whole[:, arrays["pinned"]] = arrays["path"]
+        np.save(folder / f"positions_{k}.npy", whole)
     tets = sum(len(body.mesh.tets) for body in bodies)
     bad = [f"{number} of {count} frames are {status}" for status, number in statuses.items() if status != "converged"]
     return {"summary": f"{count} frames of {len(bodies)} bodies, {tets} tets", "warnings": bad}
