@@ -21,9 +21,10 @@ from supple.results.check.checks.tets import Inversion, RestShape, Rigidity, Vol
 from supple.results.check.checks.tunnelling import Tunnelling
 from supple.results.check.checks.works import Works
 from supple.results.check.frame_check import UNKNOWN, FrameCheck, skipped
-from supple.results.check.report import CheckReport, CheckResult
+from supple.results.check.report import CheckReport, CheckResult, Verdict
 from supple.results.check.series.recording import Given, SeriesRecording
 from supple.results.check.settings import CheckSettings
+from supple.results.check.shown.place import place_of
 from supple.results.check.snapshot import Scene
 from supple.results.recording.reader import Recording, opened
 
@@ -135,7 +136,8 @@ def _checked(
         results = tuple(_result(check, checks.get(check.name), seen, source.knows) for check in chosen)
         if "times" not in source.knows:
             results = tuple(replace(result, time=None) for result in results)
-        return CheckReport(source.path, len(source), len(numbers), results, source.notes)
+        failures = [result for result in results if result.verdict is Verdict.FAIL]
+        return CheckReport(source.path, len(source), len(numbers), results, source.notes, place_of(scene, failures))
 
 
 def _check_of(name: str, knows: frozenset[str]) -> type[FrameCheck]:

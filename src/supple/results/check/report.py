@@ -7,9 +7,13 @@ import math
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from supple.runtime.displayed import Displayed
 from supple.runtime.replacing import whole_file
+
+if TYPE_CHECKING:
+    from supple.results.check.shown.place import Place
 
 
 class Verdict(StrEnum):
@@ -55,6 +59,7 @@ class CheckReport(Displayed):
     ----------
     path : of the recording; frames : how many it has; frames_checked : number of frames that were checked
     results : one for each check, in order; notes : what was assumed of the files, one sentence each
+    place : where the first failure is, for a picture; None without one
     """
 
     path: Path
@@ -62,6 +67,7 @@ class CheckReport(Displayed):
     frames_checked: int
     results: tuple[CheckResult, ...]
     notes: tuple[str, ...] = ()
+    place: Place | None = None
 
     def _facts(self) -> dict[str, str]:
         facts = {"frames": f"{self.frames_checked} of {self.frames}", "failed": str(len(self.failures))}
@@ -113,13 +119,43 @@ class CheckReport(Displayed):
 
     def to_json(self) -> str:
         """The report as JSON; numbers that are not finite are written as text."""
-        content = asdict(self) | {"path": str(self.path), "ok": self.ok}
+        content: dict[str, Any] = {
+            "path": str(self.path),
+            "frames": self.frames,
+            "frames_checked": self.frames_checked,
+            "results": [asdict(result) for result in self.results],
+            "notes": self.notes,
+            "verdict": self.verdict,
+            "ok": self.ok,
+        }
         for result in content["results"]:
             for key in ("worst", "time"):
                 value = result[key]
                 if value is not None and not math.isfinite(value):
                     result[key] = str(value)
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+    def draw(self, path: str | Path) -> Path | None:
+        """Draw the place of the first failure to a PNG, PDF or SVG file; None where there is none.
+
+        Raises
+        ------
+        OutputError : where the file cannot be written.
+        """
+        from supple.results.check.shown.picture import draw
+
+        return None if self.place is None else draw(self.place, Path(path))
+
+    def write_page(self, path: str | Path) -> Path:
+        """Write the report as a page of HTML, with the picture in it.
+
+        Raises
+        ------
+        OutputError : where the file cannot be written.
+        """
+        from supple.results.check.shown.page import write_page
+
+        return write_page(self, Path(path))
 
     def save(self, path: str | Path) -> Path:
         """Write the report as JSON, completely or not at all.

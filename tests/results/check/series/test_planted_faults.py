@@ -6,11 +6,13 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 from tests.forked_readers import forked_readers
 
 import supple as sp
 from supple.app.cli.app import main
 from supple.results.check.checker import check_series
+from supple.results.check.geometry.moving_triangles import triangles_pass
 from supple.results.check.series.recording import Given
 
 from .generated import FAULTS, SURFACES, WRITERS, clean
@@ -71,6 +73,27 @@ def test_the_shell_checks_files_of_other_programs(tmp_path, capsys):
     assert "skipped  inversion: the files have no tets" in out
     assert json.loads((tmp_path / "report.json").read_text())["ok"] is False
     assert main(["check", str(tmp_path), "--max-volume-change", "0.02", "-q"]) == 0
+
+
+def test_a_failure_has_a_picture_and_a_page(tmp_path):
+    frames = FAULTS["intersection"](clean(4))
+    path = WRITERS["npz"](frames, tmp_path)
+    outputs = {key: str(tmp_path / f"out.{key}") for key in ("png", "html")}
+    assert main(["check", str(path), "-q", "--picture", outputs["png"], "--html", outputs["html"]]) == 1
+    image = np.asarray(Image.open(outputs["png"]).convert("RGB")).astype(int)
+    # What meets is red.
+    assert ((image[..., 0] > 120) & (image[..., 1:].max(axis=-1) < 60)).sum() > 500
+    page = (tmp_path / "out.html").read_text()
+    assert "FAILED: intersection" in page
+    assert "data:image/png;base64," in page
+
+
+def test_sides_that_are_parallel_for_a_moment_do_not_pass():
+    """Mirror images of each other, so that both turn through being parallel at the same time as their planes meet."""
+    left0 = np.array([[-0.1, 1.0, 0.0], [-0.01, 1.0, 0.01], [-0.05, 1.2, 0.0]])
+    left1 = np.array([[-0.1, 1.0, 0.0], [-0.01, 1.0, -0.01], [-0.05, 1.2, 0.0]])
+    x0, x1 = (np.concatenate([left, left * [-1, 1, 1]]) for left in (left0, left1))
+    assert not triangles_pass(x0, x1, np.array([0, 1, 2]), np.array([3, 4, 5]))
 
 
 def test_momentum_and_energy_of_a_free_fall(tmp_path):

@@ -41,6 +41,8 @@ def check(
     fps: float | None = None,
     free: Flag = False,
     json: Path | None = None,
+    html: Path | None = None,
+    picture: Path | None = None,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> ExitCode:
     """Verify the frames of any program, or a recording, independently of the solver that wrote it.
@@ -85,6 +87,10 @@ def check(
         Nothing but gravity acts on the parts of the series: momentum is checked.
     json
         Write the results to this file.
+    html
+        Write the results, with a picture of the place of the first failure, as a page to this file.
+    picture
+        Draw the place of the first failure to this file (.png, .pdf or .svg).
     quiet
         Print only failed checks.
     """
@@ -100,12 +106,17 @@ def check(
     settings = {key: values[key] for key in _SETTINGS if values[key] is not None}
     given = {key: values[key] for key in _GIVEN if values[key]}
     CheckSettings(**settings)
-    if json is not None:
-        for each in (path, *more):
-            refuse_to_replace(each, json)
+    for output in (json, html, picture):
+        if output is not None:
+            for each in (path, *more):
+                refuse_to_replace(each, output)
     report = _report((path, *more), given, settings)
     if json is not None:
         report.save(json)
+    if html is not None:
+        report.write_page(html)
+    if picture is not None:
+        report.draw(picture)
     if not quiet or not report.ok:
         _print(report, only_failures=quiet)
     return ExitCode.OK if report.ok else ExitCode.FAILED

@@ -17,6 +17,15 @@ _PIECES = 8
 Floats = NDArray[np.float64]
 
 
+def passing_between(before: Snapshot, x1: Floats, x0: Floats | None = None) -> tuple[int, NDArray[np.int64]]:
+    """How many pairs of triangles pass from a frame's points, or x0 instead, to x1, and the first (k, 2) of them."""
+    surfaces = before.scene.surfaces
+    out = np.zeros((_MOST_PAIRS, 2), dtype=np.int64)
+    shared = surfaces.triangles, surfaces.owners, surfaces.allowed, surfaces.ignored
+    count = passing_pairs(before.points if x0 is None else x0, x1, *shared, *before.tree[2:4], out)
+    return count, out[: min(count, _MOST_PAIRS)]
+
+
 class Tunnelling(FrameCheck):
     """Surfaces that pass through each other between two frames, in both of which they are apart.
 
@@ -43,19 +52,11 @@ class Tunnelling(FrameCheck):
         self._judge(at)
         self._frames = [*self._frames[-2:], at]
         if len(self._frames) > 1:
-            count, pairs = self._passing(self._frames[-2].points, at.points, self._frames[-2])
+            count, pairs = passing_between(self._frames[-2], at.points)
             if count:
                 self._waiting = count, pairs
             else:
                 self.tally.see(at, 0.0, False)
-
-    def _passing(self, x0: Floats, x1: Floats, tree_of: Snapshot) -> tuple[int, NDArray[np.int64]]:
-        surfaces = self.scene.surfaces
-        out = np.zeros((_MOST_PAIRS, 2), dtype=np.int64)
-        order, nodes = tree_of.tree[2:4]
-        shared = surfaces.triangles, surfaces.owners, surfaces.allowed, surfaces.ignored
-        count = passing_pairs(x0, x1, *shared, order, nodes, out)
-        return count, out[: min(count, _MOST_PAIRS)]
 
     def _judge(self, following: Snapshot | None) -> None:
         """Decide on what passed between the last two frames, with the frame before and the one after."""
@@ -87,7 +88,7 @@ class Tunnelling(FrameCheck):
                 for own, x in known:  # Lagrange's polynomials
                     others = [other for other, _ in known if other != own]
                     following += x * float(np.prod([(t - other) / (own - other) for other in others]))
-            if self._passing(at, following, tree_of)[0]:
+            if passing_between(tree_of, following, at)[0]:
                 return True
             at = following
         return False

@@ -3,19 +3,20 @@
 A corner and a triangle, or two sides, meet where four points are in one plane, at a root of a cubic polynomial of time,
 and the place is in the triangle, or on both sides. These are signs of polynomials: in the basis of Bernstein, a
 polynomial whose coefficients have one sign has it everywhere on the interval. Intervals are halved until the signs of
-all polynomials are known beyond round-off. What is left then, a path through a side or a corner to within 1e-9 of its
-length, counts as passing where the four points turn over.
+all polynomials are known beyond round-off. What is left then, a path through a side or a corner, counts as passing
+where the four points turn over and touch to within 1e-8 of the coordinates.
 
 Source: Farin, "Curves and Surfaces for CAGD" (Bernstein polynomials); the tests are those of Provot (1997).
 """
 
 import numpy as np
 
+from supple.results.check.geometry.triangle_distance import point_triangle, segment_segment
 from supple.results.check.geometry.triangle_pairs import triangles_meet
 from supple.runtime.kernel_cache import njit
 
 _DEPTH, _MOST_STEPS = 30, 400
-_EPSILON = 2.0**-52
+_EPSILON, _NEAR = 2.0**-52, 1e-8
 
 
 @njit
@@ -120,6 +121,20 @@ def _state(x0, x1, four, sides, begin, end, largest):
 
 
 @njit
+def _at(x0, x1, a, t):
+    s = 1.0 - t
+    return (s * x0[a, 0] + t * x1[a, 0], s * x0[a, 1] + t * x1[a, 1], s * x0[a, 2] + t * x1[a, 2])
+
+
+@njit
+def _apart(x0, x1, four, sides, t):
+    """Squared distance of the corner and the triangle, or of the two sides, at time t."""
+    a, b = _at(x0, x1, four[0], t), _at(x0, x1, four[1], t)
+    c, d = _at(x0, x1, four[2], t), _at(x0, x1, four[3], t)
+    return segment_segment(a, b, c, d) if sides else point_triangle(a, b, c, d)
+
+
+@njit
 def points_pass(x0, x1, four, sides):
     """Whether a corner (the first of four rows) passes through a triangle, or a side (two rows) through another."""
     largest = 0.0
@@ -142,7 +157,8 @@ def points_pass(x0, x1, four, sides):
         if state == 0:
             continue
         if level == _DEPTH:
-            if state == 3:
+            # Sides that are parallel for a moment turn over as well, wherever they are.
+            if state == 3 and _apart(x0, x1, four, sides, t) <= _NEAR * _NEAR * largest * largest:
                 return True
             continue
         begin[top], depth[top] = t + 0.5 * width, level + 1

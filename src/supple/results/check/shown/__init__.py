@@ -1,0 +1,1 @@
+"""Reports for people: the place of a failure, its picture, and a page."""
