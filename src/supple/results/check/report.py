@@ -7,13 +7,10 @@ import math
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from supple.runtime.displayed import Displayed
 from supple.runtime.replacing import whole_file
-
-if TYPE_CHECKING:
-    from supple.results.check.shown.place import Place
 
 
 class Verdict(StrEnum):
@@ -59,7 +56,7 @@ class CheckReport(Displayed):
     ----------
     path : of the recording; frames : how many it has; frames_checked : number of frames that were checked
     results : one for each check, in order; notes : what was assumed of the files, one sentence each
-    place : where the first failure is, for a picture; None without one
+    place : where the first failure is, as `shown.picture` draws it; None without one
     """
 
     path: Path
@@ -67,7 +64,7 @@ class CheckReport(Displayed):
     frames_checked: int
     results: tuple[CheckResult, ...]
     notes: tuple[str, ...] = ()
-    place: Place | None = None
+    place: Any = None
 
     def _facts(self) -> dict[str, str]:
         facts = {"frames": f"{self.frames_checked} of {self.frames}", "failed": str(len(self.failures))}
@@ -134,28 +131,6 @@ class CheckReport(Displayed):
                 if value is not None and not math.isfinite(value):
                     result[key] = str(value)
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
-
-    def draw(self, path: str | Path) -> Path | None:
-        """Draw the place of the first failure to a PNG, PDF or SVG file; None where there is none.
-
-        Raises
-        ------
-        OutputError : where the file cannot be written.
-        """
-        from supple.results.check.shown.picture import draw
-
-        return None if self.place is None else draw(self.place, Path(path))
-
-    def write_page(self, path: str | Path) -> Path:
-        """Write the report as a page of HTML, with the picture in it.
-
-        Raises
-        ------
-        OutputError : where the file cannot be written.
-        """
-        from supple.results.check.shown.page import write_page
-
-        return write_page(self, Path(path))
 
     def save(self, path: str | Path) -> Path:
         """Write the report as JSON, completely or not at all.

@@ -96,6 +96,8 @@ def check(
     """
     from supple.errors import OutputError
     from supple.results.check.settings import CheckSettings
+    from supple.results.check.shown.page import write_page
+    from supple.results.check.shown.picture import draw
     from supple.runtime.replacing import refuse_to_replace
 
     values = locals()
@@ -114,9 +116,9 @@ def check(
     if json is not None:
         report.save(json)
     if html is not None:
-        report.write_page(html)
-    if picture is not None:
-        report.draw(picture)
+        write_page(report, html)
+    if picture is not None and report.place is not None:
+        draw(report.place, picture)
     if not quiet or not report.ok:
         _print(report, only_failures=quiet)
     return ExitCode.OK if report.ok else ExitCode.FAILED
