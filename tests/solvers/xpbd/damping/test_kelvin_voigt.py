@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 from tests.scenes import at_start, converged
+from tests.solvers.xpbd.damping.viscosity import Viscosity
 
 import supple as sp
 from supple.model.system import build_system
-from supple.solvers.xpbd.damping import kelvin_voigt
-from supple.solvers.xpbd.damping.coarse_space import CoarseMatrix, vertex_groups
-from supple.solvers.xpbd.damping.elements import matrices_of_springs, matrices_of_tets, viscous_springs, viscous_tets
 from supple.solvers.xpbd.damping.kelvin_voigt import LONGEST_CYCLE, cycle_lengths
 from supple.solvers.xpbd.solver import XPBD
 
@@ -25,20 +23,9 @@ def beam(tau, **more):
     return sp.Scene([sp.Body("beam", BEAM, material)], pins=[sp.Pin("beam", HELD)], gravity=(0, 0, 0), **more)
 
 
-def assembled(vertices, matrices, n):
-    K = np.zeros((3 * n, 3 * n))
-    for nodes, matrix in zip(vertices, matrices, strict=True):
-        dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
-        np.add.at(K, (dofs[:, None], dofs), matrix)
-    return K
-
-
-def viscosity(system, x, tau=1.0):
+def viscosity(system, x):
     """The matrix K (3n, 3n) at positions x, which is tau times the stiffness at rest."""
-    w = system.inverse_masses
-    tets, springs = viscous_tets(system, w), viscous_springs(system, w)
-    K = assembled(tets.vertices, matrices_of_tets(x, tets.vertices, tets.constants(), 0.0), len(x))
-    return K + assembled(springs.vertices, matrices_of_springs(x, springs.vertices, springs.constants(), 0.0), len(x))
+    return Viscosity(system).at(x)
 
 
 @pytest.fixture(scope="module")
@@ -78,13 +65,6 @@ def test_a_beam_is_damped_as_kelvin_voigt_damps_it(first_mode, tau):
     omega, _ = first_mode
     t, q = coordinate(beam(tau), first_mode, 40, 60)
     np.testing.assert_allclose(q, released(omega, tau, t), atol=0.03)
-
-
-def test_a_part_of_the_elements_suffices_for_the_length_of_a_step(first_mode, monkeypatch):
-    """In turn, and here in a body that has a few groups only."""
-    monkeypatch.setattr(kelvin_voigt, "ENOUGH_GROUPS", 1)
-    t, q = coordinate(beam(0.02), first_mode, 40, 60)
-    np.testing.assert_allclose(q, released(first_mode[0], 0.02, t), atol=0.03)
 
 
 def test_damping_below_the_own_damping_of_the_method_changes_nothing(first_mode):
@@ -127,27 +107,6 @@ def test_viscous_forces_dissipate_and_do_not_resist_rotations(kind):
     assert eigenvalues[0] >= -1e-12 * eigenvalues[-1]
     # A finite rotation, as a displacement: no resistance about the positions in the middle.
     assert np.abs(K @ (turned - x).ravel()).max() <= 1e-12 * eigenvalues[-1]
-
-
-def test_the_coarse_matrix_is_the_projected_one():
-    system = build_system(beam(1.0))
-    tets, x = viscous_tets(system, system.inverse_masses), BEAM.vertices
-    rows = np.flatnonzero(system.inverse_masses > 0.0)
-    groups = vertex_groups(rows, x, system.joined_components, system.components)
-    H, h, n = 2e-3, 5e-4, len(x)
-    matrices = matrices_of_tets(x, tets.vertices, tets.constants(), h)
-    A = H * assembled(tets.vertices, matrices, n) + np.diag(np.repeat(system.masses, 3))
-    count = len(groups.start) - 1
-    assert count > 1
-    Z = np.zeros((3 * n, 12 * count))
-    for k, i in enumerate(groups.rows):
-        for a in range(4):
-            for j in range(3):
-                Z[3 * i + j, 12 * groups.group_of[i] + 3 * a + j] = groups.fields[k, a]
-    b = np.random.default_rng(1).standard_normal(12 * count)
-    solved = b.copy()
-    CoarseMatrix(groups, system.masses, [(tets.vertices, matrices)], H).solve(solved)
-    np.testing.assert_allclose(Z.T @ A @ Z @ solved, b, atol=1e-8)
 
 
 def test_a_spinning_body_of_any_damping_keeps_its_energy():
