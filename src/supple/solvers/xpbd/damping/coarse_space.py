@@ -66,14 +66,15 @@ class CoarseSpace:
         ordered, lattice = np.concatenate(groups), (np.concatenate(nodes), np.concatenate(weights))
         return cls(ordered, start, np.array(blocks), offsets, *lattice, np.array(node_start))
 
-    def inverse(self, matrices: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def inverses(self, matrices: list[NDArray[np.float64]]) -> NDArray[np.float32]:
         """Those of all bodies, one after the other, of their matrices."""
         parts = []
         for A in matrices:
-            scale = 1.0 / np.sqrt(np.maximum(A.diagonal(), np.finfo(float).tiny))
-            # Nodes outside of a body may move nothing, and more of them than of vertices the same.
+            # Nodes outside of a body may move nothing, and several of them the same vertices.
+            size = np.maximum(A.diagonal(), 0.0)
+            scale = np.where(size > 1e-12 * size.max(), 1.0 / np.sqrt(np.where(size > 0.0, size, np.inf)), 0.0)
             parts.append(scale[:, None] * np.linalg.inv(scale[:, None] * A * scale + 1e-9 * np.eye(len(A))) * scale)
-        return np.concatenate([part.ravel() for part in parts])
+        return np.concatenate([part.ravel() for part in parts]).astype(np.float32)
 
 
 def _lattice(

@@ -4,7 +4,7 @@
 `motion` (n, 10) has one per vertex: positions, velocities, K v and the mean diagonal entry of K. `frames` : (g, 3, 3).
 """
 
-from supple.numerics.mat3 import load_mat
+from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
 from supple.numerics.svd3 import svd3
 from supple.runtime.kernel_cache import njit
 
@@ -23,127 +23,123 @@ def _turned_back(R, x, y, z):
     return R[0] * x + R[3] * y + R[6] * z, R[1] * x + R[4] * y + R[7] * z, R[2] * x + R[5] * y + R[8] * z
 
 
-@njit(cache=True)
-def place(points, velocities, anchor_velocities, h, motion):
+@njit
+def _place(points, velocities, anchor_velocities, h, motion):
     """Velocities, and the positions in the middle of the last substep, at which a rotation has no rate of strain."""
     n = len(velocities)
     for i in range(len(motion)):
         for j in range(3):
             v = velocities[i, j] if i < n else anchor_velocities[i - n, j]
             motion[i, j], motion[i, 3 + j] = points[i, j] - 0.5 * h * v, v
-        motion[i, 6:] = 0.0
+            motion[i, 6 + j] = 0.0
+        motion[i, 9] = 0.0
+
+
+@njit
+def _frame(low, high, rows, offsets, motion):
+    """The polar factor of sum x offset^T."""
+    a00 = a01 = a02 = a10 = a11 = a12 = a20 = a21 = a22 = 0.0
+    first = rows[low]
+    for k in range(low, high):
+        i = rows[k]
+        x, y, z = motion[i, 0] - motion[first, 0], motion[i, 1] - motion[first, 1], motion[i, 2] - motion[first, 2]
+        u, v, w = offsets[k, 0], offsets[k, 1], offsets[k, 2]
+        a00, a01, a02 = a00 + x * u, a01 + x * v, a02 + x * w
+        a10, a11, a12 = a10 + y * u, a11 + y * v, a12 + y * w
+        a20, a21, a22 = a20 + z * u, a21 + z * v, a22 + z * w
+    U, _, V = svd3((a00, a01, a02, a10, a11, a12, a20, a21, a22))
+    return mat_mul_transposed(U, V)
 
 
 @njit(cache=True)
-def turn_frames(space, motion, frames):
-    """The polar factor of sum x offset^T of each group."""
-    rows, start, _, offsets, _, _ = space
-    for g in range(len(frames)):
-        F = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        first = rows[start[g]]
-        for k in range(start[g], start[g + 1]):
-            i = rows[k]
-            x, y, z = motion[i, 0] - motion[first, 0], motion[i, 1] - motion[first, 1], motion[i, 2] - motion[first, 2]
-            u, v, w = offsets[k, 0], offsets[k, 1], offsets[k, 2]
-            F = (
-                F[0] + x * u,
-                F[1] + x * v,
-                F[2] + x * w,
-                F[3] + y * u,
-                F[4] + y * v,
-                F[5] + y * w,
-                F[6] + z * u,
-                F[7] + z * v,
-                F[8] + z * w,
-            )
-        U, _, V = svd3(F)
-        for i in range(3):
-            for j in range(3):
-                frames[g, i, j] = U[3 * i] * V[3 * j] + U[3 * i + 1] * V[3 * j + 1] + U[3 * i + 2] * V[3 * j + 2]
+def begin(space, known, points, velocities, anchor_velocities, h, last, frames, forces, motion):
+    """f <- R f_1, and v <- v_0 + ratio (v_0 - R v_1) in `motion`, with `known` (b,) 1 + ratio of each body.
 
-
-@njit(cache=True)
-def extrapolate(space, frames, known, local_forces, local_velocities, velocities, forces, motion):
-    """f <- R f_1, and v <- v_0 + ratio (v_0 - R v_1) in `motion`; both for no last cycle where `known` (b,) is 0.
-
-    Otherwise it is 1 + ratio.
+    Where it is 0, f <- 0 and v <- v_0. `last` is (f_1, v_1), in the frames.
     """
-    rows, start, blocks, _, _, _ = space
+    rows, start, blocks, offsets, _, _ = space
+    _place(points, velocities, anchor_velocities, h, motion)
     for b in range(len(known)):
         for g in range(blocks[b], blocks[b + 1]):
-            R = load_mat(frames, g)
+            R = _frame(start[g], start[g + 1], rows, offsets, motion)
+            store_mat(R, frames, g)
             for k in range(start[g], start[g + 1]):
-                f, v, i = _turned(R, local_forces[k]), _turned(R, local_velocities[k]), rows[k]
+                f, v, i = _turned(R, last[0][k]), _turned(R, last[1][k]), rows[k]
                 for j in range(3):
                     forces[k, j] = f[j] if known[b] > 0.0 else 0.0
-                    change = velocities[i, j] - v[j]
-                    motion[i, 3 + j] = velocities[i, j] + max(known[b] - 1.0, 0.0) * change
-                motion[i, 6:] = 0.0
+                    motion[i, 3 + j] += max(known[b] - 1.0, 0.0) * (velocities[i, j] - v[j])
 
 
 @njit(cache=True)
 def restrict(space, frames, H, forces, motion, coarse):
-    """coarse <- Z^T r with r = -H (f + K v)."""
+    """coarse (3 nodes,) <- Z^T r with r = -H (f + K v)."""
     rows, start, _, _, nodes, weights = space
     coarse[:] = 0.0
     for g in range(len(frames)):
         R = load_mat(frames, g)
         for k in range(start[g], start[g + 1]):
             i = rows[k]
-            r = _turned_back(R, forces[k, 0] + motion[i, 6], forces[k, 1] + motion[i, 7], forces[k, 2] + motion[i, 8])
+            x, y, z = forces[k, 0] + motion[i, 6], forces[k, 1] + motion[i, 7], forces[k, 2] + motion[i, 8]
+            r = _turned_back(R, -H * x, -H * y, -H * z)
             for c in range(8):
-                for j in range(3):
-                    coarse[nodes[k, c], j] -= H * weights[k, c] * r[j]
+                n, w = 3 * nodes[k, c], weights[k, c]
+                coarse[n], coarse[n + 1], coarse[n + 2] = (
+                    coarse[n] + w * r[0],
+                    coarse[n + 1] + w * r[1],
+                    coarse[n + 2] + w * r[2],
+                )
+
+
+@njit
+def _multiply(begin, end, at, inverse, vector, out):
+    """out <- A^-1 vector in the numbers `begin` to `end`; returns where the next matrix begins."""
+    count, part = end - begin, out[begin:end]
+    part[:] = 0.0
+    for i in range(begin, end):
+        row, factor = inverse[at : at + count], vector[i]
+        for j in range(count):
+            part[j] += factor * row[j]
+        at += count
+    return at
 
 
 @njit(cache=True)
-def multiply(start, inverse, vectors, out):
-    """out <- A^-1 vectors of each body's nodes, (nodes, 3) each; see `CoarseSpace.inverse`."""
-    at = 0
-    for b in range(len(start) - 1):
-        low, high = 3 * start[b], 3 * start[b + 1]
-        out[low:high] = 0.0
-        for i in range(low, high):
-            for j in range(low, high):
-                out[j] += inverse[at + j - low] * vectors[i]
-            at += high - low
+def correct(space, frames, H, masses, matrices, restricted, coarse, forces, motion, products):
+    """v <- z_c = Z (Z^T (M + H K_0) Z)^-1 Z^T r in `motion`; products (b, 2) <- r . z_c and z_c . M z_c.
 
+    f <- f - M z / H with the other part z = diag(m + H k)^-1 r, times `matrices[2]`, the longest step.
+    K v <- 0.
 
-@njit(cache=True)
-def correct(space, frames, H, masses, placed, forces, coarse, motion, products):
-    """v <- z = P^-1 r with r = -H (f + K v); products (b, 2) <- r . z and z . M z; K v <- 0.
-
-    Where K's diagonal has a larger sum over a body than `placed` (r,), that of the shape that the scene places, the
-    coarse part is divided by the ratio.
+    Parameters
+    ----------
+    matrices : first number of each body's nodes, the inverses, the longest step
     """
     rows, start, blocks, _, nodes, weights = space
+    numbers, inverses, longest = matrices
+    at = 0
     for b in range(len(products)):
-        now = before = rz = zMz = 0.0
-        for k in range(start[blocks[b]], start[blocks[b + 1]]):
-            now += motion[rows[k], 9]
-            before += placed[k]
-        share = before / now if now > before else 1.0
+        at = _multiply(numbers[b], numbers[b + 1], at, inverses, restricted, coarse)
+        rz = zMz = 0.0
         for g in range(blocks[b], blocks[b + 1]):
             R = load_mat(frames, g)
             for k in range(start[g], start[g + 1]):
-                x = y = z = 0.0
+                i, x, y, z = rows[k], 0.0, 0.0, 0.0
                 for c in range(8):
-                    n, w = nodes[k, c], share * weights[k, c]
-                    x, y, z = x + w * coarse[n, 0], y + w * coarse[n, 1], z + w * coarse[n, 2]
-                u, i = _turned(R, (x, y, z)), rows[k]
-                inverse = 1.0 / (masses[i] + H * motion[i, 9])
+                    n, w = 3 * nodes[k, c], weights[k, c]
+                    x, y, z = x + w * coarse[n], y + w * coarse[n + 1], z + w * coarse[n + 2]
+                u = _turned(R, (x, y, z))
+                factor = longest * masses[i] / (masses[i] + H * motion[i, 9])
                 for j in range(3):
-                    r = -H * (forces[k, j] + motion[i, 6 + j])
-                    value = u[j] + inverse * r
-                    rz += r * value
-                    zMz += masses[i] * value * value
-                    motion[i, 3 + j] = value
-                motion[i, 6:] = 0.0
+                    r = forces[k, j] + motion[i, 6 + j]
+                    rz -= H * r * u[j]
+                    zMz += masses[i] * u[j] * u[j]
+                    forces[k, j] -= factor * r
+                    motion[i, 3 + j], motion[i, 6 + j] = u[j], 0.0
         products[b, 0], products[b, 1] = rz, zMz
 
 
 @njit(cache=True)
-def step(space, frames, H, masses, longest, share, products, velocities, motion, forces, local_forces, local_velocities):
+def step(space, frames, H, masses, longest, share, products, velocities, motion, forces, last):
     """f += alpha M z / H with alpha = r . z / z . (M + H K) z of each body, at most `longest`; f_1 <- f, v_1 <- v.
 
     K z is the sum over so many of the elements that `share` (b,) of it is the whole.
@@ -155,7 +151,7 @@ def step(space, frames, H, masses, longest, share, products, velocities, motion,
             i = rows[k]
             zKz += motion[i, 3] * motion[i, 6] + motion[i, 4] * motion[i, 7] + motion[i, 5] * motion[i, 8]
         curvature = products[b, 1] + H * share[b] * zKz
-        alpha = min(products[b, 0] / curvature, longest) if curvature > 0.0 else 0.0
+        alpha = longest * min(products[b, 0] / curvature, 1.0) if curvature > 0.0 else 0.0
         for g in range(blocks[b], blocks[b + 1]):
             R = load_mat(frames, g)
             for k in range(start[g], start[g + 1]):
@@ -165,7 +161,7 @@ def step(space, frames, H, masses, longest, share, products, velocities, motion,
                 f = _turned_back(R, forces[k, 0], forces[k, 1], forces[k, 2])
                 v = _turned_back(R, velocities[i, 0], velocities[i, 1], velocities[i, 2])
                 for j in range(3):
-                    local_forces[k, j], local_velocities[k, j] = f[j], v[j]
+                    last[0][k, j], last[1][k, j] = f[j], v[j]
 
 
 @njit(cache=True)

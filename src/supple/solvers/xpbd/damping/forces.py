@@ -128,7 +128,7 @@ class ViscousElements:
         self.members, counts = groups.members, groups.counts
         self.rates, self._active = np.zeros(len(counts)), np.ones(len(counts), dtype=np.bool_)
         self._corners = np.ascontiguousarray(vertices[groups.members], dtype=np.uint32)
-        self._elements = self._corners, counts, groups.lanes(constants), groups.pointers
+        self._elements = self._corners, counts, groups.lanes(constants).astype(np.float32), groups.pointers
         self._kernel = _sum_of(law, vertices.shape[1])
 
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:

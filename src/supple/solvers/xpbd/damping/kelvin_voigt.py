@@ -35,10 +35,10 @@ from supple.solvers.xpbd.sweeps.ordering import Layout
 
 # Substeps of a cycle, and the longest step. The largest eigenvalue of P^-1 (M + H K) is 2.5 to 4. A mode of which one
 # step corrects more than .85 grows in cycles of 8; the extrapolated forces are wrong where its tets answer faster.
-LONGEST_CYCLE, LONGEST_STEP = 8, 0.22
-COARSE_WEIGHT = 2.0
+LONGEST_CYCLE, LONGEST_STEP = 7, 0.14
+COARSE_WEIGHT = 4.0
 # The power that the step needs is that of one group of elements in so many, in turn, where a body has groups enough.
-PARTS, ENOUGH_GROUPS = 4, 16
+PARTS, ENOUGH_GROUPS = 8, 8
 # Change of strain in a cycle beyond which a body begins from f = 0: bodies that are released from random positions gain
 # energy without limit otherwise.
 LARGEST_STRAIN = 0.3
@@ -105,7 +105,7 @@ class Damping:
         self._forces, self._local_forces, self._local_velocities = (np.zeros((len(rows), 3)) for _ in range(3))
         self._frames = np.zeros((len(space.start) - 1, 3, 3))
         self._products = np.zeros((len(space.blocks) - 1, 2))
-        self._coarse, self._restricted = (np.zeros((space.node_start[-1], 3)) for _ in range(2))
+        self._coarse, self._restricted = (np.zeros(3 * space.node_start[-1]) for _ in range(2))
         body_of = np.full(n, -1, dtype=np.int64)
         body_of[space.rows] = np.repeat(np.arange(len(space.blocks) - 1), np.diff(space.start[space.blocks]))
         self._body_of_row = body_of[space.rows]
@@ -119,9 +119,15 @@ class Damping:
             for made, (_, vertices, _) in zip(self._kinds, kinds, strict=True)
         ]
         counts = sum(np.bincount(bodies, minlength=len(self._products)) for bodies in self._bodies)
-        self._parts = np.where(counts >= ENOUGH_GROUPS, PARTS, 1)
+        parts = np.clip(counts // ENOUGH_GROUPS, 1, PARTS)
+        self._shares = parts.astype(np.float64)
+        self._parts = [
+            [np.arange(len(bodies)) % parts[bodies] == part % parts[bodies] for part in range(PARTS)]
+            for bodies in self._bodies
+        ]
+        self._numbers = 3 * space.node_start
         self._cycle, self._interval = 0, 0.0
-        self._prepared: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+        self._prepared: dict[tuple[int, int], NDArray[np.float32]] = {}
 
     def begin_step(self, memory: ViscousMemory | None, state_velocities: NDArray[np.float64]) -> None:
         """Continue from the memory of a state (its velocities in the scene's numbering), if it belongs to it."""
@@ -151,27 +157,27 @@ class Damping:
         ----------
         points : (n + a, 4) positions [m] at its beginning; velocities : (n, 3), anchor_velocities : (a, 3) [m/s]
         """
-        H, motion, local = substeps * h, self._motion, (self._local_forces, self._local_velocities)
-        k, inverse = self._preconditioner(substeps, h)
-        cycle.place(points, velocities, anchor_velocities, h, motion)
-        cycle.turn_frames(self._space, motion, self._frames)
+        H, motion, last = substeps * h, self._motion, (self._local_forces, self._local_velocities)
+        inverses = self._inverses(substeps, h)
         ratio = min(1.0, H / self._interval) if self._interval > 0.0 else 0.0
         known = np.full(len(self._products), 1.0 + ratio)
-        cycle.extrapolate(self._space, self._frames, known, *local, velocities, self._forces, motion)
+        moving = points, velocities, anchor_velocities, h, last, self._frames, self._forces, motion
+        cycle.begin(self._space, known, *moving)
         self._add(h)
         fast = self._fast_bodies(H)
         if fast.any():
             known[fast] = 0.0
-            cycle.extrapolate(self._space, self._frames, known, *local, velocities, self._forces, motion)
+            cycle.begin(self._space, known, *moving)
             self._add(h)
         at = self._space, self._frames, H
         cycle.restrict(*at, self._forces, motion, self._restricted)
-        cycle.multiply(self._coarse_space.node_start, inverse, self._restricted.ravel(), self._coarse.ravel())
         motion[self._held, 3:] = 0.0
-        cycle.correct(*at, self._masses, k, self._forces, self._coarse, motion, self._products)
-        self._add(h, self._cycle)
-        where = *at, self._masses, LONGEST_STEP, self._parts.astype(np.float64), self._products
-        cycle.step(*where, velocities, motion, self._forces, *local)
+        matrices = self._numbers, inverses, LONGEST_STEP
+        found = self._restricted, self._coarse, self._forces, motion, self._products
+        cycle.correct(*at, self._masses, matrices, *found)
+        self._add(h, self._cycle % PARTS)
+        where = *at, self._masses, LONGEST_STEP * COARSE_WEIGHT, self._shares, self._products
+        cycle.step(*where, velocities, motion, self._forces, last)
         self._interval = 0.0
         self._cycle += 1
 
@@ -194,9 +200,8 @@ class Damping:
 
     def _add(self, h: float, part: int | None = None) -> None:
         """Add K v to `_motion`, of all groups of elements or of a part of those of each body."""
-        for made, bodies in zip(self._kinds, self._bodies, strict=True):
-            parts = self._parts[bodies]
-            made.add(self._motion, h, None if part is None else np.arange(len(bodies)) % parts == part % parts)
+        for made, parts in zip(self._kinds, self._parts, strict=True):
+            made.add(self._motion, h, None if part is None else parts[part])
 
     def _fast_bodies(self, H: float) -> NDArray[np.bool_]:
         """(b,) where the strain of an element changes so much in a cycle that f_1 and v_1 are not guesses for it."""
@@ -205,8 +210,8 @@ class Damping:
             fast[bodies[made.rates > (LARGEST_STRAIN / H) ** 2]] = True
         return fast
 
-    def _preconditioner(self, substeps: int, h: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The diagonal k of the rows and the coarse inverses, for a length of substeps that is near enough."""
+    def _inverses(self, substeps: int, h: float) -> NDArray[np.float32]:
+        """The inverses of the coarse matrices, for a length of substeps that is near enough."""
         key = substeps, round(2.0 * np.log2(h))
         if key not in self._prepared:
             if len(self._prepared) == _MOST_MATRICES:
@@ -214,25 +219,25 @@ class Damping:
             self._prepared[key] = self._made_for(substeps, 2.0 ** (0.5 * key[1]))
         return self._prepared[key]
 
-    def _made_for(self, substeps: int, h: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _made_for(self, substeps: int, h: float) -> NDArray[np.float32]:
         """Column after column of the coarse matrices of all bodies at once."""
-        space, motion, H = self._coarse_space, self._motion, substeps * h
-        begin = space.node_start[:-1]
-        counts = np.diff(space.node_start)
-        matrices = [np.zeros((3 * count, 3 * count)) for count in counts]
+        space, motion, H, numbers = self._coarse_space, self._motion, substeps * h, self._numbers
+        counts = np.diff(numbers)
+        matrices = [np.zeros((count, count)) for count in counts]
         self._frames[:], self._forces[:] = np.eye(3), 0.0
-        for column in range(3 * counts.max()):
+        for column in range(counts.max()):
             node, axis = divmod(column, 3)
             motion[:, :3], motion[:, 3:] = self._placed, 0.0
-            shares = np.where(space.nodes == (begin + node)[self._body_of_row][:, None], space.weights, 0.0).sum(axis=1)
+            nodes = (space.node_start[:-1] + node)[self._body_of_row]
+            shares = np.where(space.nodes == nodes[:, None], space.weights, 0.0).sum(axis=1)
             motion[space.rows, 3 + axis] = shares
             self._add(h)
             motion[space.rows, 6 + axis] += self._masses[space.rows] * shares / H
             cycle.restrict(self._space, self._frames, -H, self._forces, motion, self._restricted)
-            for b, count in enumerate(counts):
-                if node < count:
-                    matrices[b][column] = self._restricted[begin[b] : begin[b] + count].ravel()
-        return motion[space.rows, 9].copy(), COARSE_WEIGHT * space.inverse(matrices)
+            for matrix, begin, count in zip(matrices, numbers[:-1], counts, strict=True):
+                if column < count:
+                    matrix[column] = self._restricted[begin : begin + count]
+        return space.inverses(matrices)
 
 
 def _groups_of(vertices: NDArray[np.int32], layout: Layout, system: System, n_vertices: int) -> Groups:
