@@ -4,7 +4,7 @@
 `motion` (n, 10) has one per vertex: positions, velocities, K v and the mean diagonal entry of K. `frames` : (g, 3, 3).
 """
 
-from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
+from supple.numerics.mat3 import dot, load_mat, mat_mul_transposed, store_mat
 from supple.numerics.svd3 import svd3
 from supple.runtime.kernel_cache import njit
 
@@ -51,23 +51,48 @@ def _frame(low, high, rows, offsets, motion):
     return mat_mul_transposed(U, V)
 
 
-@njit(cache=True)
-def begin(space, known, points, velocities, anchor_velocities, h, last, frames, forces, motion):
-    """f <- R f_1, and v <- v_0 + ratio (v_0 - R v_1) in `motion`, with `known` (b,) 1 + ratio of each body.
+@njit
+def _strain(R, low, high, rows, offsets, velocities, before):
+    """The square of how much the velocity relative to the group's has changed, per size of the group [1/s^2]."""
+    x = y = z = squares = size = 0.0
+    for k in range(low, high):
+        v, i = _turned(R, before[k]), rows[k]
+        u = velocities[i, 0] - v[0], velocities[i, 1] - v[1], velocities[i, 2] - v[2]
+        x, y, z, squares = x + u[0], y + u[1], z + u[2], squares + dot(u, u)
+        size += offsets[k, 0] ** 2 + offsets[k, 1] ** 2 + offsets[k, 2] ** 2
+    squares -= (x * x + y * y + z * z) / (high - low)
+    return squares / size if size > 0.0 else 0.0
 
-    Where it is 0, f <- 0 and v <- v_0. `last` is (f_1, v_1), in the frames.
+
+@njit(cache=True)
+def begin(space, places, h, limits, last, frames, forces, motion):
+    """f <- R f_1, and v <- v_0 + ratio (v_0 - R v_1) in `motion`.
+
+    But f <- 0 and v <- v_0 in a body of which a group has changed its strain by so much that f_1 and v_1 are not guesses.
+
+    Parameters
+    ----------
+    places : points, velocities and velocities of the anchors; limits : the ratio, and the largest change of rates [1/s]
+    last : f_1 and v_1, in the frames
     """
     rows, start, blocks, offsets, _, _ = space
-    _place(points, velocities, anchor_velocities, h, motion)
-    for b in range(len(known)):
+    ratio, largest = limits
+    velocities = places[1]
+    _place(*places, h, motion)
+    for b in range(len(blocks) - 1):
+        known = True
         for g in range(blocks[b], blocks[b + 1]):
             R = _frame(start[g], start[g + 1], rows, offsets, motion)
             store_mat(R, frames, g)
+            if ratio > 0.0:
+                known &= _strain(R, start[g], start[g + 1], rows, offsets, velocities, last[1]) < largest**2
+        for g in range(blocks[b], blocks[b + 1]):
+            R = load_mat(frames, g)
             for k in range(start[g], start[g + 1]):
                 f, v, i = _turned(R, last[0][k]), _turned(R, last[1][k]), rows[k]
                 for j in range(3):
-                    forces[k, j] = f[j] if known[b] > 0.0 else 0.0
-                    motion[i, 3 + j] += max(known[b] - 1.0, 0.0) * (velocities[i, j] - v[j])
+                    forces[k, j] = f[j] if known else 0.0
+                    motion[i, 3 + j] += ratio * (velocities[i, j] - v[j]) if known else 0.0
 
 
 @njit(cache=True)

@@ -20,9 +20,7 @@ from supple.materials.material import Elastic
 from supple.model.system import BodyRange, System
 
 
-def damped_tets(
-    system: System, inverse_masses: NDArray[np.float64]
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+def damped_tets(system: System, inverse_masses: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Vertices (m, 4) and constants (m, 13) of all damped tetrahedra of bodies and stitches that can move.
 
     Parameters
@@ -37,9 +35,7 @@ def damped_tets(
     return _chosen(vertices, constants, constants[:, 9] + constants[:, 10], inverse_masses)
 
 
-def _of_body(
-    system: System, part: BodyRange, w: NDArray[np.float64]
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+def _of_body(system: System, part: BodyRange, w: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     corners, Dm_inv, V = system.tets[part.tets], system.rest_shape_inverse[part.tets], system.rest_volumes[part.tets]
     material = part.body.material
     if not isinstance(material, EdgesAndVolume):

@@ -29,7 +29,7 @@ def _softened(stiffness, slope, h):
 @njit(fastmath=FLAGS, forceinline=True)
 def viscous_tets(X, V, k, data, g, h):
     """The forces of group g that balance the viscous stress, into V; into k four means of the diagonal entries of their
-    matrix [kg/s], and the square of the rates of the stretches [1/s^2].
+    matrix [kg/s].
 
     With D = sym(F^T F') they are the gradient of shear |dev D|^2 + bulk / 2 (dJ/dF : F')^2. XPBD itself damps like
     tau = h. Columns of X and V are 12 coordinates [m] and velocities [m/s].
@@ -55,7 +55,6 @@ def viscous_tets(X, V, k, data, g, h):
             + (c01 * g01 + c11 * g11 + c21 * g21)
             + (c02 * g02 + c12 * g12 + c22 * g22)
         )
-        k[4, i] = d00 * d00 + d11 * d11 + d22 * d22
         third = (d00 + d11 + d22) / 3.0
         d00, d11, d22 = 2.0 * shear * (d00 - third), 2.0 * shear * (d11 - third), 2.0 * shear * (d22 - third)
         stress = (
@@ -86,7 +85,7 @@ def viscous_tets(X, V, k, data, g, h):
 
 @njit(fastmath=FLAGS, forceinline=True)
 def viscous_springs(X, V, k, data, g, h):
-    """The same of springs from a vertex to the place t of an edge: 9 coordinates, 3 means, and the rate of the length.
+    """The same of springs from a vertex to the place t of an edge: 9 coordinates and 3 means.
 
     They are the gradient of viscosity / 2 (d . d' / |d|)^2, with d = x_0 - (1 - t) x_1 - t x_2.
 
@@ -105,7 +104,7 @@ def viscous_springs(X, V, k, data, g, h):
         fx, fy, fz = viscosity * rate * dx, viscosity * rate * dy, viscosity * rate * dz
         put_nine(V, i, (fx, fy, fz, -s * fx, -s * fy, -s * fz, -t * fx, -t * fy, -t * fz))
         third = viscosity / 3.0
-        k[0, i], k[1, i], k[2, i], k[3, i] = third, s * s * third, t * t * third, rate * rate
+        k[0, i], k[1, i], k[2, i] = third, s * s * third, t * t * third
 
 
 class ViscousElements:
@@ -119,14 +118,11 @@ class ViscousElements:
     Attributes
     ----------
     members : (g, WIDTH) the elements of each group
-    rates : (g,) largest square of a rate of strain of its elements in the last sum [1/s^2]
     """
 
-    def __init__(
-        self, law: Any, vertices: NDArray[np.int32], constants: NDArray[np.float64], groups: Groups
-    ) -> None:
+    def __init__(self, law: Any, vertices: NDArray[np.int32], constants: NDArray[np.float64], groups: Groups) -> None:
         self.members, counts = groups.members, groups.counts
-        self.rates, self._active = np.zeros(len(counts)), np.ones(len(counts), dtype=np.bool_)
+        self._active = np.ones(len(counts), dtype=np.bool_)
         self._corners = np.ascontiguousarray(vertices[groups.members], dtype=np.uint32)
         self._elements = self._corners, counts, groups.lanes(constants).astype(np.float32), groups.pointers
         self._kernel = _sum_of(law, vertices.shape[1])
@@ -134,7 +130,6 @@ class ViscousElements:
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:
         """Sum only the groups with a vertex that can move, of inverse masses (n,) [1/kg]."""
         self._active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
-        self.rates[:] = 0.0
 
     def add(self, motion: NDArray[np.float64], h: float, part: NDArray[np.bool_] | None = None) -> None:
         """Add the forces in substeps of h [s] to the columns 6 to 8 of `motion` (n, 10), and the diagonal to the last.
@@ -143,7 +138,7 @@ class ViscousElements:
         """
         corners, counts, data, pointers = self._elements
         active = self._active if part is None else self._active & part
-        self._kernel(motion, corners, counts, active, data, pointers, h, self.rates)
+        self._kernel(motion, corners, counts, active, data, pointers, h)
 
 
 @cache
@@ -159,10 +154,10 @@ if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sum_chunk
     def law(X, V, k, data, g, h): ...
 
 
-def _sum_chunk(motion, corners, counts, active, data, first, last, h, rates):
+def _sum_chunk(motion, corners, counts, active, data, first, last, h):
     X = np.zeros((3 * CORNERS, WIDTH))
     V = np.zeros((3 * CORNERS, WIDTH))
-    k = np.zeros((CORNERS + 1, WIDTH))
+    k = np.zeros((CORNERS, WIDTH))
     for g in range(first, last):
         if not active[g]:
             continue
@@ -172,21 +167,18 @@ def _sum_chunk(motion, corners, counts, active, data, first, last, h, rates):
                 X[3 * c, lane], X[3 * c + 1, lane], X[3 * c + 2, lane] = motion[p, 0], motion[p, 1], motion[p, 2]
                 V[3 * c, lane], V[3 * c + 1, lane], V[3 * c + 2, lane] = motion[p, 3], motion[p, 4], motion[p, 5]
         law(X, V, k, data, g, h)
-        fastest = 0.0
         for lane in range(counts[g]):
-            fastest = max(fastest, k[CORNERS, lane])
             for c in range(CORNERS):
                 p = corners[g, lane, c]
                 motion[p, 6] += V[3 * c, lane]
                 motion[p, 7] += V[3 * c + 1, lane]
                 motion[p, 8] += V[3 * c + 2, lane]
                 motion[p, 9] += k[c, lane]
-        rates[g] = fastest
 
 
-def _sum(motion, corners, counts, active, data, pointers, h, rates):
+def _sum(motion, corners, counts, active, data, pointers, h):
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for k in prange((n_chunks + 1 - parity) // 2):
             c = 2 * k + parity
-            _sum_chunk(motion, corners, counts, active, data, pointers[c], pointers[c + 1], h, rates)
+            _sum_chunk(motion, corners, counts, active, data, pointers[c], pointers[c + 1], h)

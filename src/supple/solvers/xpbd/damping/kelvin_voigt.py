@@ -114,16 +114,16 @@ class Damping:
             for law, vertices, constants in kinds
         ]
         # The body of each group of elements; all vertices of an element that can move belong to one.
-        self._bodies = [
+        bodies_of = [
             body_of[vertices[made.members[:, 0]]].max(axis=1)
             for made, (_, vertices, _) in zip(self._kinds, kinds, strict=True)
         ]
-        counts = sum(np.bincount(bodies, minlength=len(self._products)) for bodies in self._bodies)
+        counts = sum(np.bincount(bodies, minlength=len(self._products)) for bodies in bodies_of)
         parts = np.clip(counts // ENOUGH_GROUPS, 1, PARTS)
         self._shares = parts.astype(np.float64)
         self._parts = [
             [np.arange(len(bodies)) % parts[bodies] == part % parts[bodies] for part in range(PARTS)]
-            for bodies in self._bodies
+            for bodies in bodies_of
         ]
         self._numbers = 3 * space.node_start
         self._cycle, self._interval = 0, 0.0
@@ -159,16 +159,10 @@ class Damping:
         """
         H, motion, last = substeps * h, self._motion, (self._local_forces, self._local_velocities)
         inverses = self._inverses(substeps, h)
-        ratio = min(1.0, H / self._interval) if self._interval > 0.0 else 0.0
-        known = np.full(len(self._products), 1.0 + ratio)
-        moving = points, velocities, anchor_velocities, h, last, self._frames, self._forces, motion
-        cycle.begin(self._space, known, *moving)
+        limits = min(1.0, H / self._interval) if self._interval > 0.0 else 0.0, LARGEST_STRAIN / H
+        places = points, velocities, anchor_velocities
+        cycle.begin(self._space, places, h, limits, last, self._frames, self._forces, motion)
         self._add(h)
-        fast = self._fast_bodies(H)
-        if fast.any():
-            known[fast] = 0.0
-            cycle.begin(self._space, known, *moving)
-            self._add(h)
         at = self._space, self._frames, H
         cycle.restrict(*at, self._forces, motion, self._restricted)
         motion[self._held, 3:] = 0.0
@@ -202,13 +196,6 @@ class Damping:
         """Add K v to `_motion`, of all groups of elements or of a part of those of each body."""
         for made, parts in zip(self._kinds, self._parts, strict=True):
             made.add(self._motion, h, None if part is None else parts[part])
-
-    def _fast_bodies(self, H: float) -> NDArray[np.bool_]:
-        """(b,) where the strain of an element changes so much in a cycle that f_1 and v_1 are not guesses for it."""
-        fast = np.zeros(len(self._products), dtype=np.bool_)
-        for made, bodies in zip(self._kinds, self._bodies, strict=True):
-            fast[bodies[made.rates > (LARGEST_STRAIN / H) ** 2]] = True
-        return fast
 
     def _inverses(self, substeps: int, h: float) -> NDArray[np.float32]:
         """The inverses of the coarse matrices, for a length of substeps that is near enough."""
