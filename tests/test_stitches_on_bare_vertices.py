@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from tests.solvers.xpbd.damping.viscosity import Viscosity
 
 import supple as sp

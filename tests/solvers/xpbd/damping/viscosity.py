@@ -13,10 +13,8 @@ class Viscosity:
     def __init__(self, system):
         w = system.inverse_masses
         self.count, self.kinds = len(w), []
-        for law, (vertices, constants) in (
-            (viscous_tets, damped_tets(system, w)),
-            (viscous_springs, damped_springs(system, w)),
-        ):
+        for law, damped in ((viscous_tets, damped_tets), (viscous_springs, damped_springs)):
+            vertices, constants = damped(system, w)
             m, k = vertices.shape
             if m:
                 copies = np.arange(3 * k * m * k, dtype=np.int32).reshape(-1, k)

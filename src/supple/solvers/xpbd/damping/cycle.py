@@ -1,6 +1,6 @@
 """The loops over vertices of a cycle of damping, group after group.
 
-`space` is (rows, start, blocks, offsets, nodes, weights) of `CoarseSpace`. Arrays named after rows have one line per row;
+`space` is (rows, start, blocks, offsets, nodes, weights) of `CoarseSpace`. Forces and f_1, v_1 have one line per row;
 `motion` (n, 10) has one per vertex: positions, velocities, K v and the mean diagonal entry of K. `frames` : (g, 3, 3).
 """
 
@@ -68,7 +68,7 @@ def _strain(R, low, high, rows, offsets, velocities, before):
 def begin(space, places, h, limits, last, frames, forces, motion):
     """f <- R f_1, and v <- v_0 + ratio (v_0 - R v_1) in `motion`.
 
-    But f <- 0 and v <- v_0 in a body of which a group has changed its strain by so much that f_1 and v_1 are not guesses.
+    Where rates of strain have changed so much that f_1 and v_1 are not guesses, f <- 0 and v <- v_0 in the body.
 
     Parameters
     ----------
