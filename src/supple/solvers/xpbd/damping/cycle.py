@@ -24,18 +24,6 @@ def _turned_back(R, x, y, z):
 
 
 @njit
-def _place(points, velocities, anchor_velocities, h, motion):
-    """Velocities, and the positions in the middle of the last substep, at which a rotation has no rate of strain."""
-    n = len(velocities)
-    for i in range(len(motion)):
-        for j in range(3):
-            v = velocities[i, j] if i < n else anchor_velocities[i - n, j]
-            motion[i, j], motion[i, 3 + j] = points[i, j] - 0.5 * h * v, v
-            motion[i, 6 + j] = 0.0
-        motion[i, 9] = 0.0
-
-
-@njit
 def _frame(low, high, rows, offsets, motion):
     """The polar factor of sum x offset^T."""
     a00 = a01 = a02 = a10 = a11 = a12 = a20 = a21 = a22 = 0.0
@@ -65,20 +53,18 @@ def _strain(R, low, high, rows, offsets, velocities, before):
 
 
 @njit(cache=True)
-def begin(space, places, h, limits, last, frames, forces, motion):
+def begin(space, velocities, limits, last, frames, forces, motion):
     """f <- R f_1, and v <- v_0 + ratio (v_0 - R v_1) in `motion`.
 
     Where rates of strain have changed so much that f_1 and v_1 are not guesses, f <- 0 and v <- v_0 in the body.
 
     Parameters
     ----------
-    places : points, velocities and velocities of the anchors; limits : the ratio, and the largest change of rates [1/s]
+    limits : the ratio, and the largest change of rates [1/s]
     last : f_1 and v_1, in the frames
     """
     rows, start, blocks, offsets, _, _ = space
     ratio, largest = limits
-    velocities = places[1]
-    _place(*places, h, motion)
     for b in range(len(blocks) - 1):
         known = True
         for g in range(blocks[b], blocks[b + 1]):

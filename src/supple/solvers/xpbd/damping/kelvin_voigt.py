@@ -38,7 +38,7 @@ LONGEST_CYCLE = 7
 # a, and the largest c / a. With both a step corrects at most .68 to .84 of a mode in beams and balls of Poisson's ratio
 # 0.3 to 0.49, and a little above .54 of a smooth one.
 STEP, COARSE_WEIGHT = 0.135, 4.0
-# The power that the line search needs is that of one group of elements in so many, in turn, where a body has groups enough.
+# The power that the line search needs is that of one group of elements in so many, in turn, where a body has enough.
 PARTS, ENOUGH_GROUPS = 8, 8
 # Change of the rate of strain in a cycle, times H, beyond which a body begins from f = 0: bodies that are released from
 # random positions gain energy without limit otherwise.
@@ -161,8 +161,10 @@ class Damping:
         H, motion, last = substeps * h, self._motion, (self._local_forces, self._local_velocities)
         inverses = self._inverses(substeps, h)
         limits = min(1.0, H / self._interval) if self._interval > 0.0 else 0.0, LARGEST_STRAIN / H
-        places = points, velocities, anchor_velocities
-        cycle.begin(self._space, places, h, limits, last, self._frames, self._forces, motion)
+        # Positions in the middle of the last substep, at which a rotation has no rate of strain.
+        motion[: len(velocities), 3:6], motion[len(velocities) :, 3:6] = velocities, anchor_velocities
+        motion[:, :3], motion[:, 6:] = points[:, :3] - 0.5 * h * motion[:, 3:6], 0.0
+        cycle.begin(self._space, velocities, limits, last, self._frames, self._forces, motion)
         self._add(h)
         at = self._space, self._frames, H
         cycle.restrict(*at, self._forces, motion, self._restricted)
