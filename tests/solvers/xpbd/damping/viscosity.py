@@ -32,7 +32,7 @@ class Viscosity:
             for c in range(k):
                 for j in range(3):
                     motion[c, j, :, c, 3 + j] = 1.0
-            elements.add(motion.reshape(-1, 10), h)
+            elements.add(motion.reshape(-1, 10), h, elements.active)
             for c in range(k):
                 for j in range(3):
                     for b in range(k):

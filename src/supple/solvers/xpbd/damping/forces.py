@@ -117,28 +117,27 @@ class ViscousElements:
 
     Attributes
     ----------
-    members : (g, WIDTH) the elements of each group
+    members : (g, WIDTH) the elements of each group; active : (g,) whether one of them can move
     """
 
     def __init__(self, law: Any, vertices: NDArray[np.int32], constants: NDArray[np.float64], groups: Groups) -> None:
         self.members, counts = groups.members, groups.counts
-        self._active = np.ones(len(counts), dtype=np.bool_)
+        self.active = np.ones(len(counts), dtype=np.bool_)
         self._corners = np.ascontiguousarray(vertices[groups.members], dtype=np.uint32)
         self._elements = self._corners, counts, groups.lanes(constants).astype(np.float32), groups.pointers
         self._kernel = _sum_of(law, vertices.shape[1])
 
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:
-        """Sum only the groups with a vertex that can move, of inverse masses (n,) [1/kg]."""
-        self._active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
+        """Set which groups are active, of inverse masses (n,) [1/kg]."""
+        self.active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
 
-    def add(self, motion: NDArray[np.float64], h: float, part: NDArray[np.bool_] | None = None) -> None:
+    def add(self, motion: NDArray[np.float64], h: float, chosen: NDArray[np.bool_]) -> None:
         """Add the forces in substeps of h [s] to the columns 6 to 8 of `motion` (n, 10), and the diagonal to the last.
 
-        The columns before are positions [m] and velocities [m/s]. Of a `part` (g,) of the groups, or of all.
+        The columns before are positions [m] and velocities [m/s]. Only groups that are `chosen` (g,) count.
         """
         corners, counts, data, pointers = self._elements
-        active = self._active if part is None else self._active & part
-        self._kernel(motion, corners, counts, active, data, pointers, h)
+        self._kernel(motion, corners, counts, chosen, data, pointers, h)
 
 
 @cache

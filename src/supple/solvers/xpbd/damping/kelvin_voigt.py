@@ -123,8 +123,7 @@ class Damping:
         parts = np.clip(counts // ENOUGH_GROUPS, 1, PARTS)
         self._shares = parts.astype(np.float64)
         self._parts = [
-            [np.arange(len(bodies)) % parts[bodies] == part % parts[bodies] for part in range(PARTS)]
-            for bodies in bodies_of
+            [_places(bodies) % parts[bodies] == part % parts[bodies] for part in range(PARTS)] for bodies in bodies_of
         ]
         self._numbers = 3 * space.node_start
         self._cycle, self._interval = 0, 0.0
@@ -196,9 +195,9 @@ class Damping:
         return ViscousMemory(forces, velocities, self._interval, state_velocities)
 
     def _add(self, h: float, part: int | None = None) -> None:
-        """Add K v to `_motion`, of all groups of elements or of a part of those of each body."""
+        """Add K v to `_motion`, of all groups of elements that can move or of a part of those of each body."""
         for made, parts in zip(self._kinds, self._parts, strict=True):
-            made.add(self._motion, h, None if part is None else parts[part])
+            made.add(self._motion, h, made.active if part is None else made.active & parts[part])
 
     def _inverses(self, substeps: int, h: float) -> NDArray[np.float32]:
         """The inverses of the coarse matrices, for a length of substeps that is near enough."""
@@ -221,7 +220,8 @@ class Damping:
             nodes = (space.node_start[:-1] + node)[self._body_of_row]
             shares = np.where(space.nodes == nodes[:, None], space.weights, 0.0).sum(axis=1)
             motion[space.rows, 3 + axis] = shares
-            self._add(h)
+            for made in self._kinds:
+                made.add(motion, h, np.ones_like(made.active))
             motion[space.rows, 6 + axis] += self._masses[space.rows] * shares / H
             cycle.restrict(self._space, self._frames, -H, self._forces, motion, self._restricted)
             for matrix, begin, count in zip(matrices, numbers[:-1], counts, strict=True):
@@ -238,6 +238,13 @@ def _groups_of(vertices: NDArray[np.int32], layout: Layout, system: System, n_ve
     if vertices.max() < len(layout.rank) and n_vertices == len(layout.rank):
         return make_groups(replace(layout, body=system.joined_components), vertices)
     return make_groups_of_one_chunk(vertices, system.joined_components, n_vertices)
+
+
+def _places(bodies: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(g,) the place of each group of elements among those of its body (g,)."""
+    order, places = np.argsort(bodies, kind="stable"), np.zeros_like(bodies)
+    places[order] = np.arange(len(bodies)) - np.searchsorted(bodies[order], bodies[order])
+    return places
 
 
 def cycle_lengths(substeps: int) -> list[int]:
