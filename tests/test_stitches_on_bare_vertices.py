@@ -9,6 +9,7 @@ from tests.solvers.xpbd.damping.viscosity import Viscosity
 import supple as sp
 from supple.model.state import Status
 from supple.model.system import PinRange, System
+from supple.runtime.threads import numba_threads
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitching import no_stitching
 from supple.solvers.implicit.energies.inertia import Inertia
@@ -90,15 +91,16 @@ def by_xpbd(system, x, h=1 / 1200, steps=12_000):
     inertia = np.diag(np.repeat(1.0 / w[free], 3))
     points, v = np.column_stack([x, w]), np.zeros_like(x)
     path = [x]
-    for _ in range(steps):
-        before = points[:, :3].copy()
-        K = viscosity.at(before - 0.5 * h * v, h).reshape(len(x), 3, len(x), 3)
-        A = inertia + h * K[free][:, :, free].reshape(inertia.shape)
-        v[free] = np.linalg.solve(A, inertia @ v[free].ravel()).reshape(-1, 3)
-        points[:, :3] += h * v
-        constraints.project(points, h)
-        v = (points[:, :3] - before) / h
-        path.append(points[:, :3].copy())
+    with numba_threads(1):
+        for _ in range(steps):
+            before = points[:, :3].copy()
+            K = viscosity.at(before - 0.5 * h * v, h).reshape(len(x), 3, len(x), 3)
+            A = inertia + h * K[free][:, :, free].reshape(inertia.shape)
+            v[free] = np.linalg.solve(A, inertia @ v[free].ravel()).reshape(-1, 3)
+            points[:, :3] += h * v
+            constraints.project(points, h)
+            v = (points[:, :3] - before) / h
+            path.append(points[:, :3].copy())
     return np.array(path)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from supple.runtime.threads import numba_threads
 from supple.solvers.xpbd.damping.elements import damped_springs, damped_tets
 from supple.solvers.xpbd.damping.forces import ViscousElements, viscous_springs, viscous_tets
 from supple.solvers.xpbd.sweeps.groups import make_groups_of_one_chunk
@@ -27,14 +28,11 @@ class Viscosity:
         K = np.zeros((self.count, 3, self.count, 3))
         for elements, vertices in self.kinds:
             m, k = vertices.shape
-            motion = np.zeros((k, 3, m, k, 10))
+            motion, corner, axis = np.zeros((k, 3, m, k, 10)), np.arange(k), np.arange(3)
             motion[..., :3] = x[vertices]
-            for c in range(k):
-                for j in range(3):
-                    motion[c, j, :, c, 3 + j] = 1.0
-            elements.add(motion.reshape(-1, 10), h, elements.active)
-            for c in range(k):
-                for j in range(3):
-                    for b in range(k):
-                        np.add.at(K, (vertices[:, b], slice(None), vertices[:, c], j), motion[c, j, :, b, 6:9])
+            motion[corner[:, None], axis, :, corner[:, None], 3 + axis] = 1.0
+            with numba_threads(1):
+                elements.add(motion.reshape(-1, 10), h, elements.active)
+            rows, columns = vertices[:, :, None], vertices.T[:, None, :, None, None]
+            np.add.at(K, (rows, axis, columns, axis[:, None, None, None]), motion[..., 6:9])
         return K.reshape(3 * self.count, -1)
