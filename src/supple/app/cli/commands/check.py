@@ -96,8 +96,6 @@ def check(
     """
     from supple.errors import OutputError
     from supple.results.check.settings import CheckSettings
-    from supple.results.check.shown.page import write_page
-    from supple.results.check.shown.picture import draw
     from supple.runtime.replacing import refuse_to_replace
 
     values = locals()
@@ -116,8 +114,12 @@ def check(
     if json is not None:
         report.save(json)
     if html is not None:
+        from supple.results.check.shown.page import write_page
+
         write_page(report, html)
     if picture is not None and report.place is not None:
+        from supple.results.check.shown.picture import draw
+
         draw(report.place, picture)
     if not quiet or not report.ok:
         _print(report, only_failures=quiet)
