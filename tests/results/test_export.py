@@ -15,9 +15,10 @@ import supple as sp
 from supple.app.cli.app import main
 from supple.errors import OutputError
 from supple.results.export import glb as export_glb
-from supple.results.export import video, video_worker
+from supple.results.export import video
 from supple.results.export.exporter import FORMATS, export
 from supple.results.recording.reader import read_recording
+from supple.results.view.fields import nodal_values
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.surfaces import body_surface, surfaces_of
 
@@ -227,7 +228,7 @@ def test_a_picture_is_colored_by_a_field_has_a_legend_and_a_shadow(tmp_path, too
     image = pytest.importorskip("PIL.Image")
     pytest.importorskip("pyvista")
     tools.record(tmp_path / "r.vtkhdf", 4)
-    looks = ["--color J --camera follow", "--color J --camera follow --no-shadows"]
+    looks = ["--color J --camera follow", "--color J --camera follow --no-shadows", "--dark"]
     shown = []
     for k, look in enumerate(looks):
         path = tmp_path / f"{k}.png"
@@ -239,7 +240,8 @@ def test_a_picture_is_colored_by_a_field_has_a_legend_and_a_shadow(tmp_path, too
         with image.open(path) as page:
             shown.append(np.asarray(page.convert("RGB")).astype(int))
     assert all(picture.shape == (200, 320, 3) for picture in shown)
-    legend = shown[0][40:160, 270:300]
+    assert shown[0][:5].mean() > 220 > 60 > shown[2][:5].mean()  # the background is bright, or dark
+    legend = shown[0][40:160, 270:320]
     assert (legend[..., 0] - legend[..., 2] > 80).any()
     assert (legend[..., 2] - legend[..., 0] > 80).any()
     darker = (shown[1] - shown[0]).sum(axis=2) > 30
@@ -255,7 +257,7 @@ def test_a_field_of_quadratic_tets_has_values_at_middle_nodes(tmp_path):
     with sp.read_recording(path) as recording:
         model = model_of_recording(recording)
         moment = moment_of_frame(model, recording[-1])
-        values = video_worker._nodal(moment, np.linspace(2.0, 3.0, len(model.tets)))
+        values = np.repeat(nodal_values(moment, np.linspace(2.0, 3.0, len(model.tets)))[:, None], 3, axis=1)
         drawn = body_surface(model, model.bodies[0]).of(values)
     assert len(drawn) > len(np.unique(mesh.tets))
     assert 2.0 <= drawn.min() < drawn.max() <= 3.0

@@ -31,6 +31,7 @@ class PlacedBody(ABC):
     name, position, rotation, velocity, angular_velocity, friction : see `Body`
     mesh : the tets whose vertices move; material : of these tets
     skin : the surface that is drawn instead of the mesh's own; None where that is drawn
+    look : how it is drawn; None: see `drawn_look`
     """
 
     name: str
@@ -42,6 +43,12 @@ class PlacedBody(ABC):
     mesh: TetMesh
     material: Material
     skin: SurfaceMesh | None
+    look: str | None
+
+    @property
+    def drawn_look(self) -> str:
+        """One of `LOOKS`: the given one, or foam where its material is light, otherwise rubber."""
+        return self.look or "rubber"
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -139,6 +146,16 @@ class PlacedBody(ABC):
             )
 
 
+LOOKS = ("rubber", "gummy", "foam", "steel")
+_FOAM = 250.0  # what is lighter looks like foam [kg/m^3]
+
+
+def check_look(look: str | None, owner: str) -> None:
+    """Raise `SceneError` unless it is one of `LOOKS`, or None."""
+    if look is not None and look not in LOOKS:
+        raise SceneError(f"{owner}: look is {look!r}; give one of {', '.join(LOOKS)}")
+
+
 @dataclass(frozen=True, eq=False)
 class Body(PlacedBody):
     """One soft body of a scene.
@@ -156,6 +173,7 @@ class Body(PlacedBody):
     skin : a finer surface, in the mesh's coordinates, that follows the body in pages and exports.
     collide : what touches other things: the surface of the "tets", or the "skin", closed and outward, which then may
         reach out of the tets. Pins, forces and loads act on the tets in both cases.
+    look : how it is drawn, "rubber", "gummy", "foam" or "steel"; None for that of its material.
 
     Raises
     ------
@@ -172,6 +190,7 @@ class Body(PlacedBody):
     friction: float = 0.0
     skin: SurfaceMesh | None = field(default=None)
     collide: Literal["tets", "skin"] = "tets"
+    look: str | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name, "body")
@@ -190,10 +209,15 @@ class Body(PlacedBody):
             require_closed(self.skin, f"{owner}: skin")
             if self.skin.volume <= 0.0:
                 raise SceneError(f"{owner}: skin: its surface is inside out; give surface.flipped()")
+        check_look(self.look, owner)
         self._check_placement(owner, self.mesh.edges)
         self._require_one_value_per_tet(owner)
         if self.mesh.order == 2 and (self.material.per_tet(len(self.mesh.tets)).region != NO_REGION).any():
             raise SceneError(f'{owner}: quadratic tets need no patches; give its material integration="tets"')
+
+    @property
+    def drawn_look(self) -> str:
+        return self.look or ("foam" if float(np.mean(self.material.density)) < _FOAM else "rubber")
 
     @cached_property
     def touching(self) -> tuple[EmbeddedPoints, NDArray[np.int32]]:

@@ -40,6 +40,7 @@ def scene() -> Scene:
                     rotation=generator.normal(scale=0.15, size=3),
                     friction=0.4,
                     skin=skin,
+                    look="gummy",
                 )
             )
     return Scene(

@@ -37,6 +37,7 @@ def scene() -> Scene:
         angular_velocity=SPIN,
         friction=0.5,
         skin=shapes.gummy_bear_surface(height=HEIGHT, resolution=40),
+        look="gummy",
     )
     mesh = shapes.cylinder(radius=0.006, height=0.014, edge_length=0.004)
     placed = bear.place(bear.mesh.vertices)

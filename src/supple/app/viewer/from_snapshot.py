@@ -57,7 +57,14 @@ class MomentBuilder:
     def _model_of(self, scene: SceneDescription) -> Model:
         bodies = tuple(
             ModelBody(
-                body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), i, body.material == RIGID
+                body.name,
+                body.vertices,
+                body.tet_rows,
+                body.triangles,
+                self._skin_of(body),
+                i,
+                body.material == RIGID,
+                body.look,
             )
             for i, body in enumerate(scene.bodies)
         )

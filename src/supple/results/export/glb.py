@@ -66,7 +66,7 @@ class _Glb:
         triangles = surface.triangles
         if isinstance(surface, RigidSurface):
             x, normals = surface.vertices, vertex_normals(surface.vertices, triangles)
-            material = self._material(surface.color, surface.opacity)
+            material = self._material(surface, surface.opacity)
             node = self._mesh_node(surface.name, x, normals, triangles, material, [])
             self._place(node, np.stack([surface.pose(moment) for moment in self.moments]))
             return
@@ -77,7 +77,7 @@ class _Glb:
             x = surface.at(moment)
             normals = vertex_normals(x, triangles)
             targets.append({"POSITION": self._vectors(x - x0, bounds=True), "NORMAL": self._vectors(normals - n0)})
-        node = self._mesh_node(surface.name, x0, n0, triangles, self._material(surface.color, 1.0), targets)
+        node = self._mesh_node(surface.name, x0, n0, triangles, self._material(surface, 1.0), targets)
         if targets:
             self._animate(node, "weights", self._weights)
 
@@ -126,9 +126,12 @@ class _Glb:
         self.samplers.append({"input": self.times, "output": values, "interpolation": "LINEAR"})
         self.channels.append({"sampler": len(self.samplers) - 1, "target": {"node": node, "path": path}})
 
-    def _material(self, color: tuple[int, int, int], opacity: float) -> int:
-        linear = ((np.array(color) / 255.0 + 0.055) / 1.055) ** 2.4  # sRGB; all our colors are above its linear part
-        surface = {"baseColorFactor": [*linear.tolist(), opacity], "metallicFactor": 0.0, "roughnessFactor": 0.45}
+    def _material(self, drawn: SoftSurface | RigidSurface, opacity: float) -> int:
+        linear = (
+            (np.array(drawn.color) / 255.0 + 0.055) / 1.055
+        ) ** 2.4  # sRGB; all our colors are above its linear part
+        surface = {"baseColorFactor": [*linear.tolist(), opacity], "metallicFactor": drawn.look.metallic}
+        surface["roughnessFactor"] = drawn.look.roughness
         transparent = {"doubleSided": True, "alphaMode": "BLEND"} if opacity < 1.0 else {}
         return self._added("materials", {"pbrMetallicRoughness": surface, **transparent})
 

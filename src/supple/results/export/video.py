@@ -34,7 +34,8 @@ class Film:
     camera : "fit" shows the whole motion, "follow" moves with the bodies, "orbit" turns once around them
     view : from where: "corner", "front", "side", "top" or "back"
     color : "body", or a field of the tets: "J", "von_mises" or "energy"
-    shadows : whether bodies and obstacles cast soft shadows on floors
+    shadows : whether bodies and obstacles cast soft shadows
+    dark : whether the background is dark
     time : of a picture [s]; None: the end
 
     Raises
@@ -49,6 +50,7 @@ class Film:
     view: str = "corner"
     color: str = COLOR_BY_BODY
     shadows: bool = True
+    dark: bool = False
     time: float | None = None
 
     def __post_init__(self) -> None:

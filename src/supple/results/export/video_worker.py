@@ -13,23 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SuppleError
+from supple.results.export.legend import legend
 from supple.results.export.video import COLORS, Film
 from supple.results.recording.reader import Recording, read_recording
 from supple.results.view.camera import eye_of
-from supple.results.view.fields import Field, Limits, Range
-from supple.results.view.floor_shadow import FloorShadow, floor_shadow
+from supple.results.view.fields import Limits, Range, color_map, nodal_values
+from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
+from supple.results.view.look import Color, Look, floor_disc, theme
 from supple.results.view.model import Model, Moment
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
 _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
-_BACKGROUND, _HORIZON = "#e3e8ef", "#fbfcfd"
 # Direction [share of the radius of the scene, across, up, ahead], color and strength of each light.
 _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4), ((0.5, 1.0, -4.0), "#ffffff", 0.25))
-_BODY: Any = {"ambient": 0.28, "diffuse": 0.8, "specular": 0.25, "specular_power": 30}
-_OBSTACLE: Any = {"ambient": 0.7, "diffuse": 0.55, "specular": 0.0}
-_SHADOW_CELLS = 256
+# Colors of a field must be found again in the legend: they have little shading.
+_FIELD: Any = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}
+_SHADOW_CELLS, _FLOOR_CELLS = 256, 512
+# Of the shade in corners (ambient occlusion in the space of the picture), as shares of the radius of the scene.
+_SHADE_REACH, _SHADE_BIAS = 0.2, 0.008
 _MARGIN = 1.12  # of the distance of the camera: room beside the bodies
 _SAMPLED = 24  # moments from which the ends of a color scale are found
 
@@ -42,30 +45,37 @@ class Studio:
 
         self._film, self._view, self._distance = film, model.view, 0.0
         self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
-        plotter.set_background(_BACKGROUND, top=_HORIZON)  # pyright: ignore[reportArgumentType]
-        plotter.enable_anti_aliasing("msaa", multi_samples=4)
+        shown = theme(film.dark)
+        plotter.set_background(_share(shown.bottom), top=_share(shown.top))  # pyright: ignore[reportArgumentType]
+        plotter.enable_anti_aliasing("fxaa")  # works with the shade in corners
+        if film.shadows:
+            plotter.enable_ssao(_SHADE_REACH * model.view.radius, _SHADE_BIAS * model.view.radius, 64, blur=True)
         self._add_lights(pyvista)
         self._field = COLORS.get(film.color)
         self._meshes: list[tuple[Any, SoftSurface | RigidSurface]] = []
         ends = self._ends(moments)
-        for number, flat in enumerate(surfaces_of(model)):
+        self._legend = None if self._field is None or ends is None else legend(self._field, ends, film.size, shown)
+        for flat in surfaces_of(model):
+            if flat.is_floor:
+                continue
             surface = flat.creased(model)
             mesh = pyvista.PolyData.from_regular_faces(surface.at(moments[0]), surface.triangles)
-            look: dict[str, Any] = {"color": [c / 255.0 for c in surface.color]}
+            look: dict[str, Any] = _phong(surface.look) | {"color": _share(surface.color)}
             if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = np.zeros(mesh.n_points)
-                look = _scale(self._field, ends, film.size[0])
+                colors = {"cmap": color_map(self._field), "clim": ends, "show_scalar_bar": False}
+                look = _FIELD | {"scalars": "field"} | colors
             room = surface.room
             opacity = 1.0 if room else surface.opacity
-            actor = plotter.add_mesh(
-                mesh, opacity=opacity, culling="front" if room else None, **look,
-                **(_BODY if number < len(model.bodies) else _OBSTACLE),
-            )  # fmt: skip
+            actor = plotter.add_mesh(mesh, opacity=opacity, culling="front" if room else None, **look)
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
         self._bodies = len(model.bodies)
-        self._shadow = floor_shadow(model, _SHADOW_CELLS) if film.shadows else None
-        self._floor: Any = None if self._shadow is None else self._add_floor(pyvista, self._shadow)
+        floor = floor_shadow(model, _SHADOW_CELLS)
+        self._shadow = floor if film.shadows else None
+        if floor is not None:
+            self._add_picture(pyvista, floor.disc, floor_disc(film.dark, _FLOOR_CELLS))
+        self._floor: Any = None if floor is None else self._add_picture(pyvista, floor.corners, floor.picture([]))
         plotter.show(auto_close=False, interactive=False)  # pyvista renders nothing before
 
     def _add_lights(self, pyvista: Any) -> None:
@@ -87,15 +97,15 @@ class Studio:
         chosen = [moments[i] for i in evenly(len(moments), _SAMPLED)]
         return Limits(self._field, Range()).follow(np.concatenate([self._field.values(moment) for moment in chosen]))
 
-    def _add_floor(self, pyvista: Any, shadow: FloorShadow) -> Any:
-        mesh = pyvista.PolyData(shadow.corners, np.array([4, 0, 1, 2, 3]))
+    def _add_picture(self, pyvista: Any, corners: NDArray[np.float64], image: NDArray[np.uint8]) -> Any:
+        mesh = pyvista.PolyData(corners, np.array([4, 0, 1, 2, 3]))
         mesh.active_texture_coordinates = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
-        return self._plotter.add_mesh(mesh, texture=_texture(shadow.picture([])), lighting=False)
+        return self._plotter.add_mesh(mesh, texture=_texture(image), lighting=False)
 
     def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
         """(height, width, 3) of a moment, at a share of the film's length."""
         points = []
-        nodal = _nodal(moment, self._field.values(moment)) if self._field is not None else None
+        nodal = None if self._field is None else nodal_values(moment, self._field.values(moment))
         for mesh, surface in self._meshes:
             x = surface.at(moment)
             points.append(x)
@@ -103,14 +113,18 @@ class Studio:
             mesh.point_data["Normals"] = vertex_normals(x, surface.triangles).astype(np.float32)
             mesh.GetPointData().SetActiveNormals("Normals")
             if nodal is not None and "field" in mesh.point_data and isinstance(surface, SoftSurface):
-                mesh.point_data["field"] = surface.of(nodal)[:, 0]
+                mesh.point_data["field"] = surface.of(np.repeat(nodal[:, None], 3, axis=1))[:, 0]
         if self._shadow is not None:
             drawn = zip(points, (surface for _, surface in self._meshes), strict=True)
             cast = [(x, surface.triangles) for x, surface in drawn if surface.casts_shadow]
             self._floor.texture = _texture(self._shadow.picture(cast))
         self._aim(np.concatenate(points[: self._bodies]), share)
         self._plotter.render()
-        return np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
+        image = np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
+        if self._legend is None:
+            return image
+        colors, opaque = self._legend
+        return np.round(image * (1.0 - opaque) + colors * opaque).astype(np.uint8)
 
     def _aim(self, points: NDArray[np.float64], share: float) -> None:
         """Place the camera so that the whole motion, or the bodies at points (k, 3), fill the picture."""
@@ -138,33 +152,13 @@ class Studio:
         self._plotter.reset_camera_clipping_range()
 
 
-def _scale(field: Field, ends: tuple[float, float], width: int) -> dict[str, Any]:
-    """Colors by a field, and their legend in a picture of this width [pixels]."""
-    title = f"{field.name} [{field.unit}]" if field.unit else field.name
-    bar = {"title": title, "color": "#30343a", "vertical": True, "fmt": "%.3g", "title_font_size": max(9, width // 72)}
-    bar |= {"position_x": 0.86, "position_y": 0.2, "width": 0.06, "height": 0.6}
-    colors = "coolwarm" if field.center is not None else "viridis"
-    return {"scalars": "field", "cmap": colors, "clim": ends, "scalar_bar_args": bar}
+def _share(color: Color) -> list[float]:
+    return [each / 255.0 for each in color]
 
 
-def _nodal(moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values (n, 3), thrice the mean of the tets around each vertex; middle nodes have that of their neighbours."""
-    model = moment.model
-    known = np.asarray(np.isfinite(values))
-    corners, own = model.tets[known].ravel(), np.repeat(values[known], 4)
-    n = len(moment.positions)
-    total, count = np.bincount(corners, own, minlength=n), np.bincount(corners, minlength=n)
-    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    for body in model.bodies:  # a middle node is beside corners in the quarters of a side, but for the inner one
-        triangles = body.triangles + body.vertices.start
-        unknown = np.asarray(np.isnan(mean[triangles]))
-        mixed = np.any(unknown, axis=1) & ~np.all(unknown, axis=1)
-        around = np.repeat(np.nanmean(mean[triangles[mixed]], axis=1), unknown[mixed].sum(axis=1))
-        rows = triangles[mixed][unknown[mixed]]
-        times = np.bincount(rows, minlength=n)
-        filled = np.bincount(rows, around, minlength=n) / np.maximum(times, 1)
-        mean = np.where(np.isnan(mean) & (times > 0), filled, mean)
-    return np.repeat(np.nan_to_num(mean)[:, None], 3, axis=1)
+def _phong(look: Look) -> dict[str, Any]:
+    of = {"ambient": look.ambient, "diffuse": look.diffuse}
+    return of | {"specular": look.specular, "specular_power": look.power}
 
 
 def _texture(image: NDArray[np.uint8]) -> Any:

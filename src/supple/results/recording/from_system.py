@@ -78,6 +78,7 @@ def _body(part: BodyRange) -> RecordedBody:
         skin,
         rigid,
         bool(body.touches_with_skin),
+        body.drawn_look,
     )
 
 

@@ -33,6 +33,7 @@ from supple.results.recording.actions import (
 from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.details import RecordedDetails, RecordedField, RecordedSensor
 from supple.results.recording.physics import RecordedLaw, RecordedPhysics, RecordedWeld
+from supple.scene.body import LOOKS
 from supple.scene.joints.joint import Conditions, Function
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.registry import KINDS, restored_obstacle
@@ -77,6 +78,7 @@ class RecordedBody:
     skin : a finer surface that it carries, or None; its corners are rows of its own vertices
     rigid : whether its vertices are the control points of a rigid body, whose surface is the skin
     touches_with_skin : whether the skin is what touches other things
+    look : how it is drawn, see `supple.results.view.look`
     """
 
     name: str
@@ -87,6 +89,7 @@ class RecordedBody:
     skin: SkinnedSurface | None
     rigid: bool = False
     touches_with_skin: bool = False
+    look: str = "rubber"
 
     @property
     def sizes(self) -> Sizes:
@@ -276,6 +279,8 @@ def _check_consistency(scene: RecordedScene) -> None:
             raise ValueError(f"body {body.name!r} has rows {ends}, outside of {n} vertices and {m} tets")
         if body.rigid and (body.skin is None or [b - a for a, b in ends] != [4, 1]):
             raise ValueError(f"rigid body {body.name!r} does not have four vertices and a surface")
+        if body.look not in LOOKS:
+            raise ValueError(f"body {body.name!r} has the unknown look {body.look!r}")
         if body.touches_with_skin and body.skin is None:
             raise ValueError(f"body {body.name!r} has no skin to touch with")
         if body.skin is not None and body.skin.corners.shape[1] not in (4, 10):

@@ -98,6 +98,18 @@ def follow(client: Any, way: NDArray[np.float64]) -> None:
     _move(client, center + way, eye - center)
 
 
+def stay_above(client: Any, floor: NDArray[np.float64], view: View) -> None:
+    """Raise the camera of one visitor where it is below a floor, of which `floor` (3,) is a point [m]."""
+    camera = client.camera
+    missing = _LOWEST * view.radius - float((np.asarray(camera.position) - floor) @ view.up)
+    if missing > 0.0:
+        center = np.asarray(camera.look_at)
+        _move(client, center, np.asarray(camera.position) + missing * view.up - center)
+
+
+_LOWEST = 0.03  # height of a camera over a floor, as a share of the radius of the scene
+
+
 def _half_angle(camera: Any) -> float:
     """Half of the smaller angle of view of a camera [rad]."""
     half = 0.5 * float(np.clip(camera.fov, 0.02, 3.0))

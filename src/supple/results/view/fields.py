@@ -76,11 +76,45 @@ _SHRINK_BELOW = 0.3
 
 
 def palette(field: Field) -> NDArray[np.uint8]:
-    """(BINS, 3) colors: from blue over white to red where the field has a center, otherwise from dark to bright."""
+    """(BINS, 3) colors of a scale."""
+    return colors_of(field, np.linspace(0.0, 1.0, BINS), (0.0, 1.0))
+
+
+def colors_of(field: Field, values: NDArray[np.float64], ends: tuple[float, float]) -> NDArray[np.uint8]:
+    """(k, 3) of values (k,): from red over white to blue where the field has a center, otherwise from dark to bright.
+
+    Both are perceptually uniform on either side of their middle.
+    """
     from matplotlib import colormaps
 
-    colors = colormaps["RdBu" if field.center is not None else "viridis"](np.linspace(0.0, 1.0, BINS))
-    return np.round(255.0 * np.asarray(colors)[:, :3]).astype(np.uint8)
+    low, high = ends
+    share = np.clip((values - low) / (high - low), 0.0, 1.0)
+    return np.round(255.0 * np.asarray(colormaps[color_map(field)](share))[:, :3]).astype(np.uint8)
+
+
+def color_map(field: Field) -> str:
+    """The name that matplotlib gives to the colors of a field."""
+    return "RdBu" if field.center is not None else "viridis"
+
+
+def nodal_values(moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) the mean of the tets around each vertex; middle nodes have that of their neighbours."""
+    model = moment.model
+    known = np.asarray(np.isfinite(values))
+    corners, own = model.tets[known].ravel(), np.repeat(values[known], 4)
+    n = len(moment.positions)
+    total, count = np.bincount(corners, own, minlength=n), np.bincount(corners, minlength=n)
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    for body in model.bodies:  # a middle node is beside corners in the quarters of a side, but for the inner one
+        triangles = body.triangles + body.vertices.start
+        unknown = np.asarray(np.isnan(mean[triangles]))
+        mixed = np.any(unknown, axis=1) & ~np.all(unknown, axis=1)
+        around = np.repeat(np.nanmean(mean[triangles[mixed]], axis=1), unknown[mixed].sum(axis=1))
+        rows = triangles[mixed][unknown[mixed]]
+        times = np.bincount(rows, minlength=n)
+        filled = np.bincount(rows, around, minlength=n) / np.maximum(times, 1)
+        mean = np.where(np.isnan(mean) & (times > 0), filled, mean)
+    return np.nan_to_num(mean)
 
 
 def bin_of(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.int64]:

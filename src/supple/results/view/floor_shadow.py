@@ -11,6 +11,7 @@ from supple.results.view.model import Model
 # Of the dark rim of a contact and of the wide shadow around it, as shares of the radius of the scene: the height above
 # the floor at which it fades, and its blur; and how dark it becomes.
 _COLOR = (30, 34, 48)
+_DISC = 5.0  # half the side of that square, as a share of the radius of the scene
 _MOST = 2.0**18  # points of one triangle
 _LAYERS = ((0.06, 0.02, 0.45), (0.6, 0.09, 0.4))
 
@@ -26,7 +27,8 @@ class FloorShadow:
 
     Attributes
     ----------
-    corners : (4, 3) where the picture lies on the floor [m]
+    corners : (4, 3) where the picture lies on the floor, a little above it [m]
+    disc : (4, 3) the square about the disc that is drawn of the floor [m]
     """
 
     def __init__(
@@ -45,6 +47,7 @@ class FloorShadow:
         raised = self._origin + 5e-3 * radius * up  # two surfaces in the same plane flicker
         signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         self.corners = raised + self._half * signs @ self._axes
+        self.disc = self._origin + _DISC * radius * signs @ self._axes
 
     def darkness(self, surfaces: list[tuple[NDArray[np.float64], NDArray[np.int32]]]) -> NDArray[np.float64]:
         """(cells, cells) from 0 to 1, rows along the second side; of vertices (k, 3) [m] and triangles (t, 3)."""

@@ -20,6 +20,7 @@ from supple.results.recording.actions import RecordedJoint, RecordedStitches, no
 from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
 from supple.results.view.camera import View
 from supple.results.view.colors import body_color
+from supple.results.view.look import LOOKS, Look
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,7 @@ class ModelBody:
     skin : a finer surface that follows its tets, or None
     number : place among the bodies, which selects the color
     rigid : whether its vertices are the control points of a rigid body, whose surface is the skin
+    look_name : one of `LOOKS`
     """
 
     name: str
@@ -43,11 +45,17 @@ class ModelBody:
     skin: SkinnedSurface | None
     number: int
     rigid: bool = False
+    look_name: str = "rubber"
+
+    @property
+    def look(self) -> Look:
+        """How it reflects light."""
+        return LOOKS[self.look_name]
 
     @property
     def color(self) -> tuple[int, int, int]:
         """(r, g, b) from 0 to 255."""
-        return body_color(self.number)
+        return self.look.color(body_color(self.number))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ class ViewOptions:
     ends : of the color scale
     explode : distance by which tets are pulled apart; cut_axis : "x", "y" or "z"; cut_place : from 0 to 1
     velocities, contacts, stitches : whether they are drawn
+    dark : whether the background is dark
     """
 
     surface: str = "skin"
@@ -32,3 +33,4 @@ class ViewOptions:
     velocities: bool = False
     contacts: bool = False
     stitches: bool = True
+    dark: bool = False

@@ -20,6 +20,7 @@ from supple.results.view.layers.layer import Layer
 from supple.results.view.layers.section import Cut
 from supple.results.view.layers.surfaces import ObstacleView, SkinView
 from supple.results.view.layers.tets import TetView
+from supple.results.view.look import background
 from supple.results.view.model import Model, Moment
 from supple.results.view.options import COLOR_BY_BODY, ViewOptions
 
@@ -111,7 +112,13 @@ class Stage:
             layer.remove()
         scene, moment, options = self._scene, self.moment, self.options
         self._bodies = self._make_bodies()
-        self._layers = [self._bodies, Ground(scene, moment), ObstacleView(scene, moment), SpringView(scene, moment)]
+        scene.set_background_image(background(options.dark), format="png")
+        self._layers = [
+            self._bodies,
+            Ground(scene, moment, options.dark),
+            ObstacleView(scene, moment),
+            SpringView(scene, moment),
+        ]
         self._layers.append(ShadowView(scene, moment))
         self._layers += [PusherView(scene, moment), Dots(scene, moment, "/pins", _PIN_COLOR, 0.04, _pins)]
         self._layers.append(JointView(scene, moment))

@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from supple.results.view.colors import OBSTACLE_COLOR
+from supple.results.view.look import OBSTACLE, Look
 from supple.results.view.model import Model, ModelBody, Moment
 
 # A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
@@ -28,11 +29,13 @@ class Surface(ABC):
     name : of the body or obstacle
     triangles : (t, 3) of its vertices, counter-clockwise from outside
     color : (r, g, b) from 0 to 255
+    look : how it reflects light
     """
 
     name: str
     triangles: NDArray[np.int32]
     color: tuple[int, int, int]
+    look: Look
 
     @abstractmethod
     def at(self, moment: Moment) -> NDArray[np.float64]:
@@ -68,6 +71,7 @@ class SoftSurface(Surface):
     opacity: ClassVar[float] = 1.0
     room: ClassVar[bool] = False
     casts_shadow: ClassVar[bool] = True
+    is_floor: ClassVar[bool] = False
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (k, 3) at the drawn vertices, of values (n, 3) at all vertices of the model."""
@@ -95,6 +99,7 @@ class RigidSurface(Surface):
     opacity : from 0 to 1
     room : whether it is seen from within; its triangles face outwards, and a page draws only their backs
     casts_shadow : on floors; planes and rooms do not
+    is_floor : whether it is a plane that bodies stand on, which pictures draw as a disc
     """
 
     vertices: NDArray[np.float64]
@@ -102,6 +107,7 @@ class RigidSurface(Surface):
     opacity: float = 1.0
     room: bool = False
     casts_shadow: bool = True
+    is_floor: bool = False
 
     def at(self, moment: Moment) -> NDArray[np.float64]:
         pose = self.pose(moment)
@@ -125,7 +131,7 @@ def body_surface(model: Model, body: ModelBody) -> SoftSurface | RigidSurface:
         return boundary_surface(body)
     if not body.rigid:
         rows = np.arange(len(body.skin.corners))
-        return SoftSurface(body.name, body.skin.triangles, body.color, body, True, rows)
+        return SoftSurface(body.name, body.skin.triangles, body.color, body.look, body, True, rows)
     # Its control points give the pose; the coordinates begin at the center of mass, their mean.
     rest = model.rest_positions[body.vertices]
     center = rest.mean(axis=0)
@@ -135,13 +141,15 @@ def body_surface(model: Model, body: ModelBody) -> SoftSurface | RigidSurface:
         x = moment.finite_positions[body.vertices]
         return np.column_stack([(x[1:] - x[0]).T @ inverse, x.mean(axis=0)])
 
-    return RigidSurface(body.name, body.skin.triangles, body.color, body.skin.positions(rest) - center, pose)
+    vertices = body.skin.positions(rest) - center
+    return RigidSurface(body.name, body.skin.triangles, body.color, body.look, vertices, pose)
 
 
 def boundary_surface(body: ModelBody) -> SoftSurface:
     """The boundary of a body's tets."""
     used, rows = np.unique(body.triangles, return_inverse=True)
-    return SoftSurface(body.name, rows.reshape(-1, 3).astype(np.int32), body.color, body, False, used.astype(np.int64))
+    triangles = rows.reshape(-1, 3).astype(np.int32)
+    return SoftSurface(body.name, triangles, body.color, body.look, body, False, used.astype(np.int64))
 
 
 def obstacle_surfaces(model: Model) -> list[RigidSurface]:
@@ -159,13 +167,58 @@ def obstacle_surfaces(model: Model) -> list[RigidSurface]:
         triangles = triangles.astype(np.int32)
         if obstacle.is_room and _volume(vertices, triangles) < 0.0:
             triangles = triangles[:, ::-1].copy()
+        solid, pose = obstacle.plane is None and not obstacle.is_room, _pose_of(number)
         if obstacle.is_room:
             vertices, triangles = _lower_half(vertices, triangles, view.up)
-        solid, pose = obstacle.plane is None and not obstacle.is_room, _pose_of(number)
         made.append(
-            RigidSurface(recorded.name, triangles, OBSTACLE_COLOR, vertices, pose, opacity, obstacle.is_room, solid)
+            RigidSurface(
+                recorded.name,
+                triangles,
+                OBSTACLE_COLOR,
+                OBSTACLE,
+                vertices,
+                pose,
+                opacity,
+                obstacle.is_room,
+                solid,
+                obstacle.plane is not None and not is_wall,
+            )
         )
+        rim = rim_of(vertices, triangles, view.up, _RIM * view.radius) if obstacle.is_room else None
+        if rim is not None:
+            made.append(RigidSurface(f"{recorded.name}, rim", rim[1], OBSTACLE_COLOR, OBSTACLE, rim[0], pose))
     return made
+
+
+_RIM = 0.018  # radius of the rim of a bowl, as a share of that of the scene
+
+
+def rim_of(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int32], up: NDArray[np.float64], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
+    """A tube along the edge of an open surface, which is one loop about `up`; None where there is none."""
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    edges, back = start * np.int64(len(vertices)) + end, end * np.int64(len(vertices)) + start
+    follows = dict(zip(*(rows[~np.isin(edges, back)].tolist() for rows in (start, end)), strict=True))
+    if not follows:
+        return None
+    loop = [next(iter(follows))]
+    while (following := follows.get(loop[-1])) is not None and following != loop[0] and len(loop) <= len(follows):
+        loop.append(following)
+    if len(loop) != len(follows) or len(loop) < 3:
+        return None
+    x = vertices[loop]
+    out = x - x.mean(axis=0)
+    out -= np.outer(out @ up, up)
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    turns = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
+    ring = np.cos(turns)[:, None] * out[:, None] + np.sin(turns)[:, None] * up
+    n, m = len(loop), len(turns)
+    i, j = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
+    a, b, c, d = (((i + p) % n * m + (j + q) % m).ravel() for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    tube = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]).astype(np.int32)
+    points = (x[:, None] + radius * ring).reshape(-1, 3)
+    return points, tube if _volume(points, tube) > 0.0 else tube[:, ::-1].copy()
 
 
 def _pose_of(obstacle: int) -> Callable[[Moment], NDArray[np.float64]]:

@@ -27,7 +27,7 @@ from supple.materials.material import Material
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
-from supple.scene.body import PlacedBody
+from supple.scene.body import PlacedBody, check_look
 from supple.scene.rigid.mass_properties import MassProperties, of_solid, with_inertia, with_mass
 from supple.scene.rigid.pose import deformation_of
 
@@ -91,6 +91,7 @@ class RigidBody(PlacedBody):
     velocity : (3,) initial velocity of the center of mass [m/s].
     angular_velocity : (3,) initial spin about the center of mass [rad/s].
     friction : Coulomb coefficient against other bodies; a pair uses the geometric mean of its two.
+    look : how it is drawn: "rubber" (where it is not given), "gummy", "foam" or "steel".
     stiffness : kappa [Pa] of the energy that keeps the body rigid in `Implicit`; in `XPBD` it is exactly rigid. None:
         from the heaviest load of the scene, see `supple.scene.rigid.stiffness` and docs/theory/rigid_bodies.md.
 
@@ -119,6 +120,7 @@ class RigidBody(PlacedBody):
     friction: float = 0.0
     stiffness: float | None = None
     center: ArrayLike | None = None
+    look: str | None = None
     kappa: float = field(init=False, repr=False)
     surface: SurfaceMesh = field(init=False, repr=False)
     properties: MassProperties = field(init=False, repr=False)
@@ -141,6 +143,7 @@ class RigidBody(PlacedBody):
         derived = {"surface": surface, "skin": surface, "properties": properties}
         for key, value in (derived | {"mesh": control.mesh, "weights": control.weights}).items():
             object.__setattr__(self, key, value)
+        check_look(self.look, owner)
         self._check_placement(owner, surface.edges)
         if self.stiffness is not None:
             self._set_stiffness(positive(self.stiffness, f"{owner}: stiffness"))

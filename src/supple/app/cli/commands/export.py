@@ -7,7 +7,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import Pixels, recording_at
+from supple.app.cli.arguments import recording_at
+from supple.app.cli.film_options import FilmOptions
+
+_USUAL = FilmOptions()
 
 
 def export(
@@ -16,13 +19,7 @@ def export(
     *,
     to: str,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
-    size: Pixels = None,
-    rate: float | None = None,
-    slow: float | None = None,
-    camera: str | None = None,
-    view: str | None = None,
-    color: str | None = None,
-    shadows: bool | None = None,
+    film: FilmOptions = _USUAL,
 ) -> None:
     """Write a recording in another program's format.
 
@@ -36,31 +33,9 @@ def export(
         (a page), csv (a table of the reports of all frames).
     output
         File or folder to write, with a suffix of the format; without it, beside the recording and under its name.
-    size
-        Of a film or picture: width and height in pixels, such as 1920x1080. Without it 1280x720, of a gif 640x360.
-    rate
-        Frames per second of a film: 30 without it, of a gif 20.
-    slow
-        Slow motion: 4 makes a film four times as long as the simulation.
-    camera
-        fit (the whole motion, without it), follow (moves with the bodies) or orbit (turns once around them).
-    view
-        From where: corner (without it), front, side, top or back.
-    color
-        body (without it), or a field with a legend: J, von_mises or energy.
-    shadows
-        Whether bodies and obstacles cast soft shadows on floors: yes without it.
+    film
+        How a film or picture is drawn.
     """
     from supple.results.export.exporter import export as write
 
-    given = {
-        "size": size,
-        "rate": rate,
-        "slow": slow,
-        "camera": camera,
-        "view": view,
-        "color": color,
-        "shadows": shadows,
-    }
-    film = {key: value for key, value in given.items() if value is not None}
-    print(write(recording_at(recording), to, output, **film))
+    print(write(recording_at(recording), to, output, **film.given()))

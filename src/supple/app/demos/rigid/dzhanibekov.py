@@ -21,7 +21,7 @@ SPIN = (0.5, 10.0, 0.5)
 
 def scene() -> Scene:
     """A box of 1 x 2 x 3 without gravity; it spins about its axis of length 2, not quite exactly."""
-    box = RigidBody("box", shapes.box_surface(SIZE, (1, 1, 1)), density=1000.0, angular_velocity=SPIN)
+    box = RigidBody("box", shapes.box_surface(SIZE, (1, 1, 1)), density=1000.0, angular_velocity=SPIN, look="steel")
     return Scene([box], gravity=(0, 0, 0))
 
 

@@ -28,6 +28,8 @@ FRICTION = 0.8
 GRIPPED, LIFTED, END = 0.5, 1.5, 4.5
 LARGEST_GRIP, LARGEST_LIFT = 12.0, 60.0
 
+PALM = shapes.box_surface((0.18, 0.02, 0.04), (1, 1, 1))
+
 
 def scene() -> Scene:
     """Fingers of 20 x 60 x 20 mm, welded to carriers that slide on the palm, which slides up and down."""
@@ -43,7 +45,9 @@ def scene() -> Scene:
             position=(0, 0.0301, 0),
             friction=FRICTION,
         ),
-        RigidBody("palm", shapes.box_surface((0.18, 0.02, 0.04), (1, 1, 1)), mass=0.4, position=(0, 0.12, 0)),
+        RigidBody(
+            "palm", shapes.box_surface((0.18, 0.02, 0.04), (1, 1, 1)), mass=0.4, position=(0, 0.12, 0), look="steel"
+        ),
     ]
     lift = Curve([0, GRIPPED, LIFTED], [0, 0, LIFT])
     joints = [
@@ -58,7 +62,7 @@ def scene() -> Scene:
     for name, side in (("left", -1.0), ("right", 1.0)):
         bodies += [
             Body(f"{name} finger", finger, soft, position=(side * 0.043, 0.055, 0), friction=FRICTION),
-            RigidBody(f"{name} carrier", block, mass=0.05, position=(side * 0.043, 0.095, 0)),
+            RigidBody(f"{name} carrier", block, mass=0.05, position=(side * 0.043, 0.095, 0), look="steel"),
         ]
         welds.append(Weld(f"{name} finger", f"{name} carrier", max_distance=1e-6, name=f"{name} weld"))
         # The targets are 5 mm behind the faces of the box: fingers and motors are its springs.

@@ -18,7 +18,7 @@ from supple.errors import SceneError
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Hyperelastic, Material
 from supple.mesh.tetmesh import TetMesh
-from supple.scene.body import Body, PlacedBody
+from supple.scene.body import LOOKS, Body, PlacedBody
 from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.selection import InBox
@@ -185,6 +185,9 @@ class BodyModel(Model):
     collide: Literal["tets", "skin"] | None = Field(
         default=None, description="what touches other things: the surface of the tets (default), or the skin"
     )
+    look: Literal[LOOKS] | None = Field(  # pyright: ignore[reportInvalidTypeForm]
+        default=None, description="how it is drawn; default: foam where the material is light, otherwise rubber"
+    )
     copies: CopiesModel | None = Field(default=None, description="copies of the body")
     initial: InitialModel | None = Field(default=None, description="a deformed start")
 
@@ -214,7 +217,7 @@ class BodyModel(Model):
         return built
 
     def _placement(self) -> dict[str, Any]:
-        keys = ("position", "rotation", "velocity", "angular_velocity", "friction")
+        keys = ("position", "rotation", "velocity", "angular_velocity", "friction", "look")
         return {key: getattr(self, key) for key in keys}
 
     def _rigid(self, rigid: RigidModel, meshes: MeshStore) -> RigidBody:

@@ -123,6 +123,7 @@ def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -
         values={"friction": body.friction, **({} if isinstance(body, RigidBody) else _material_values(body.material))},
         mass=float(masses[part.vertices].sum()),
         added=body.name in added,
+        look=body.drawn_look,
     )
 
 

@@ -32,6 +32,7 @@ class BodyDescription:
     material : name of its class, or `RIGID`; values : of the parameters that a page can change, by name
     mass : [kg]
     added : whether it was added on the page
+    look : how it is drawn
     """
 
     name: str
@@ -45,6 +46,7 @@ class BodyDescription:
     values: dict[str, Value]
     mass: float
     added: bool = False
+    look: str = "rubber"
 
 
 @dataclass(frozen=True, eq=False)

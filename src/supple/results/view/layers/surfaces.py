@@ -40,6 +40,8 @@ class ObstacleView(Layer):
     def __init__(self, scene: Any, moment: Moment) -> None:
         self._parts = []
         for number, flat in enumerate(obstacle_surfaces(moment.model)):
+            if flat.is_floor:  # it is drawn as a disc
+                continue
             surface = flat.creased(moment.model)
             pose = surface.pose(moment)
             handle = scene.add_mesh_simple(

@@ -207,6 +207,18 @@ def test_a_room_is_drawn_open(server, fake):
     a, b, c = (np.asarray(bowl.vertices, dtype=np.float64)[bowl.faces[:, k]] for k in range(3))
     assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0  # faces outwards: only the inside of the far wall is drawn
     assert bowl.vertices[:, 1].max() == pytest.approx(0.0, abs=1e-6)  # the lower half
+    rim = server.scene._handle_from_node_name["/obstacles/1 bowl, rim"]
+    away = np.hypot(rim.vertices[:, 0], rim.vertices[:, 2])
+    assert 2.0 < away.min() < away.max() < 4.0
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_floor_is_a_disc_that_fades_to_the_background(server, fake, dark):
+    Stage(server, MomentBuilder().moment(fake.snapshot), ViewOptions(dark=dark))
+    assert not any(name.startswith("/obstacles/0") for name in server.scene._handle_from_node_name)
+    disc = floor_disc(dark, 64)
+    assert (disc[32, 32, 3], disc[0, 0, 3], disc[32, 0, 3]) == (255, 0, 0)
+    assert (disc[32, 32, :3].mean() < 100) == dark == (background(dark).mean() < 100)
 
 
 def test_the_colors_of_many_bodies_differ():

@@ -14,8 +14,9 @@ from supple.app.viewer.controls.controller import sequential
 from supple.app.viewer.controls.view.color_scale import ColorRange, arrows_html, bar_html
 from supple.app.viewer.controls.view.overlay import Overlay, set_theme
 from supple.app.viewer.protocol.quantities import written
-from supple.results.view.camera import PRESETS, fit, follow, look_from
+from supple.results.view.camera import PRESETS, fit, follow, look_from, stay_above
 from supple.results.view.fields import FIELDS
+from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.results.view.stage import Stage
 
@@ -147,7 +148,7 @@ class ViewControls:
         shape = self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place
         for handle in (*shape, self.velocities, self.contacts, self.stitches):
             handle.on_update(lambda _: self.apply())
-        self.dark.on_update(lambda _: set_theme(server, self.dark.value))
+        self.dark.on_update(lambda _: self._theme())
         self.camera.on_click(self._look)
         server.on_client_connect(self._welcome)
         self.follow.on_update(lambda _: self._begin_to_follow())
@@ -167,6 +168,7 @@ class ViewControls:
                 velocities=self.velocities.value,
                 contacts=self.contacts.value,
                 stitches=self.stitches.value,
+                dark=self.dark.value,
             )
             self.explode.visible = options.surface == "exploded tets"
             self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
@@ -174,6 +176,10 @@ class ViewControls:
             self._stage.apply(options)
             self.range.show()
             self.refresh()
+
+    def _theme(self) -> None:
+        set_theme(self._server, self.dark.value)
+        self.apply()
 
     def refresh(self) -> None:
         """Update the legend, the value at a chosen place, and the text about contacts."""
@@ -230,6 +236,13 @@ class ViewControls:
         """In a narrow picture, the camera is farther away than in the one that all get at first."""
         if client.camera.aspect < 1.0:
             look_from(client, PRESETS[0], self._stage.model.view)
+        client.camera.on_update(lambda _: self._stay_above(client))
+
+    def _stay_above(self, client: Any) -> None:
+        """A camera under the floor would see nothing."""
+        floor = floor_shadow(self._stage.model, 1)
+        if floor is not None:
+            stay_above(client, floor.disc[0], self._stage.model.view)
 
     def _look(self, event: Any) -> None:
         if event.client is not None:

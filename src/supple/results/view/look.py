@@ -1,0 +1,89 @@
+"""How surfaces reflect light, and what is behind them: for the page, films, pictures and glb alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Color = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Look:
+    """A surface.
+
+    Attributes
+    ----------
+    roughness, metallic : as of glTF [-]
+    ambient, diffuse, specular, power : of the model of Phong, for films
+    tint : what is mixed into the color of the body, and its share
+    """
+
+    roughness: float
+    metallic: float
+    ambient: float
+    diffuse: float
+    specular: float
+    power: float
+    tint: tuple[Color, float] = ((0, 0, 0), 0.0)
+
+    def color(self, body: Color) -> Color:
+        """The color of a body, from 0 to 255."""
+        mixed, share = self.tint
+        r, g, b = (round((1.0 - share) * own + share * other) for own, other in zip(body, mixed, strict=True))
+        return r, g, b
+
+
+LOOKS = {
+    "rubber": Look(0.55, 0.0, 0.4, 0.72, 0.22, 18.0),
+    "gummy": Look(0.18, 0.0, 0.48, 0.66, 0.6, 60.0),
+    "foam": Look(0.95, 0.0, 0.55, 0.7, 0.0, 1.0, ((250, 244, 232), 0.3)),
+    "steel": Look(0.3, 0.9, 0.3, 0.6, 0.9, 24.0, ((176, 184, 196), 0.7)),
+}
+OBSTACLE = Look(0.8, 0.0, 0.58, 0.62, 0.05, 10.0)
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colors of what is not part of the scene.
+
+    Attributes
+    ----------
+    top, bottom : of the background; floor : of the disc on which bodies stand, which fades to the background
+    cell, section : of the lines on it; text : of legends in films
+    """
+
+    top: Color
+    bottom: Color
+    floor: Color
+    cell: Color
+    section: Color
+    text: Color
+
+
+BRIGHT = Theme((236, 242, 250), (205, 217, 233), (232, 236, 243), (210, 216, 226), (176, 184, 198), (44, 50, 60))
+DARK = Theme((44, 50, 61), (20, 23, 29), (58, 64, 76), (74, 81, 95), (98, 106, 122), (226, 230, 236))
+
+
+def theme(dark: bool) -> Theme:
+    """The bright or the dark one."""
+    return DARK if dark else BRIGHT
+
+
+def background(dark: bool, rows: int = 256) -> NDArray[np.uint8]:
+    """(rows, 2, 3) a picture that fades from top to bottom."""
+    shown = theme(dark)
+    share = np.linspace(0.0, 1.0, rows)[:, None, None]
+    return np.round((1.0 - share) * shown.top + share * shown.bottom).astype(np.uint8).repeat(2, axis=1)
+
+
+def floor_disc(dark: bool, cells: int) -> NDArray[np.uint8]:
+    """(cells, cells, 4) the floor, which fades to the background outwards."""
+    place = (np.arange(cells) + 0.5) / cells * 2.0 - 1.0
+    away = np.hypot(place[:, None], place[None, :])
+    fade = np.clip((away - 0.35) / 0.62, 0.0, 1.0)
+    image = np.empty((cells, cells, 4), dtype=np.uint8)
+    image[..., :3], image[..., 3] = theme(dark).floor, np.round(255.0 * (1.0 - fade**2 * (3.0 - 2.0 * fade)))
+    return image
