@@ -13,6 +13,7 @@ from supple.results.view.fields import FIELDS
 from supple.results.view.layers.connections import length_text
 from supple.results.view.layers.section import Cut, surface
 from supple.results.view.layers.tets import exploded_facets
+from supple.results.view.look import background, floor_disc
 from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.results.view.stage import Stage
 
