@@ -70,7 +70,7 @@ class Film:
             raise OutputError(f"export: time is {self.time!r}; give seconds")
 
 
-_NEEDED = {"png": ("pyvista", "PIL"), "gif": ("pyvista", "PIL"), "mp4": ("pyvista", "imageio_ffmpeg")}
+_NEEDED = {"png": ("pyvista", "PIL"), "gif": ("pyvista", "PIL"), "mp4": ("pyvista", "PIL", "imageio_ffmpeg")}
 
 
 def write_video(recording: Recording, output: Path, film: Film) -> None:

@@ -25,6 +25,7 @@ from supple.results.view.model import Model, Moment
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
+_FINER = {"gif": 2.0, "mp4": 1.25, "png": 2.0}
 _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
 # Direction [share of the radius of the scene, across, up, ahead], color and strength of each light.
 _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4), ((0.5, 1.0, -4.0), "#ffffff", 0.25))
@@ -32,24 +33,30 @@ _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4
 _FIELD: Any = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}
 _SHADOW_CELLS, _FLOOR_CELLS = 256, 512
 # Of the shade in corners (ambient occlusion in the space of the picture), as shares of the radius of the scene.
-_SHADE_REACH, _SHADE_BIAS = 0.2, 0.008
+_SHADE_REACH, _SHADE_BIAS, _SHADE_SAMPLES = 0.2, 0.008, 32
 _MARGIN = 1.12  # of the distance of the camera: room beside the bodies
 _SAMPLED = 24  # moments from which the ends of a color scale are found
 
 
 class Studio:
-    """A scene of VTK with all surfaces of a recording, and its camera."""
+    """A scene of VTK with all surfaces of a recording, and its camera.
 
-    def __init__(self, model: Model, moments: list[Moment], film: Film) -> None:
+    finer : how many pixels are drawn along a side of each of the picture; their means have smooth edges, with the shade
+        in corners, too, of which multisampling of OpenGL knows nothing
+    """
+
+    def __init__(self, model: Model, moments: list[Moment], film: Film, finer: float = 2.0) -> None:
         import pyvista
 
         self._film, self._view, self._distance = film, model.view, 0.0
-        self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
+        self._plotter = plotter = pyvista.Plotter(
+            off_screen=True, window_size=[round(finer * n) for n in film.size], lighting="none"
+        )
         shown = theme(film.dark)
         plotter.set_background(_share(shown.bottom), top=_share(shown.top))  # pyright: ignore[reportArgumentType]
-        plotter.enable_anti_aliasing("fxaa")  # works with the shade in corners
         if film.shadows:
-            plotter.enable_ssao(_SHADE_REACH * model.view.radius, _SHADE_BIAS * model.view.radius, 64, blur=True)
+            reach, bias = (share * model.view.radius for share in (_SHADE_REACH, _SHADE_BIAS))
+            plotter.enable_ssao(radius=reach, bias=bias, kernel_size=_SHADE_SAMPLES, blur=True)
         self._add_lights(pyvista)
         self._field = COLORS.get(film.color)
         self._meshes: list[tuple[Any, SoftSurface | RigidSurface]] = []
@@ -104,6 +111,8 @@ class Studio:
 
     def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
         """(height, width, 3) of a moment, at a share of the film's length."""
+        from PIL import Image
+
         points = []
         nodal = None if self._field is None else nodal_values(moment, self._field.values(moment))
         for mesh, surface in self._meshes:
@@ -120,7 +129,8 @@ class Studio:
             self._floor.texture = _texture(self._shadow.picture(cast))
         self._aim(np.concatenate(points[: self._bodies]), share)
         self._plotter.render()
-        image = np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
+        drawn = Image.fromarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
+        image = np.asarray(drawn.resize(self._film.size, Image.Resampling.HAMMING))
         if self._legend is None:
             return image
         colors, opaque = self._legend
@@ -176,7 +186,7 @@ def write(source: Path, output: Path, film: Film) -> None:
         numbers, rate = _chosen(recording, film, kind)
         model = model_of_recording(recording)
         moments = [moment_of_frame(model, recording[k]) for k in numbers]
-        studio = Studio(model, moments, film)
+        studio = Studio(model, moments, film, _FINER[kind])
         images = (studio.picture(moment, k / max(1, len(moments) - 1)) for k, moment in enumerate(moments))
         if kind == "png":
             from PIL import Image
