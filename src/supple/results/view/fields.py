@@ -69,7 +69,7 @@ FIELDS = {
 }
 
 
-BINS = 16  # colors of a scale; each is one mesh on the page, because a mesh has one color
+BINS = 24  # colors of a scale; each is one mesh on the page, because a mesh has one color
 NOT_KNOWN_COLOR = (150, 152, 158)
 # A scale grows immediately, and shrinks only where less than this share of it is used: otherwise its ends flicker.
 _SHRINK_BELOW = 0.3

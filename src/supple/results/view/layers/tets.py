@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.mesh.topology import TET_FACETS
-from supple.results.view.fields import NOT_KNOWN_COLOR, Field, Limits, Range, bin_of, palette
+from supple.results.view.fields import NOT_KNOWN_COLOR, Field, Limits, Range, bin_of, nodal_values, palette
 from supple.results.view.layers.layer import Layer, single
 from supple.results.view.layers.section import Cut, Triangles, surface, whole
 from supple.results.view.model import Model, Moment
@@ -106,12 +106,21 @@ class TetView(Layer):
             x = x + self._offsets(moment)[self._triangles.owner][:, None]
         self._corners = x
         if self._field is None or self._limits is None:
-            color = self._body
+            color = self._body[self._triangles.owner]
         else:
             self.values = self._field.values(moment)
             self.range = self._limits.follow(self.values)
-            color = bin_of(self.values, *(self.range or (0.0, 1.0)))
-        self._drawn.update(x, color[self._triangles.owner])
+            color = bin_of(self._of_triangles(moment, self.values), *(self.range or (0.0, 1.0)))
+        self._drawn.update(x, color)
+
+    def _of_triangles(self, moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(t,) the mean of the corners, between which values change smoothly; of tets apart from each other, their own
+        values (m,)."""
+        own = values[self._triangles.owner]
+        if self._explode > 0.0:
+            return own
+        smooth = self._triangles.corners(nodal_values(moment, values)[:, None])[..., 0].mean(axis=1)
+        return np.where(np.isfinite(own), smooth, own)
 
     def tet_on_ray(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
         """The tet that a ray from `origin` (3,) in `direction` (3,) meets first, or None."""
