@@ -155,3 +155,10 @@ def test_the_notebook_runs(tmp_path):
     assert any(page.startswith("<table><caption>Report") for page in pages)
     printed = "".join(output.text for output in outputs if output.output_type == "stream")
     assert "40 of 40 frames" in printed
+
+
+@pytest.mark.parametrize("mesh", [sp.shapes.box(divisions=(1, 1, 1)), sp.shapes.gummy_bear_surface(height=1.0)])
+def test_meshes_are_shown(mesh, tmp_path):
+    player = mesh.show(height=200)
+    assert type(mesh).__name__ in player.title
+    assert "__VISER_EMBED_DATA__" in player.page

@@ -14,14 +14,14 @@ from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, vertex_array
 from supple.mesh.io.mesh_files import read_surface, write_surface
 from supple.mesh.topology import Components, connected_components, is_used, unique_edges, without_unused
-from supple.runtime.displayed import Displayed, extent
+from supple.runtime.displayed import Showable, extent
 
 if TYPE_CHECKING:
     from supple.mesh.surface_checks import SurfaceReport
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SurfaceMesh(Displayed):
+class SurfaceMesh(Showable):
     """Triangles in space, counter-clockwise seen from outside.
 
     Wrong shapes of arrays, indices out of range and coordinates that are not finite are errors. Holes,

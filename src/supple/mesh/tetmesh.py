@@ -37,7 +37,7 @@ from supple.mesh.topology import (
     unique_edges,
     without_unused,
 )
-from supple.runtime.displayed import Displayed, extent
+from supple.runtime.displayed import Showable, extent
 
 logger = logging.getLogger(__name__)
 
@@ -46,7 +46,7 @@ ROUND_OFF_UNITS = 64.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TetMesh(Displayed):
+class TetMesh(Showable):
     """Tetrahedra in space, each with det[x1-x0, x2-x0, x3-x0] > 0.
 
     Tets given with the other winding are turned by swapping their last two vertices; `turned` is their number.

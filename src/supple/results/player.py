@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from supple.errors import OutputError
+from supple.materials.elastic import StableNeoHookean
+from supple.mesh import shapes
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
 from supple.model.system import build_system, initial_state
 from supple.results.frame import Frame, start_frame
 from supple.results.recording.frame import RecordedFrame
@@ -16,6 +22,7 @@ from supple.results.recording.reader import Recording
 from supple.results.recording.recorder import Recorder
 from supple.results.view.page import write_page
 from supple.runtime.replacing import whole_file
+from supple.scene.body import Body
 from supple.scene.scene import Scene
 
 _LEAST, _MOST = 100, 4000  # heights [pixels]
@@ -60,7 +67,7 @@ class Player:
 
 
 def player_of(shown: Any, height: int) -> Player:
-    """A player of a recording, or of one frame, or of a scene at its start.
+    """A player of a recording, or of one frame, of a scene at its start, or of a mesh.
 
     Raises
     ------
@@ -80,7 +87,8 @@ def _page(shown: Any, folder: Path) -> str:
     elif isinstance(shown, RecordedFrame):
         write_page(shown.recording.path, page, frames=[shown])
     else:
-        frame = shown if isinstance(shown, Frame) else _first_frame(shown)
+        scene = _scene_of(shown) if isinstance(shown, TetMesh | SurfaceMesh) else shown
+        frame = scene if isinstance(scene, Frame) else _first_frame(scene)
         recorder = Recorder(folder / "frame.vtkhdf")
         try:
             recorder.begin(frame, 1.0, 0)
@@ -88,6 +96,18 @@ def _page(shown: Any, folder: Path) -> str:
             recorder.end()
         write_page(recorder.path, page)
     return page.read_text(encoding="utf-8")
+
+
+def _scene_of(mesh: TetMesh | SurfaceMesh) -> Scene:
+    """A scene with a mesh alone; of a surface, whether it is closed or not, as the skin of the box around it."""
+    material = StableNeoHookean(youngs=1.0, poisson=0.3)
+    if isinstance(mesh, TetMesh):
+        return Scene([Body("mesh", mesh, material)], gravity=(0, 0, 0))
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    size = np.maximum(high - low, 1e-3 * float(np.max(high - low)))
+    box = shapes.box(tuple(1.01 * size), (1, 1, 1))
+    around = TetMesh(box.vertices + 0.5 * (low + high), box.tets)
+    return Scene([Body("mesh", around, material, skin=mesh)], gravity=(0, 0, 0))
 
 
 def _first_frame(scene: Scene) -> Frame:
@@ -100,4 +120,6 @@ def _title(shown: Any) -> str:
         return f"{len(shown)} frames of {shown.path.name}"
     if isinstance(shown, Scene):
         return f"the start of {len(shown.bodies)} bodies"
+    if isinstance(shown, TetMesh | SurfaceMesh):
+        return f"a {type(shown).__name__}"
     return f"frame {shown.index}"
