@@ -30,6 +30,8 @@ SHOWN = {
     "reading_fields": Shown("reference/forces_and_stresses.md", reading_text),
     "tolerances": Shown("theory/implicit.md", table_text),
     "quadratic_tets": Shown("theory/locking.md", table_text),
+    "checked_results": Shown("learn/check_your_simulator.md", table_text),
+    "checked_results_short": Shown("../README.md", table_text),
     "rigid_heap": Shown("theory/rigid_bodies.md", table_text),
     **dict.fromkeys(
         (

@@ -1,7 +1,8 @@
 """Series in arrays of NumPy: an .npz file, or a folder of .npy files.
 
 Positions (frames, n, 3) are called positions, vertices, points, x, q or flexvert_xpos; tets (m, 4) tets, elements or
-flex_elem; triangles (t, 3) triangles, faces or indices. MuJoCo's arrays are as `mjData` and `mjModel` have them.
+flex_elem; triangles (t, 3) triangles, faces or indices; masses (n,) masses or particle_mass. MuJoCo's arrays are as
+`mjData` and `mjModel` have them.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ _POSITIONS = ("positions", "vertices", "points", "x", "q", "flexvert_xpos", "par
 _TETS = ("tets", "elements", "tetrahedra", "flex_elem", "tet_indices")
 _TRIANGLES = ("triangles", "faces", "indices", "tri_indices")
 _TIMES = ("times", "time", "t")
+_MASSES = ("masses", "particle_mass")
 _DIMENSION = ("flex_dim",)
-_NAMES = {*_POSITIONS, *_TETS, *_TRIANGLES, *_TIMES, *_DIMENSION}
+_NAMES = {*_POSITIONS, *_TETS, *_TRIANGLES, *_TIMES, *_MASSES, *_DIMENSION}
 _MOST_BYTES = 2**36
 
 
@@ -100,7 +102,13 @@ def _series(path: Path, there: Iterable[str], load: Callable[[str], NDArray[Any]
     times = first_of(_TIMES)
     if times is not None and times.shape != (len(x),):
         raise MeshError(f"{path}: it has {times.size} times for {len(x)} frames")
-    return ArraySeries(path, cells, x, None if times is None else times.astype(np.float64))
+    series = ArraySeries(path, cells, x, None if times is None else times.astype(np.float64))
+    masses = first_of(_MASSES)
+    if masses is not None:
+        if masses.shape != (n,) or not (np.isfinite(masses) & (masses >= 0.0)).all():
+            raise MeshError(f"{path}: its masses are not {n} numbers of zero or more")
+        series.masses = masses.astype(np.float64)
+    return series
 
 
 def _rows(path: Path, array: NDArray[Any] | None, width: int, count: int, kind: str) -> NDArray[np.int64]:

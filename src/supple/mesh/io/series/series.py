@@ -38,6 +38,7 @@ class Series(ABC):
     path : as the user gave it; cells : see `Cells`
     times : (frames,) [s], or None where the files have none
     numbers : (frames,) whole numbers in the names of files, or None
+    masses : (count,) of the points [kg], or None
     notes : what was left out or assumed, one sentence each
     """
 
@@ -45,6 +46,7 @@ class Series(ABC):
     cells: Cells
     times: NDArray[np.float64] | None = None
     numbers: NDArray[np.int64] | None = None
+    masses: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()
 
     @abstractmethod

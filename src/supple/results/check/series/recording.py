@@ -90,6 +90,8 @@ class SeriesRecording(RecordedScene):
         volumes = np.einsum("ij,ij->i", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6.0
         shares = np.repeat(np.abs(volumes) * (given.density or 0.0) / 4.0, 4)
         masses = np.bincount(tets.ravel(), shares, len(rest)).astype(np.float64)
+        if series.masses is not None:
+            masses = np.ascontiguousarray(series.masses[parts.points])
         starts = np.vstack([np.zeros((1, 3), dtype=np.int64), parts.ends])
         bodies = tuple(
             RecordedBody(
@@ -138,9 +140,11 @@ class SeriesRecording(RecordedScene):
         )
         known = {
             "files": True,
+            "paths": True,
             "tets": len(tets) > 0,
             "times": step is not None and count > 2,
-            "masses": given.density is not None and len(tets) == len(tets[volumes > 0.0]) > 0,
+            "masses": series.masses is not None
+            or (given.density is not None and len(tets) == np.count_nonzero(volumes > 0.0) > 0),
             "material": given.youngs is not None and given.poisson is not None,
             "gravity": given.gravity is not None,
             "free": given.free,
