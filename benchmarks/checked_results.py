@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -79,7 +80,9 @@ def main(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
                 continue
             out = folder / f"{name}_{program.lower().replace(' ', '_')}.npz"
             about = run(name, out)
-            report = check_series(out, given)
+            # MuJoCo's tets have the law of St. Venant and Kirchhoff.
+            law = "st_venant_kirchhoff" if program == "MuJoCo flex" else given.law
+            report = check_series(out, replace(given, law=law))
             counted = [report[check].failed_frames for check in ("inversion", "intersection", "tunnelling")]
             failed = ", ".join(result.name for result in report.failures)
             table.add(

@@ -19,7 +19,7 @@ Vector = Annotated[tuple[float, float, float] | None, Parameter(negative="")]
 _SETTINGS = (
     "every", "only", "skip", "max_volume_change", "max_orthogonality_error", "max_energy_gain", "max_momentum_change",
 )  # fmt: skip
-_GIVEN = ("density", "youngs", "poisson", "gravity", "dt", "free")
+_GIVEN = ("density", "youngs", "poisson", "law", "gravity", "dt", "free")
 
 
 def check(
@@ -36,6 +36,7 @@ def check(
     density: float | None = None,
     youngs: float | None = None,
     poisson: float | None = None,
+    law: str | None = None,
     gravity: Vector = None,
     dt: Seconds = None,
     fps: float | None = None,
@@ -77,6 +78,9 @@ def check(
         Young's modulus of a series [Pa].
     poisson
         Poisson's ratio of a series.
+    law
+        Of the elastic energy of a series: stable_neo_hookean (without it), neo_hookean, fixed_corotated or
+        st_venant_kirchhoff.
     gravity
         Of a series, three numbers [m/s^2].
     dt

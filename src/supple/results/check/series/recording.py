@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError, OutputError
-from supple.materials.elastic import StableNeoHookean
+from supple.materials.elastic import Elastic, FixedCorotated, NeoHookean, StableNeoHookean, StVenantKirchhoff
 from supple.materials.per_tet import NO_REGION
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.mesh.io.series.series import OtherCells, Series
@@ -19,6 +19,13 @@ from supple.results.recording.details import RecordedDetails
 from supple.results.recording.physics import NOT_KNOWN, RecordedPhysics
 from supple.results.recording.scene import RecordedBody, RecordedScene
 
+# As scene files call them.
+LAWS: dict[str, type[Elastic]] = {
+    "stable_neo_hookean": StableNeoHookean,
+    "neo_hookean": NeoHookean,
+    "fixed_corotated": FixedCorotated,
+    "st_venant_kirchhoff": StVenantKirchhoff,
+}
 # Points that were one in the first frame are apart beyond this share of the size of everything.
 _APART = 1e-6
 
@@ -30,6 +37,7 @@ class Given:
     Parameters
     ----------
     density : [kg/m^3]; youngs : [Pa]; poisson : [-]
+    law : of which the elastic energy is computed, one of `LAWS`
     gravity : (3,) [m/s^2]; dt : from frame to frame [s]
     free : whether nothing but gravity acts on the parts from outside
 
@@ -44,8 +52,11 @@ class Given:
     gravity: tuple[float, float, float] | None = None
     dt: float | None = None
     free: bool = False
+    law: str = "stable_neo_hookean"
 
     def __post_init__(self) -> None:
+        if self.law not in LAWS:
+            raise OutputError(f"check: law is {self.law!r}; give one of {', '.join(LAWS)}")
         for name in ("density", "youngs", "dt"):
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0.0):
@@ -223,7 +234,7 @@ def _step(times: NDArray[np.float64] | None, given: float | None) -> float | Non
 def _physics(given: Given, tets: int, bodies: int) -> RecordedPhysics:
     kind, mu, lam = np.full(tets, NOT_KNOWN, dtype=np.uint8), np.zeros(tets), np.zeros(tets)
     if given.youngs is not None and given.poisson is not None:
-        law = StableNeoHookean(youngs=given.youngs, poisson=given.poisson, density=given.density or 1.0)
+        law = LAWS[given.law](youngs=given.youngs, poisson=given.poisson, density=given.density or 1.0)
         rows = law.per_tet(tets)
         kind[:], mu, lam = rows.kind, rows.mu, rows.lam
     return RecordedPhysics(
