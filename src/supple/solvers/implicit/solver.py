@@ -69,7 +69,9 @@ class Implicit(Solver):
         there is contact no longer than a tenth of `dhat`, with friction than a hundredth of `friction_velocity`.
     force_tolerance : where surfaces touch, Newton also goes on until the forces left over are below this share of
         contact's [-].
-    max_iterations : of Newton in one (sub)step.
+    max_iterations : of Newton in one (sub)step. 1: one linearization, for real time; the step is not divided where it
+        does not converge. Tets still do not invert and surfaces do not cross, but bodies that meet fast can hang at each
+        other for some steps. The status is `iteration_limit` where forces are left over; the message says how much.
     linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
     max_substeps : largest number of substeps: a step that fails is halved. Steps in which scripts turn far are first
         divided into straight pieces (1024 at most), each of which may take this number. 1: never divided.
@@ -238,7 +240,8 @@ class Implicit(Solver):
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
             if taken.outcome.status is not Status.CONVERGED:
                 logger.debug("step of %g s: %s", substepping.length, taken.outcome.status)
-                if substepping.halve():
+                linearized = self.max_iterations == 1 and taken.outcome.status is Status.ITERATION_LIMIT
+                if not linearized and substepping.halve():
                     continue
                 worst, message = taken.outcome.status, _limit_message(taken.outcome.message, substepping)
                 if not worst.can_go_on:

@@ -223,7 +223,8 @@ def test_an_iteration_limit_is_reported_and_the_run_continues():
     frames = list(sp.simulate(scene, Implicit(contact=None, max_iterations=1, max_substeps=1), 1 / 60, 3))
     assert len(frames) == 3
     assert all(frame.report.status == "iteration_limit" for frame in frames)
-    assert "1 iterations" in frames[0].report.message
+    assert "1 iteration;" in frames[0].report.message
+    assert "N are left over" in frames[0].report.message
     assert all(pinned_exactly(frame) for frame in frames)
 
 
