@@ -17,13 +17,14 @@ SUBSTEPS, ITERATIONS = 10, 10
 # XPBD finds contact between particles, which are 0.1 m apart; VBD between triangles and points.
 RADIUS = 0.04 if kind == "xpbd" else 0.01
 own = scene(name)
+# Of Newton's law, as of Supple's, the first Lamé parameter of small strains is k_lambda - k_mu.
 mu, lam = YOUNGS / 2 / (1 + POISSON), YOUNGS * POISSON / (1 + POISSON) / (1 - 2 * POISSON)
 builder = newton.ModelBuilder(up_axis=newton.Axis.Z, gravity=(0.0, 0.0, own.gravity))
 for points, _, tets in own.bodies():
     builder.add_soft_mesh(
         pos=wp.vec3(0, 0, 0), rot=wp.quat_identity(), scale=1.0, vel=wp.vec3(0, 0, 0),
         vertices=[wp.vec3(*map(float, x)) for x in points], indices=tets.ravel().tolist(),
-        density=DENSITY, k_mu=mu, k_lambda=lam, k_damp=0.0, particle_radius=RADIUS,
+        density=DENSITY, k_mu=mu, k_lambda=lam + mu, k_damp=0.0, particle_radius=RADIUS,
     )  # fmt: skip
 if own.floor:
     builder.add_ground_plane()

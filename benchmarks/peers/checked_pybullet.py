@@ -16,6 +16,7 @@ from checked_scenes import DENSITY, FPS, FRAMES, POISSON, YOUNGS, save, scene
 name, out = sys.argv[1:3]
 STEPS = 20
 own = scene(name)
+# Of PyBullet's law, that of Smith and others (2018), these have the Lamé parameters of small strains.
 mu, lam = YOUNGS / 2 / (1 + POISSON), YOUNGS * POISSON / (1 + POISSON) / (1 - 2 * POISSON)
 p.connect(p.DIRECT)
 p.resetSimulation(p.RESET_USE_DEFORMABLE_WORLD)
@@ -41,8 +42,8 @@ with tempfile.TemporaryDirectory() as folder:
                 str(file),
                 mass=mass,
                 useNeoHookean=1,
-                NeoHookeanMu=mu,
-                NeoHookeanLambda=lam,
+                NeoHookeanMu=4 / 3 * mu,
+                NeoHookeanLambda=lam + 5 / 6 * mu,
                 NeoHookeanDamping=0.0,
                 collisionMargin=0.005,
                 useSelfCollision=1,
