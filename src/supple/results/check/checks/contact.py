@@ -183,18 +183,17 @@ class Containment(FrameCheck):
         surfaces, x = self.scene.surfaces, at.points
         owners = surfaces.owners
         crossing = {frozenset(pair) for pair in owners[at.meeting[1]].tolist()}
-        for solid in surfaces.pieces:
+        corners = [x[surfaces.triangles[piece.triangles].ravel()] for piece in surfaces.pieces]
+        low = np.array([own.min(axis=0) for own in corners]).reshape(-1, 3)
+        high = np.array([own.max(axis=0) for own in corners]).reshape(-1, 3)
+        for k, solid in enumerate(surfaces.pieces):
             if not solid.closed:
                 continue
-            corners = x[surfaces.triangles[solid.triangles].ravel()]
-            low, high = corners.min(axis=0), corners.max(axis=0)
-            for piece in surfaces.pieces:
+            # A contained piece is contained with its bounding box; a single vertex may also lie on the surface.
+            for other in np.flatnonzero(((low >= low[k]) & (high <= high[k])).all(axis=1)).tolist():
+                piece = surfaces.pieces[other]
                 pair = frozenset((piece.owner, solid.owner))
-                if piece is solid or not surfaces.allowed[piece.owner, solid.owner] or pair in crossing:
-                    continue
-                # A contained piece is contained with its bounding box; a single vertex may also lie on the surface.
-                points = x[surfaces.triangles[piece.triangles].ravel()]
-                if (points < low).any() or (points > high).any():
+                if other == k or not surfaces.allowed[piece.owner, solid.owner] or pair in crossing:
                     continue
                 point = x[piece.vertex].copy()
                 if is_inside(x, point, surfaces.triangles, solid.triangles):
