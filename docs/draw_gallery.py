@@ -41,9 +41,7 @@ def draw_demo(name: str, folder: Path) -> dict[str, object]:
         moments = [moment_of_frame(model, recording[round(share * (len(recording) - 1))]) for share in SHARES]
     studio = Studio(model, moments, Film(size=SIZE))
     strip = np.concatenate([studio.picture(moment, 0.0) for moment in moments], axis=1)
-    image = Image.fromarray(strip).quantize(
-        255, method=Image.Quantize.MAXCOVERAGE, kmeans=4, dither=Image.Dither.FLOYDSTEINBERG
-    )
+    image = Image.fromarray(strip).quantize(255, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.FLOYDSTEINBERG)
     PICTURES.mkdir(exist_ok=True)
     image.save(PICTURES / f"{name}.png", optimize=True)
     claims = measurement.claims()

@@ -220,8 +220,8 @@ def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float) -
     sheet = Image.new("RGB", (some[0].width, some[0].height * len(some)))
     for k, page in enumerate(some):
         sheet.paste(page, (0, k * page.height))
-    palette = sheet.quantize(255, method=Image.Quantize.MAXCOVERAGE, kmeans=4)
-    drawn = [page.quantize(palette=palette, dither=Image.Dither.NONE) for page in pages]
+    palette = sheet.quantize(255, method=Image.Quantize.FASTOCTREE)
+    drawn = [page.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for page in pages]
     # GIF has a time unit of a hundredth of a second.
     duration = max(20, round(100.0 / rate) * 10)
     drawn[0].save(output, format="GIF", save_all=True, append_images=drawn[1:], duration=duration, loop=0)
