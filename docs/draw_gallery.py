@@ -18,7 +18,7 @@ from PIL import Image
 import supple as sp
 from supple.app.demos.registry import DEMOS
 from supple.results.export.video import Film
-from supple.results.export.video_worker import Studio
+from supple.results.export.video_worker import Studio, palette_of
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 
 FOLDER = Path(__file__).parent
@@ -41,7 +41,8 @@ def draw_demo(name: str, folder: Path) -> dict[str, object]:
         moments = [moment_of_frame(model, recording[round(share * (len(recording) - 1))]) for share in SHARES]
     studio = Studio(model, moments, Film(size=SIZE))
     strip = np.concatenate([studio.picture(moment, 0.0) for moment in moments], axis=1)
-    image = Image.fromarray(strip).quantize(255, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.FLOYDSTEINBERG)
+    picture = Image.fromarray(strip)
+    image = picture.quantize(palette=palette_of(picture, dark=False), dither=Image.Dither.FLOYDSTEINBERG)
     PICTURES.mkdir(exist_ok=True)
     image.save(PICTURES / f"{name}.png", optimize=True)
     claims = measurement.claims()

@@ -20,43 +20,32 @@ from supple.results.view.camera import eye_of
 from supple.results.view.fields import Limits, Range, color_map, nodal_values
 from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
-from supple.results.view.look import Color, Look, floor_disc, theme
+from supple.results.view.look import Color, Look, background, floor_disc, theme
 from supple.results.view.model import Model, Moment
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
-_FINER = {"gif": 2.0, "mp4": 1.25, "png": 2.0}
 _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
 # Direction [share of the radius of the scene, across, up, ahead], color and strength of each light.
 _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4), ((0.5, 1.0, -4.0), "#ffffff", 0.25))
 # Colors of a field must be found again in the legend: they have little shading.
 _FIELD: Any = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}
 _SHADOW_CELLS, _FLOOR_CELLS = 256, 512
-# Of the shade in corners (ambient occlusion in the space of the picture), as shares of the radius of the scene.
-_SHADE_REACH, _SHADE_BIAS, _SHADE_SAMPLES = 0.2, 0.008, 32
 _MARGIN = 1.12  # of the distance of the camera: room beside the bodies
 _SAMPLED = 24  # moments from which the ends of a color scale are found
 
 
 class Studio:
-    """A scene of VTK with all surfaces of a recording, and its camera.
+    """A scene of VTK with all surfaces of a recording, and its camera."""
 
-    finer : how many pixels are drawn along a side of each of the picture; their means have smooth edges, with the shade
-        in corners, too, of which multisampling of OpenGL knows nothing
-    """
-
-    def __init__(self, model: Model, moments: list[Moment], film: Film, finer: float = 2.0) -> None:
+    def __init__(self, model: Model, moments: list[Moment], film: Film) -> None:
         import pyvista
 
         self._film, self._view, self._distance = film, model.view, 0.0
-        self._plotter = plotter = pyvista.Plotter(
-            off_screen=True, window_size=[round(finer * n) for n in film.size], lighting="none"
-        )
+        self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
         shown = theme(film.dark)
         plotter.set_background(_share(shown.bottom), top=_share(shown.top))  # pyright: ignore[reportArgumentType]
-        if film.shadows:
-            reach, bias = (share * model.view.radius for share in (_SHADE_REACH, _SHADE_BIAS))
-            plotter.enable_ssao(radius=reach, bias=bias, kernel_size=_SHADE_SAMPLES, blur=True)
+        plotter.enable_anti_aliasing("msaa", multi_samples=4)
         self._add_lights(pyvista)
         self._field = COLORS.get(film.color)
         self._meshes: list[tuple[Any, SoftSurface | RigidSurface]] = []
@@ -111,8 +100,6 @@ class Studio:
 
     def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
         """(height, width, 3) of a moment, at a share of the film's length."""
-        from PIL import Image
-
         points = []
         nodal = None if self._field is None else nodal_values(moment, self._field.values(moment))
         for mesh, surface in self._meshes:
@@ -129,8 +116,7 @@ class Studio:
             self._floor.texture = _texture(self._shadow.picture(cast))
         self._aim(np.concatenate(points[: self._bodies]), share)
         self._plotter.render()
-        drawn = Image.fromarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
-        image = np.asarray(drawn.resize(self._film.size, Image.Resampling.HAMMING))
+        image = np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
         if self._legend is None:
             return image
         colors, opaque = self._legend
@@ -186,14 +172,14 @@ def write(source: Path, output: Path, film: Film) -> None:
         numbers, rate = _chosen(recording, film, kind)
         model = model_of_recording(recording)
         moments = [moment_of_frame(model, recording[k]) for k in numbers]
-        studio = Studio(model, moments, film, _FINER[kind])
+        studio = Studio(model, moments, film)
         images = (studio.picture(moment, k / max(1, len(moments) - 1)) for k, moment in enumerate(moments))
         if kind == "png":
             from PIL import Image
 
             Image.fromarray(next(images)).save(output, format="PNG")
         elif kind == "gif":
-            _write_gif(images, output, rate)
+            _write_gif(images, output, rate, film)
         else:
             _write_mp4(images, output, rate, film.size)
 
@@ -211,7 +197,17 @@ def _chosen(recording: Recording, film: Film, kind: str) -> tuple[list[int], flo
     return [int(k) for k in nearest], max((count - 1) / duration, 1.0)
 
 
-def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float) -> None:
+def palette_of(image: Any, dark: bool) -> Any:
+    """A palette for a picture: 64 colors of the background, which fades, and 192 of what is before it."""
+    from PIL import Image
+
+    own = image.quantize(192, method=Image.Quantize.MAXCOVERAGE, kmeans=4).getpalette()[: 3 * 192]
+    made = Image.new("P", (1, 1))
+    made.putpalette(own + background(dark, 64)[:, 0].ravel().tolist())
+    return made
+
+
+def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, film: Film) -> None:
     """One palette for all pages, from a page of several moments: one for each page would flicker."""
     from PIL import Image
 
@@ -220,8 +216,8 @@ def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float) -
     sheet = Image.new("RGB", (some[0].width, some[0].height * len(some)))
     for k, page in enumerate(some):
         sheet.paste(page, (0, k * page.height))
-    palette = sheet.quantize(255, method=Image.Quantize.FASTOCTREE)
-    drawn = [page.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for page in pages]
+    palette = palette_of(sheet, film.dark)
+    drawn = [page.quantize(palette=palette, dither=Image.Dither.NONE) for page in pages]
     # GIF has a time unit of a hundredth of a second.
     duration = max(20, round(100.0 / rate) * 10)
     drawn[0].save(output, format="GIF", save_all=True, append_images=drawn[1:], duration=duration, loop=0)
