@@ -155,8 +155,8 @@ def test_files_that_cannot_be_checked(free, tmp_path, capsys):
 
 def test_the_checker_shares_no_code_with_the_solvers():
     code = (
-        "import sys, supple.results.check.checker\n"
-        "print([n for n in sys.modules if n.startswith(('supple.solvers', 'supple.numerics.cubic',"
+        "import sys, supple.results.check.checker, supple.app.cli.commands.check, supple.results.check.shown.page\n"
+        "print([n for n in sys.modules if n.startswith(('supple.solvers', 'supple.contact', 'supple.numerics.cubic',"
         " 'supple.mesh.surface_checks', 'ipctk'))])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
