@@ -176,8 +176,8 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             return Outcome(Status.LINE_SEARCH_FAILED, here, text, rows)
         last_length = found.length
     text = (
-        f"Newton's method took {problem.max_iterations} iteration{'s' * (problem.max_iterations > 1)}; its last step was "
-        f"{rows[-1].direction:.2e} m, the tolerance is {convergence.step:.2e} m; "
+        f"Newton's method took {problem.max_iterations} iteration{'s' * (problem.max_iterations > 1)}; "
+        f"its last step was {rows[-1].direction:.2e} m, the tolerance is {convergence.step:.2e} m; "
         f"forces of {_free_norm(here.gradient, tools) / (problem.scale or 1.0):.2e} N are left over"
     )
     return Outcome(Status.ITERATION_LIMIT, here, text, rows)
