@@ -71,7 +71,7 @@ class Implicit(Solver):
         contact's [-].
     max_iterations : of Newton in one (sub)step. 1: one linearization, for real time; the step is not divided where it
         does not converge. Tets still do not invert and surfaces do not cross, but bodies that meet fast can hang at
-        each other for some steps. The status is `iteration_limit` where forces are left over; the message says how much.
+        each other for some steps. The status is `iteration_limit` where forces are left over, which the message names.
     linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
     max_substeps : largest number of substeps: a step that fails is halved. Steps in which scripts turn far are first
         divided into straight pieces (1024 at most), each of which may take this number. 1: never divided.

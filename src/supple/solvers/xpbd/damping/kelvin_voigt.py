@@ -33,7 +33,7 @@ from supple.solvers.xpbd.damping.forces import ViscousElements, viscous_springs,
 from supple.solvers.xpbd.sweeps.groups import Groups, make_groups, make_groups_of_one_chunk
 from supple.solvers.xpbd.sweeps.ordering import Layout
 
-# The longest cycle, in substeps. A mode of which one step corrects more than .85 grows in cycles of 7; after cycles of 6
+# The longest cycle, in substeps. A mode of which one step corrects more than .85 grows in cycles of 7; after ones of 6
 # bodies fall asleep with forces off by 1.2 %.
 LONGEST_CYCLE = 4
 # a, and the largest c / a. With both a step corrects at most .68 to .84 of a mode in beams and balls of Poisson's ratio
