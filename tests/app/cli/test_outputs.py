@@ -57,7 +57,9 @@ def test_an_input_file_is_not_replaced(place, capsys, arguments):
 def test_the_folder_of_a_run_stands_for_its_recording(place, capsys, arguments):
     (place / "out").mkdir()
     assert main([*arguments, "out"]) == ExitCode.INPUT
-    assert "out is a folder without recording.vtkhdf" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert error.startswith("supple: out")
+    assert "recording.vtkhdf" in error
     (place / "r.vtkhdf").rename(place / "out" / "recording.vtkhdf")
     assert main([*arguments, "out"]) == ExitCode.OK
     assert {path.name for path in (place / "out").iterdir()} >= {
