@@ -63,7 +63,7 @@ def own_pairs(system: System, surface: RowSurface) -> OwnPairs:
     # Patches that share a node.
     by_node = adjacency(p.nodes, patch_of_node, surface.count)
     count = np.diff(by_node.start)
-    pairs = [np.zeros((0, 2), dtype=np.int64)]
+    pairs: list[NDArray[np.integer]] = [np.zeros((0, 2), dtype=np.int64)]
     for node in np.flatnonzero(count > 1):
         mine = by_node.items[by_node.start[node] : by_node.start[node + 1]]
         pairs.append(np.stack(np.meshgrid(mine, mine), axis=-1).reshape(-1, 2))
@@ -71,13 +71,13 @@ def own_pairs(system: System, surface: RowSurface) -> OwnPairs:
     near = np.unique(np.concatenate(pairs), axis=0)
     near = near[near[:, 0] <= near[:, 1]]
     corners = by_node.start[system.tets], by_node.start[system.tets + 1]
-    of_tet = [np.zeros((0, 2), dtype=np.int64)]
+    parts: list[NDArray[np.integer]] = [np.zeros((0, 2), dtype=np.int64)]
     for j in range(4):
         lengths = corners[1][:, j] - corners[0][:, j]
         rows = np.repeat(np.arange(len(system.tets)), lengths)
         places = np.arange(len(rows)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-        of_tet.append(np.stack([by_node.items[corners[0][rows, j] + places], rows], axis=1))
-    of_tet = np.concatenate(of_tet)
+        parts.append(np.stack([by_node.items[corners[0][rows, j] + places], rows], axis=1))
+    of_tet = np.concatenate(parts)
     start, neighbours = adjacency(near[:, 0], near[:, 1], q)
     tet_start, tets = adjacency(of_tet[:, 0], of_tet[:, 1], q)
     rest = surface.simplices.rest.copy()

@@ -56,10 +56,11 @@ def sensor_readings(system: System, x: NDArray[np.float64], contacts: ContactPoi
         if isinstance(sensor, SurfaceSensor):
             by = sensor.by if isinstance(sensor, ForceSensor) else None
             if by not in touched:
-                felt = contacts if by is None or contacts is None else contacts.of_pair(sensor.body, by)
-                touched[by] = _touched(system.triangles, points, felt)
+                between = contacts if by is None or contacts is None else contacts.of_pair(sensor.body, by)
+                touched[by] = _touched(system.triangles, points, between)
             rows = parts[sensor.body].triangles.start + sensor.triangles(system.scene.bodies)
-            own = Touched(*(each[rows] for each in touched[by]))
+            felt = touched[by]
+            own = Touched(felt.triangles[rows], felt.forces[rows], felt.normals[rows])
             found[sensor.name] = (
                 _taxels(sensor, own, points, rest) if isinstance(sensor, Taxels) else _force(own, points)
             )

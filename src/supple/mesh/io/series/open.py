@@ -108,8 +108,8 @@ def _numbered(path: Path, files: Iterable[Path]) -> Series:
     if not parts:
         hint = f"; {alone[0].name} has no number" if alone else ""
         raise MeshError(
-            f"{path}: there is neither a recording.vtkhdf nor frames, which are files such as frame_0001.obj with a number "
-            f"in their names{hint}"
+            f"{path}: there is neither a recording.vtkhdf nor frames, which are files such as frame_0001.obj, with a "
+            f"number in their names{hint}"
         )
     suffixes = sorted({suffix for _, suffix in parts})
     if len(suffixes) > 1:
