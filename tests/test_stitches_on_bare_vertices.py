@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.solvers.xpbd.damping.viscosity import Viscosity
 
 import supple as sp
 from supple.model.state import Status
 from supple.model.system import PinRange, System
-from supple.runtime.threads import numba_threads
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitching import no_stitching
 from supple.solvers.implicit.energies.inertia import Inertia
@@ -23,6 +21,7 @@ from supple.solvers.implicit.newton.minimize import Convergence, Problem, minimi
 from supple.solvers.implicit.newton.objective import Objective
 from supple.solvers.implicit.step_limits import StepLimits
 from supple.solvers.xpbd.constraints.stitches import stitch_constraints
+from supple.solvers.xpbd.damping.elements import matrices_of_tets, viscous_tets
 
 
 def side(points, triangles=()):
@@ -85,22 +84,24 @@ def by_xpbd(system, x, h=1 / 1200, steps=12_000):
     """Substeps without bodies; the viscous forces of the stitches are solved for exactly."""
     w = system.inverse_masses
     (constraints,) = stitch_constraints(system, w)
-    viscosity = Viscosity(system)
-    assert len(viscosity.kinds) == 1
+    tets = viscous_tets(system, w)
+    assert len(tets.tau)
     free = np.flatnonzero(w > 0.0)
     inertia = np.diag(np.repeat(1.0 / w[free], 3))
     points, v = np.column_stack([x, w]), np.zeros_like(x)
     path = [x]
-    with numba_threads(1):
-        for _ in range(steps):
-            before = points[:, :3].copy()
-            K = viscosity.at(before - 0.5 * h * v, h).reshape(len(x), 3, len(x), 3)
-            A = inertia + h * K[free][:, :, free].reshape(inertia.shape)
-            v[free] = np.linalg.solve(A, inertia @ v[free].ravel()).reshape(-1, 3)
-            points[:, :3] += h * v
-            constraints.project(points, h)
-            v = (points[:, :3] - before) / h
-            path.append(points[:, :3].copy())
+    for _ in range(steps):
+        before = points[:, :3].copy()
+        K = np.zeros((len(x), 3, len(x), 3))
+        matrices = matrices_of_tets(before - 0.5 * h * v, tets.vertices, tets.constants(), h)
+        for nodes, matrix in zip(tets.vertices, matrices.reshape(-1, 4, 3, 4, 3), strict=True):
+            K[nodes[:, None], :, nodes] += matrix.transpose(0, 2, 1, 3)
+        A = inertia + h * K[free][:, :, free].reshape(inertia.shape)
+        v[free] = np.linalg.solve(A, inertia @ v[free].ravel()).reshape(-1, 3)
+        points[:, :3] += h * v
+        constraints.project(points, h)
+        v = (points[:, :3] - before) / h
+        path.append(points[:, :3].copy())
     return np.array(path)
 
 

@@ -6,20 +6,21 @@ At the beginning of a cycle of length H the forces f solve
 
 with K the viscosity at the present shape, v_0 the velocity, and f_0 all other forces, which are taken from the cycle
 before: v_0 + H M^-1 f_0 = 2 v_0 - v_1 - H M^-1 f_1, with v_1 and f_1 the velocity and the viscous forces of that cycle.
-In the substeps of the cycle f is constant and acts with the constraints. It follows the solution in time: from that of
-the cycle before, f = f_1, v_e = 2 v_0 - v_1, with the residual r = -H (f + K v_e), one step goes
+In the substeps of the cycle f is constant and acts with the constraints. The solution is one step of preconditioned
+conjugate gradients from that of the cycle before, f = f_1, v_e = 2 v_0 - v_1; so it follows the solution in time.
+v_1 and f_1 turn with the frames of `VertexGroups`. The preconditioner is additive and has two levels,
 
-    f <- f + M (a diag(m + H k)^-1 r + c z) / H,    z = Z (Z^T (M + H K_0) Z)^-1 Z^T r,
+    P^-1 = diag(m + H k)^-1 + Z (Z^T (M + H K_0) Z)^-1 Z^T,
 
-with k a third of the trace of K's diagonal blocks, Z the interpolation from the nodes of `CoarseSpace`, K_0 the
-viscosity of the shape that the scene places, and c the length of a line search along z, at most one that suits this
-shape. v_1, f_1 and z turn with the frames of `CoarseSpace`.
+with k a third of the trace of K's diagonal blocks, and K_0 the viscosity of the shape that the scene places.
 
-Source: Toselli, Widlund, "Domain Decomposition Methods" (2005), chapter 3.
+Sources: Nocedal, Wright, "Numerical Optimization" (2006), section 5.1; Toselli, Widlund, "Domain Decomposition Methods"
+(2005), chapter 3.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,23 +28,27 @@ from numpy.typing import NDArray
 
 from supple.model.system import System, initial_state
 from supple.solvers.xpbd.damping import cycle
-from supple.solvers.xpbd.damping.coarse_space import CoarseSpace
-from supple.solvers.xpbd.damping.elements import damped_springs, damped_tets
-from supple.solvers.xpbd.damping.forces import ViscousElements, viscous_springs, viscous_tets
+from supple.solvers.xpbd.damping.coarse_space import CoarseMatrix, frames_of_groups, vertex_groups
+from supple.solvers.xpbd.damping.elements import matrices_of_springs, matrices_of_tets, viscous_springs, viscous_tets
+from supple.solvers.xpbd.damping.force_sum import ForceSum
+from supple.solvers.xpbd.damping.forces import forces_of_springs, forces_of_tets, powers_of_springs, powers_of_tets
 from supple.solvers.xpbd.sweeps.groups import Groups, make_groups, make_groups_of_one_chunk
 from supple.solvers.xpbd.sweeps.ordering import Layout
 
-# The longest cycle, in substeps. A mode of which one step corrects more than .85 grows in cycles of 7; after ones of 6
-# bodies fall asleep with forces off by 1.2 %.
+# Substeps of a cycle. The extrapolated forces need H to be short against the time in which the stiffest tets answer:
+# with exact solutions cycles of 4 have the accuracy of cycles of 1, and cycles of 6 let modes grow.
 LONGEST_CYCLE = 4
-# a, and the largest c / a. With both a step corrects at most .68 to .84 of a mode in beams and balls of Poisson's ratio
-# 0.3 to 0.49, and a little above .54 of a smooth one.
-STEP, COARSE_WEIGHT = 0.135, 4.0
-# The power that the line search needs is that of one group of elements in so many, in turn, where a body has enough.
-PARTS, ENOUGH_GROUPS = 8, 8
-# Change of the rate of strain in a cycle, times H, beyond which a body begins from f = 0: bodies that are released from
-# random positions gain energy without limit otherwise.
+# Of the conjugate gradients. The largest eigenvalue of P^-1 (M + H K) is 2.5 to 5. Longer steps, which one solution
+# may take where modes of small eigenvalues dominate, let the highest modes overshoot, cycle after cycle.
+LONGEST_STEP = 0.4
+# The power that the step needs is that of one group of elements in so many, in turn, where a body has groups enough.
+# It may be wrong by some per cent; `LONGEST_STEP` keeps the iteration stable for any value.
+PARTS, ENOUGH_GROUPS = 4, 64
+# Change of strain in a cycle beyond which a body begins from f = 0: bodies that are released from random positions gain
+# energy without limit otherwise.
 LARGEST_STRAIN = 0.3
+# Tets whose matrices are in memory at the same time: 50 MB.
+_BATCH = 40_000
 _MOST_MATRICES = 8
 
 
@@ -71,10 +76,8 @@ def make_damping(system: System, layout: Layout, inverse_masses: NDArray[np.floa
     ----------
     inverse_masses : (n + a,) of the vertices and of the stitches' anchors [1/kg]
     """
-    laws = (viscous_tets, damped_tets), (viscous_springs, damped_springs)
-    kinds = [(law, *damped(system, inverse_masses)) for law, damped in laws]
-    kinds = [kind for kind in kinds if len(kind[1])]
-    return Damping(system, layout, inverse_masses, kinds) if kinds else None
+    damping = Damping(system, layout, inverse_masses)
+    return damping if damping.tau > 0.0 else None
 
 
 class Damping:
@@ -83,65 +86,75 @@ class Damping:
     Attributes
     ----------
     tau : the largest Kelvin-Voigt time [s]
-
-    Parameters
-    ----------
-    kinds : law, vertices and constants of each kind of elements
     """
 
-    def __init__(self, system: System, layout: Layout, inverse_masses: NDArray[np.float64], kinds: list) -> None:
-        self._layout, n = layout, len(inverse_masses)
-        self.tau = float(max(constants[:, -1].max() for *_, constants in kinds))
+    def __init__(self, system: System, layout: Layout, inverse_masses: NDArray[np.float64]) -> None:
+        tets, springs = viscous_tets(system, inverse_masses), viscous_springs(system, inverse_masses)
+        self._elements = [
+            (kind.vertices, kind.constants(), matrices)
+            for kind, matrices in ((tets, matrices_of_tets), (springs, matrices_of_springs))
+            if len(kind.tau)
+        ]
+        self.tau = float(max(tets.tau.max(initial=0.0), springs.tau.max(initial=0.0)))
+        if not self._elements:
+            return
+        self._layout = layout
+        laws = (tets, forces_of_tets, powers_of_tets), (springs, forces_of_springs, powers_of_springs)
+        self._sums = [
+            ForceSum(
+                (forces, powers),
+                kind.vertices,
+                kind.constants(),
+                _groups_of(kind.vertices, layout, system, len(inverse_masses)),
+            )
+            for kind, forces, powers in laws
+            if len(kind.tau)
+        ]
+        n = len(system.masses)
         placed = initial_state(system.scene).positions[layout.old_from_new[: system.bodies[-1].vertices.stop]]
-        stitched = system.stitching.rigid.positions(placed), system.stitching.anchors.at(0.0)
-        self._placed = np.concatenate([placed, *stitched])
-        touched = np.unique(np.concatenate([vertices.ravel() for _, vertices, _ in kinds])).astype(np.int64)
+        self._placed = np.concatenate(
+            [placed, system.stitching.rigid.positions(placed), system.stitching.anchors.at(0.0)]
+        )
+        touched = np.unique(np.concatenate([vertices.ravel() for vertices, *_ in self._elements])).astype(np.int64)
         movable = inverse_masses[touched] > 0.0
         rows, self._held = touched[movable], touched[~movable]
-        space = self._coarse_space = CoarseSpace.of(rows, self._placed, system.joined_components, system.components)
-        self._space = space.rows, space.start, space.blocks, space.offsets, space.nodes, space.weights
-        self._masses = np.zeros(n)
-        given = system.masses if system.effective_masses is None else system.effective_masses
-        self._masses[: len(given)] = given
-        self._motion = np.zeros((n, 10))
-        self._forces, self._local_forces, self._local_velocities = (np.zeros((len(rows), 3)) for _ in range(3))
-        self._frames = np.zeros((len(space.start) - 1, 3, 3))
-        self._products = np.zeros((len(space.blocks) - 1, 2))
-        self._coarse, self._restricted = (np.zeros(3 * space.node_start[-1]) for _ in range(2))
-        body_of = np.full(n, -1, dtype=np.int64)
-        body_of[space.rows] = np.repeat(np.arange(len(space.blocks) - 1), np.diff(space.start[space.blocks]))
-        self._body_of_row = body_of[space.rows]
-        self._kinds = [
-            ViscousElements(law, vertices, constants, _groups_of(vertices, layout, system, n))
-            for law, vertices, constants in kinds
-        ]
+        self._groups = vertex_groups(rows, self._placed, system.joined_components, system.components)
+        self._masses = np.zeros(len(inverse_masses))
+        self._masses[:n] = system.masses if system.effective_masses is None else system.effective_masses
+        self._motion = np.zeros((len(inverse_masses), 6))
+        self._viscous = np.zeros((len(inverse_masses), 4))
+        r, g = len(rows), len(self._groups.start) - 1
+        self._forces, self._local_forces, self._local_velocities = (np.zeros((r, 3)) for _ in range(3))
+        self._frames, self._products = np.zeros((g, 3, 3)), np.zeros((g, 2))
+        self._coarse = np.zeros(12 * g)
+        body_of_group = np.repeat(np.arange(len(self._groups.blocks) - 1), np.diff(self._groups.blocks))
         # The body of each group of elements; all vertices of an element that can move belong to one.
-        bodies_of = [
-            body_of[vertices[made.members[:, 0]]].max(axis=1)
-            for made, (_, vertices, _) in zip(self._kinds, kinds, strict=True)
+        group_of_element = [self._groups.group_of[vertices].max(axis=1) for vertices, *_ in self._elements]
+        self._bodies = [
+            body_of_group[group_of[made.members[:, 0]]]
+            for made, group_of in zip(self._sums, group_of_element, strict=True)
         ]
-        counts = sum(np.bincount(bodies, minlength=len(self._products)) for bodies in bodies_of)
-        parts = np.clip(counts // ENOUGH_GROUPS, 1, PARTS)
-        self._shares = parts.astype(np.float64)
-        self._parts = [
-            [_places(bodies) % parts[bodies] == part % parts[bodies] for part in range(PARTS)] for bodies in bodies_of
-        ]
-        self._numbers = 3 * space.node_start
-        self._cycle, self._interval = 0, 0.0
-        self._prepared: dict[tuple[int, int], NDArray[np.float32]] = {}
+        self._weights = [_weights_of_parts(bodies) for bodies in self._bodies]
+        self._cycle = 0
+        self._interval = 0.0
+        self._prepared: dict[tuple[int, int], tuple[NDArray[np.float64], CoarseMatrix]] = {}
 
     def begin_step(self, memory: ViscousMemory | None, state_velocities: NDArray[np.float64]) -> None:
         """Continue from the memory of a state (its velocities in the scene's numbering), if it belongs to it."""
-        self._interval, self._cycle = 0.0, 0
-        self._forces[:] = self._local_forces[:] = 0.0
-        if memory is not None and np.array_equal(memory.state_velocities, state_velocities):
-            old = self._layout.old_from_new[self._coarse_space.rows]
+        known = memory is not None and np.array_equal(memory.state_velocities, state_velocities)
+        if memory is not None and known:
+            old = self._layout.old_from_new[self._groups.rows]
             self._local_forces[:], self._local_velocities[:] = memory.forces[old], memory.velocities[old]
             self._interval = memory.interval
+        else:
+            self._local_forces[:] = 0.0
+            self._interval = 0.0
+        self._forces[:] = 0.0
+        self._cycle = 0
 
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:
         """Damp only elements with a vertex that can move, of inverse masses (n + a,) [1/kg]."""
-        for made in self._kinds:
+        for made in self._sums:
             made.choose(inverse_masses)
 
     def begin_cycle(
@@ -158,77 +171,92 @@ class Damping:
         ----------
         points : (n + a, 4) positions [m] at its beginning; velocities : (n, 3), anchor_velocities : (a, 3) [m/s]
         """
-        H, motion, last = substeps * h, self._motion, (self._local_forces, self._local_velocities)
-        inverses = self._inverses(substeps, h)
-        limits = min(1.0, H / self._interval) if self._interval > 0.0 else 0.0, LARGEST_STRAIN / H
-        # Positions in the middle of the last substep, at which a rotation has no rate of strain.
-        motion[: len(velocities), 3:6], motion[len(velocities) :, 3:6] = velocities, anchor_velocities
-        motion[:, :3], motion[:, 6:] = points[:, :3] - 0.5 * h * motion[:, 3:6], 0.0
-        cycle.begin(self._space, velocities, limits, last, self._frames, self._forces, motion)
-        self._add(h)
-        at = self._space, self._frames, H
-        cycle.restrict(*at, self._forces, motion, self._restricted)
+        groups, motion = self._groups, self._motion
+        H = substeps * h
+        k, coarse = self._preconditioner(substeps, h)
+        cycle.place(points, velocities, anchor_velocities, h, motion)
+        frames_of_groups(groups.start, groups.rows, motion, groups.offsets, self._frames)
+        shape = groups.start, groups.rows, groups.fields, self._frames
+        ratio = min(1.0, H / self._interval) if self._interval > 0.0 else 0.0
+        cycle.extrapolate(*shape, motion, self._forces, self._local_forces, self._local_velocities, ratio)
+        self._apply(h)
+        fast = self._fast_bodies(H)
+        if fast.any():
+            cycle.forget(groups.start, groups.rows, groups.blocks, fast, velocities, self._forces, motion)
+            self._apply(h)
+        cycle.restrict(*shape, H, self._forces, self._viscous, self._coarse)
+        coarse.solve(self._coarse)
         motion[self._held, 3:] = 0.0
-        matrices = self._numbers, inverses, STEP
-        found = self._restricted, self._coarse, self._forces, motion, self._products
-        cycle.correct(*at, self._masses, matrices, *found)
-        self._add(h, self._cycle % PARTS)
-        where = *at, self._masses, STEP * COARSE_WEIGHT, self._shares, self._products
-        cycle.step(*where, velocities, motion, self._forces, last)
+        where = groups.blocks, H, self._masses
+        cycle.correct(*shape, *where, k, self._forces, self._viscous, self._coarse, motion, self._products)
+        found = self._products, self._powers(h)
+        cycle.step(
+            groups.start, groups.rows, groups.blocks, H, LONGEST_STEP, self._masses, motion, *found, self._forces
+        )
+        cycle.keep(*shape, velocities, self._forces, self._local_forces, self._local_velocities)
         self._interval = 0.0
         self._cycle += 1
 
     def push(self, points: NDArray[np.float64], h: float) -> None:
         """Move points (n, 4) by the viscous forces, in a substep of h [s]: x += h^2 w f."""
-        cycle.push(self._coarse_space.rows, points, self._forces, h)
+        cycle.push(self._groups.rows, points, self._forces, h)
         self._interval += h
 
     @property
     def acting(self) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
         """The damped vertices (k,) and the present viscous forces on them (k, 3) [N]."""
-        return self._coarse_space.rows, self._forces
+        return self._groups.rows, self._forces
 
     def memory(self, state_velocities: NDArray[np.float64]) -> ViscousMemory:
         """Of a state with these velocities (n, 3), in the scene's numbering."""
-        old = self._layout.old_from_new[self._coarse_space.rows]
+        old = self._layout.old_from_new[self._groups.rows]
         forces, velocities = np.zeros_like(state_velocities), np.zeros_like(state_velocities)
         forces[old], velocities[old] = self._local_forces, self._local_velocities
         return ViscousMemory(forces, velocities, self._interval, state_velocities)
 
-    def _add(self, h: float, part: int | None = None) -> None:
-        """Add K v to `_motion`, of all groups of elements that can move or of a part of those of each body."""
-        for made, parts in zip(self._kinds, self._parts, strict=True):
-            made.add(self._motion, h, made.active if part is None else made.active & parts[part])
+    def _fast_bodies(self, H: float) -> NDArray[np.bool_]:
+        """(b,) where the strain of an element changes so much in a cycle that f_1 and v_1 are not guesses for it."""
+        fast = np.zeros(len(self._groups.blocks) - 1, dtype=np.bool_)
+        for made, bodies in zip(self._sums, self._bodies, strict=True):
+            fast[bodies[made.rates > (LARGEST_STRAIN / H) ** 2]] = True
+        return fast
 
-    def _inverses(self, substeps: int, h: float) -> NDArray[np.float32]:
-        """The inverses of the coarse matrices, for a length of substeps that is near enough."""
+    def _apply(self, h: float) -> None:
+        self._viscous[:] = 0.0
+        for made in self._sums:
+            made.add(self._motion, h, self._viscous)
+
+    def _powers(self, h: float) -> NDArray[np.float64]:
+        """(b,) forces times velocities in `_motion` of each body, from the part of its groups whose turn it is [W]."""
+        total = np.zeros(len(self._groups.blocks) - 1)
+        for made, bodies, weights in zip(self._sums, self._bodies, self._weights, strict=True):
+            made.find_powers(self._motion, h, weights[self._cycle % PARTS])
+            total += np.bincount(bodies, made.powers, len(total))
+        return total
+
+    def _preconditioner(self, substeps: int, h: float) -> tuple[NDArray[np.float64], CoarseMatrix]:
+        """The diagonal k of the rows and the coarse matrix, for a length of substeps that is near enough."""
         key = substeps, round(2.0 * np.log2(h))
         if key not in self._prepared:
             if len(self._prepared) == _MOST_MATRICES:
                 self._prepared.clear()
-            self._prepared[key] = self._made_for(substeps, 2.0 ** (0.5 * key[1]))
+            near = 2.0 ** (0.5 * key[1])
+            diagonal = np.zeros(len(self._placed))
+            coarse = CoarseMatrix(self._groups, self._masses, self._matrices(near, diagonal), substeps * near)
+            self._prepared[key] = diagonal[self._groups.rows], coarse
         return self._prepared[key]
 
-    def _made_for(self, substeps: int, h: float) -> NDArray[np.float32]:
-        """Column after column of the coarse matrices of all bodies at once."""
-        space, motion, H, numbers = self._coarse_space, self._motion, substeps * h, self._numbers
-        counts = np.diff(numbers)
-        matrices = [np.zeros((count, count)) for count in counts]
-        self._frames[:], self._forces[:] = np.eye(3), 0.0
-        for column in range(counts.max()):
-            node, axis = divmod(column, 3)
-            motion[:, :3], motion[:, 3:] = self._placed, 0.0
-            nodes = (space.node_start[:-1] + node)[self._body_of_row]
-            shares = np.where(space.nodes == nodes[:, None], space.weights, 0.0).sum(axis=1)
-            motion[space.rows, 3 + axis] = shares
-            for made in self._kinds:
-                made.add(motion, h, np.ones_like(made.active))
-            motion[space.rows, 6 + axis] += self._masses[space.rows] * shares / H
-            cycle.restrict(self._space, self._frames, -H, self._forces, motion, self._restricted)
-            for matrix, begin, count in zip(matrices, numbers[:-1], counts, strict=True):
-                if column < count:
-                    matrix[column] = self._restricted[begin : begin + count]
-        return space.inverses(matrices)
+    def _matrices(
+        self, h: float, diagonal: NDArray[np.float64]
+    ) -> Iterator[tuple[NDArray[np.int32], NDArray[np.float64]]]:
+        """Elements and their matrices in batches; adds their part of k to `diagonal` (n + a,)."""
+        for vertices, constants, matrices in self._elements:
+            for low in range(0, len(vertices), _BATCH):
+                batch = slice(low, low + _BATCH)
+                K = matrices(self._placed, vertices[batch], constants[batch], h)
+                shares = np.einsum("mcc->mc", K).reshape(len(K), -1, 3).mean(axis=2)
+                np.add.at(diagonal, vertices[batch], shares)
+                yield vertices[batch], K
 
 
 def _groups_of(vertices: NDArray[np.int32], layout: Layout, system: System, n_vertices: int) -> Groups:
@@ -236,16 +264,21 @@ def _groups_of(vertices: NDArray[np.int32], layout: Layout, system: System, n_ve
 
     No group has elements of two joined components.
     """
-    if vertices.max() < len(layout.rank) and n_vertices == len(layout.rank):
+    if len(vertices) and vertices.max() < len(layout.rank) and n_vertices == len(layout.rank):
         return make_groups(replace(layout, body=system.joined_components), vertices)
     return make_groups_of_one_chunk(vertices, system.joined_components, n_vertices)
 
 
-def _places(bodies: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(g,) the place of each group of elements among those of its body (g,)."""
-    order, places = np.argsort(bodies, kind="stable"), np.zeros_like(bodies)
-    places[order] = np.arange(len(bodies)) - np.searchsorted(bodies[order], bodies[order])
-    return places
+def _weights_of_parts(bodies: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(PARTS, g) how much each group of elements counts in a sum over one part that stands for all of its body (g,)."""
+    weights = np.ones((PARTS, len(bodies)))
+    for body in np.unique(bodies):
+        own = np.flatnonzero(bodies == body)
+        if len(own) >= ENOUGH_GROUPS:
+            weights[:, own] = 0.0
+            for part in range(PARTS):
+                weights[part, own[part::PARTS]] = len(own) / len(own[part::PARTS])
+    return weights
 
 
 def cycle_lengths(substeps: int) -> list[int]:
