@@ -47,7 +47,7 @@ def cheaper(arguments):
     """Options that give a command fewer frames and pixels than a person would want."""
     if arguments[:2] == ["run", "ball.yaml"]:
         return ["--steps", "20"]
-    return ["--size", "160x120"] if {"mp4", "picture"} & {*arguments} else []
+    return ["--size", "160x120"] if {"mp4", "picture"} & {*arguments} and "--size" not in arguments else []
 
 
 @pytest.mark.parametrize("page", WITH_PROGRAMS)

@@ -175,7 +175,7 @@ def test_the_page_can_be_dark(fresh):
     assert corner() > 240
     fresh.screen.show_tab("View")
     fresh.tab.locator(f'[id="{views.dark._impl.uuid}"]').click()
-    fresh.screen.wait(lambda: corner() < 50, "the dark picture")
+    fresh.screen.wait(lambda: corner() < 60, "the dark picture")
     fresh.tab.locator(f'[id="{views.dark._impl.uuid}"]').click()
     fresh.screen.wait(lambda: corner() > 240, "the light picture")
     fresh.screen.show_tab("Bodies")
