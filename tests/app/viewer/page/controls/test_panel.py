@@ -223,8 +223,8 @@ def test_the_pusher_follows_the_pointer(live, server, visitor, received, until):
     until(lambda: live.panel.mouse._backdrop is not None)
     visitor.set(controls.radius_input.handle, 0.2)
     backdrop = server.scene._handle_from_node_name["/backdrop"]
-    # The camera stands at z = -5, a little above the floor, and looks along z: the ball stays in the plane of the bodies'
-    # middle.
+    # The camera stands at z = -5, a little above the floor, and looks along z: the ball stays in the plane of the
+    # middle of the bodies.
     middle = live.stage.moment.positions.mean(axis=0)
     visitor.drag(backdrop, "start", (0.0, 0.0, 50.0), (0.0, 0.0, 50.0))
     until(lambda: live.panel.mouse._pushes)
