@@ -4,7 +4,7 @@ import numpy as np
 
 from supple.results.check.geometry.box_tree import triangle_boxes
 from supple.results.check.geometry.moving_triangles import triangles_pass
-from supple.results.check.geometry.surface_pairs import counts, push
+from supple.results.check.geometry.surface_pairs import counts, push_children
 from supple.runtime.kernel_cache import njit
 
 
@@ -82,14 +82,6 @@ def passing_pairs(x0, x1, triangles, owners, allowed, ignored, order, nodes, out
                         if found < len(out):
                             out[found, 0], out[found, 1] = a, b
                         found += 1
-        elif i == j:
-            stack, top = push(stack, top, nodes[i, 2], nodes[i, 2])
-            stack, top = push(stack, top, nodes[i, 3], nodes[i, 3])
-            stack, top = push(stack, top, nodes[i, 2], nodes[i, 3])
-        elif leaf_j or (not leaf_i and nodes[i, 1] - nodes[i, 0] >= nodes[j, 1] - nodes[j, 0]):
-            stack, top = push(stack, top, nodes[i, 2], j)
-            stack, top = push(stack, top, nodes[i, 3], j)
         else:
-            stack, top = push(stack, top, i, nodes[j, 2])
-            stack, top = push(stack, top, i, nodes[j, 3])
+            stack, top = push_children(stack, top, nodes, i, j)
     return found

@@ -30,6 +30,21 @@ def push(stack, top, i, j):
     return stack, top + 1
 
 
+@njit
+def push_children(stack, top, nodes, i, j):
+    """Put the pairs below a pair of nodes of a tree, not both leaves, on a stack; returns the stack and its top."""
+    leaf_i, leaf_j = nodes[i, 2] < 0, nodes[j, 2] < 0
+    if i == j:
+        stack, top = push(stack, top, nodes[i, 2], nodes[i, 2])
+        stack, top = push(stack, top, nodes[i, 3], nodes[i, 3])
+        return push(stack, top, nodes[i, 2], nodes[i, 3])
+    if leaf_j or (not leaf_i and nodes[i, 1] - nodes[i, 0] >= nodes[j, 1] - nodes[j, 0]):
+        stack, top = push(stack, top, nodes[i, 2], j)
+        return push(stack, top, nodes[i, 3], j)
+    stack, top = push(stack, top, i, nodes[j, 2])
+    return push(stack, top, i, nodes[j, 3])
+
+
 @njit(cache=True)
 def meeting_pairs(x, triangles, owners, allowed, ignored, low, high, order, nodes, node_low, node_high, out):
     """How many pairs of triangles meet; the first ones are written to out (k, 2).
@@ -61,16 +76,8 @@ def meeting_pairs(x, triangles, owners, allowed, ignored, low, high, order, node
                         if found < len(out):
                             out[found, 0], out[found, 1] = a, b
                         found += 1
-        elif i == j:
-            stack, top = push(stack, top, nodes[i, 2], nodes[i, 2])
-            stack, top = push(stack, top, nodes[i, 3], nodes[i, 3])
-            stack, top = push(stack, top, nodes[i, 2], nodes[i, 3])
-        elif leaf_j or (not leaf_i and nodes[i, 1] - nodes[i, 0] >= nodes[j, 1] - nodes[j, 0]):
-            stack, top = push(stack, top, nodes[i, 2], j)
-            stack, top = push(stack, top, nodes[i, 3], j)
         else:
-            stack, top = push(stack, top, i, nodes[j, 2])
-            stack, top = push(stack, top, i, nodes[j, 3])
+            stack, top = push_children(stack, top, nodes, i, j)
     return found
 
 

@@ -223,17 +223,23 @@ def test_the_pusher_follows_the_pointer(live, server, visitor, received, until):
     until(lambda: live.panel.mouse._backdrop is not None)
     visitor.set(controls.radius_input.handle, 0.2)
     backdrop = server.scene._handle_from_node_name["/backdrop"]
-    # The camera stands at z = -5, a little above the floor, and looks along z: the ball stays in the plane of the
-    # middle of the bodies.
+    # The ball stays in the plane across the camera's direction through the middle of the bodies.
     middle = live.stage.moment.positions.mean(axis=0)
+    camera = next(iter(server.get_clients().values())).camera
+
+    def in_plane(end):
+        eye = np.asarray(camera.position)
+        ahead, way = np.asarray(camera.look_at) - eye, np.asarray(end) - eye
+        return eye + way * (ahead @ (middle - eye)) / (ahead @ way)
+
     visitor.drag(backdrop, "start", (0.0, 0.0, 50.0), (0.0, 0.0, 50.0))
     until(lambda: live.panel.mouse._pushes)
     visitor.drag(backdrop, "update", (0.0, 0.0, 50.0), (11.0, 0.0, 50.0))
     first, second = received(), received()
     assert isinstance(first, MovePusher)
     assert first.radius == pytest.approx(0.2)
-    np.testing.assert_allclose(first.center, (0.0, 0.0, middle[2]), atol=0.05)
-    np.testing.assert_allclose(second.center, (11.0 * (5.0 + middle[2]) / 55.0, 0.0, middle[2]), atol=0.05)
+    np.testing.assert_allclose(first.center, in_plane((0.0, 0.0, 50.0)), atol=1e-9)
+    np.testing.assert_allclose(second.center, in_plane((11.0, 0.0, 50.0)), atol=1e-9)
     # On a body it starts in front of it.
     handle, touched = live.stage.body_handles[0], live.stage.moment.positions[0]
     visitor.drag(backdrop, "end", (0.0, 0.0, 50.0), (11.0, 0.0, 50.0))
