@@ -9,6 +9,9 @@ import supple as sp
 from supple.mesh.surface import SurfaceMesh
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
+from supple.results.recording.scene import RecordedObstacle
+from supple.results.view.bounds import view_of_scene
+from supple.results.view.camera import direction_of, fitted
 from supple.results.view.floor_shadow import FloorShadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame, view_of
 from supple.results.view.surfaces import body_surface, obstacle_surfaces, split_at_creases, vertex_normals
@@ -50,17 +53,36 @@ def test_moving_obstacles_follow_their_pose(recording, model):
     np.testing.assert_allclose(last - first, np.tile([0, 0, 0.8], (8, 1)), atol=1e-12)
 
 
-@pytest.mark.parametrize("angle", [30.0, 60.0])
-def test_the_camera_sees_every_body_in_every_frame(recording, angle):
+@pytest.mark.parametrize(("preset", "slopes"), [("corner", (0.27, 0.27)), ("top", (1.2, 0.6)), ("side", (0.1, 0.3))])
+def test_the_camera_sees_every_body_in_every_frame(recording, preset, slopes):
     view = view_of(recording)
-    eye = view.eye(angle)
-    ahead = view.center - eye
-    ahead /= np.linalg.norm(ahead)
+    away = direction_of(preset, view)
+    target, distance = fitted(view.outline, away, view.up, slopes)
+    eye = target + distance * away
+    right = np.cross(view.up, away) / np.linalg.norm(np.cross(view.up, away))
+    axes = np.stack([right, np.cross(away, right)])
     for frame in recording:
         toward = frame.state.positions - eye
-        cosines = toward @ ahead / np.linalg.norm(toward, axis=1)
-        assert np.degrees(np.arccos(cosines)).max() <= 0.5 * angle
+        seen = np.abs(toward @ axes.T) / -(toward @ away)[:, None] / slopes
+        assert seen.min() >= 0.0  # before the eye
+        assert seen.max() <= 1.0
+    seen = (view.outline - eye) @ axes.T / -((view.outline - eye) @ away)[:, None] / slopes
+    np.testing.assert_allclose(seen.max(axis=0), -seen.min(axis=0), atol=0.01)  # in the middle
+    assert np.abs(seen).max() > 0.8  # and it fills the picture
     assert eye[1] > view.center[1]
+
+
+def test_a_bowl_is_seen_whole_and_a_hall_is_not():
+    low, high, up = np.full(3, -0.1), np.full(3, 0.1), np.array([0.0, 1.0, 0.0])
+
+    def view(radius):
+        shape = {"center": np.zeros(3), "radius": np.array(radius), "inside": np.array(True)}
+        bowl = RecordedObstacle("bowl", "Sphere", shape, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
+        return view_of_scene(low, high, up, [bowl])
+
+    np.testing.assert_allclose([view(0.2).low[0], view(0.2).high[0]], [-0.2, 0.2], rtol=0.02)
+    assert view(0.2).high[1] == 0.1  # its upper half is not drawn
+    assert view(5.0).radius == pytest.approx(0.1 * np.sqrt(3.0))
 
 
 def test_normals_of_a_ball_point_outward(tools):

@@ -9,7 +9,8 @@ import pytest
 
 import supple as sp
 from supple.results.export.exporter import export
-from supple.results.view.camera import View, stay_above
+from supple.results.view.bounds import View
+from supple.results.view.camera import stay_above
 from supple.results.view.from_recording import model_of_recording
 from supple.results.view.look import LOOKS
 from supple.results.view.surfaces import rim_of, surfaces_of

@@ -12,7 +12,7 @@ from supple.app.viewer.protocol.snapshots import PUSHER, RIGID, BodyDescription,
 from supple.mesh.skin import Embedding
 from supple.mesh.tetmesh import TetMesh
 from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
-from supple.results.view.camera import View
+from supple.results.view.bounds import view_of_scene
 from supple.results.view.model import Model, ModelBody, Moment
 
 
@@ -74,7 +74,7 @@ class MomentBuilder:
             _scene_obstacles(scene),
             np.concatenate([body.rest_positions for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
-            _view_of(scene),
+            view_of_scene(np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up), _scene_obstacles(scene)),
             scene.stitches,
             joints=scene.joints,
         )
@@ -106,20 +106,6 @@ def _model_key(scene: SceneDescription) -> tuple[Any, ...]:
         _fingerprint(scene.stitches.nodes),
         len(scene.joints),
     )
-
-
-def _view_of(scene: SceneDescription) -> View:
-    """The view of the bodies at the start, and of the floor where it is not far below them."""
-    low, high, up = np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)
-    bodies = View(low, high, up)
-    for obstacle in scene.obstacles:
-        plane = obstacle.obstacle.plane
-        if plane is not None and float(plane[1] @ up) > 0.99:
-            below = float((bodies.center - plane[0]) @ up)
-            if 0.0 < below < 4.0 * bodies.radius:
-                floor = bodies.center - below * up
-                low, high = np.minimum(low, floor), np.maximum(high, floor)
-    return View(low, high, up)
 
 
 def _fingerprint(values: NDArray[Any]) -> int:

@@ -16,7 +16,8 @@ from supple.errors import SuppleError
 from supple.results.export.legend import legend
 from supple.results.export.video import COLORS, Film
 from supple.results.recording.reader import Recording, read_recording
-from supple.results.view.camera import eye_of
+from supple.results.view.bounds import box_corners
+from supple.results.view.camera import direction_of, fitted
 from supple.results.view.fields import Limits, Range, color_map, nodal_values
 from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
@@ -31,7 +32,6 @@ _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4
 # Colors of a field must be found again in the legend: they have little shading.
 _FIELD: Any = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}
 _SHADOW_CELLS, _FLOOR_CELLS = 256, 512
-_MARGIN = 1.12  # of the distance of the camera: room beside the bodies
 _SAMPLED = 24  # moments from which the ends of a color scale are found
 
 
@@ -76,7 +76,7 @@ class Studio:
 
     def _add_lights(self, pyvista: Any) -> None:
         center, radius, up = self._view.center, self._view.radius, self._view.up
-        ahead = self._view.eye(_ANGLE) - center
+        ahead = direction_of("corner", self._view)
         ahead -= float(ahead @ up) * up
         ahead /= np.linalg.norm(ahead)
         axes = np.stack([np.cross(up, ahead), up, ahead])
@@ -125,23 +125,18 @@ class Studio:
     def _aim(self, points: NDArray[np.float64], share: float) -> None:
         """Place the camera so that the whole motion, or the bodies at points (k, 3), fill the picture."""
         view, film, u = self._view, self._film, self._view.up
-        away = eye_of(film.view, view) - view.center
-        away /= np.linalg.norm(away)
+        away = direction_of(film.view, view)
         if film.camera == "orbit":
             angle = 2.0 * np.pi * share
             away = np.cos(angle) * away + np.sin(angle) * np.cross(u, away) + (1 - np.cos(angle)) * (u @ away) * u
-        low, high = view.low, view.high
+        seen = view.outline
         if film.camera == "follow":
-            low, high = points.min(axis=0), points.max(axis=0)
-        center = 0.5 * (low + high)
-        right = np.cross(u, away) / np.linalg.norm(np.cross(u, away))
-        axes = np.stack([right, np.cross(away, right), away])
-        corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1) - center[:, None]), axis=-1).reshape(-1, 3)
-        across, above, along = (corners @ axes.T).T
-        slope = np.tan(np.radians(0.5 * _ANGLE))
-        needed = np.maximum(np.abs(across) * film.size[1] / film.size[0], np.abs(above)) / slope + along
+            seen = box_corners(points.min(axis=0), points.max(axis=0))
+        slope = float(np.tan(np.radians(0.5 * _ANGLE)))
+        slopes = (slope * film.size[0] / film.size[1], slope)
+        center, distance = fitted(seen, away, u, slopes, centered=film.camera == "fit")
         # The largest until now, so that the picture does not breathe.
-        self._distance = max(self._distance, _MARGIN * float(needed.max()), view.radius * 1e-3)
+        self._distance = max(self._distance, distance, view.radius * 1e-3)
         camera = self._plotter.camera
         camera.position, camera.focal_point = tuple(center + self._distance * away), tuple(center)
         camera.up, camera.view_angle = tuple(u), _ANGLE

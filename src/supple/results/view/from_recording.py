@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
-from supple.results.view.camera import View
+from supple.results.view.bounds import View, view_of_scene
 from supple.results.view.model import Model, ModelBody, Moment
 
 
@@ -45,7 +45,7 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
 
 
 def view_of(recording: Recording) -> View:
-    """Bounds over all frames, of which at most about 200 are read."""
+    """See `view_of_scene`; over all frames, of which at most about 200 are read."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for frame in recording[:: max(1, len(recording) // 200)]:
         x = np.concatenate(list(frame.positions.values()))
@@ -57,7 +57,7 @@ def view_of(recording: Recording) -> View:
     g = recording.gravity
     size = np.linalg.norm(g)
     up = -g / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
-    return View(low, high, up)
+    return view_of_scene(low, high, up, recording.obstacles)
 
 
 def evenly(count: int, most: int) -> list[int]:

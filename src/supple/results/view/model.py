@@ -18,7 +18,7 @@ from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.results.recording.actions import RecordedJoint, RecordedStitches, no_stitches
 from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
-from supple.results.view.camera import View
+from supple.results.view.bounds import View
 from supple.results.view.colors import body_color
 from supple.results.view.look import LOOKS, Look
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording, opened
-from supple.results.view.camera import View
+from supple.results.view.bounds import View
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.gate import new_token
 from supple.results.view.model import Model, Moment

@@ -1,0 +1,76 @@
+"""The bounds of a scene, which cameras show whole: of its bodies, and of what stands about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.results.recording.scene import RecordedObstacle
+
+# Obstacles that are larger than the bodies and the way between them by more than this factor are surroundings.
+_LARGEST = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The bounds of a whole scene.
+
+    Attributes
+    ----------
+    low, high : (3,) bounds of what is to be seen in all frames [m]
+    up : (3,) unit vector against gravity; y where there is none
+    outline : (k, 3) points whose convex hull contains what is to be seen [m]; the corners of the bounds without this
+    """
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    up: NDArray[np.float64]
+    outline: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        if not len(self.outline):
+            object.__setattr__(self, "outline", box_corners(self.low, self.high))
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def radius(self) -> float:
+        """Of the ball about `center` that contains all that is to be seen [m]."""
+        return max(0.5 * float(np.linalg.norm(self.high - self.low)), 1e-6)
+
+
+def view_of_scene(
+    low: NDArray[np.float64], high: NDArray[np.float64], up: NDArray[np.float64], obstacles: Sequence[RecordedObstacle]
+) -> View:
+    """The view of bodies within bounds (3,), (3,) [m], of the floor not far below them, and of obstacles of their size.
+
+    Of a room the lower half counts, which is what is drawn.
+    """
+    bodies = View(low, high, up)
+    outline = [bodies.outline]
+    for recorded in obstacles:
+        plane = recorded.obstacle.plane
+        if plane is not None:
+            below = float((bodies.center - plane[0]) @ up)
+            if float(plane[1] @ up) > 0.99 and 0.0 < below < 4.0 * bodies.radius:
+                outline.append((bodies.center - below * up)[None])
+            continue
+        points, _ = recorded.obstacle.drawn(bodies.center, bodies.radius)
+        heights = points @ up
+        if recorded.obstacle.is_room:
+            points = points[heights <= 0.5 * (heights.min() + heights.max())]
+        both = np.concatenate([bodies.outline, points])
+        if np.linalg.norm(np.ptp(both, axis=0)) < _LARGEST * 2.0 * bodies.radius:
+            outline.append(points)
+    whole = np.concatenate(outline)
+    return View(whole.min(axis=0), whole.max(axis=0), up, whole)
+
+
+def box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(8, 3) the corners of a box."""
+    return np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
