@@ -68,7 +68,7 @@ def test_the_camera_sees_every_body_in_every_frame(recording, preset, slopes):
         assert seen.max() <= 1.0
     seen = (view.outline - eye) @ axes.T / -((view.outline - eye) @ away)[:, None] / slopes
     np.testing.assert_allclose(seen.max(axis=0), -seen.min(axis=0), atol=0.01)  # in the middle
-    assert np.abs(seen).max() > 0.8  # and it fills the picture
+    assert np.abs(seen).max() > 0.75  # and it fills the picture
     assert eye[1] > view.center[1]
 
 
@@ -76,7 +76,7 @@ def test_a_bowl_is_seen_whole_and_a_hall_is_not():
     low, high, up = np.full(3, -0.1), np.full(3, 0.1), np.array([0.0, 1.0, 0.0])
 
     def view(radius):
-        shape = {"center": np.zeros(3), "radius": np.array(radius), "inside": np.array(True)}
+        shape = {"center": np.zeros(3), "radius": radius, "inside": True}
         bowl = RecordedObstacle("bowl", "Sphere", shape, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
         return view_of_scene(low, high, up, [bowl])
 

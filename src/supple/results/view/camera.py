@@ -53,13 +53,16 @@ def fitted(
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(away, right), away])
     target, distance = 0.5 * (points.min(axis=0) + points.max(axis=0)), 0.0
-    for _ in range(4):
+    for _ in range(6):
         across, along = (points - target) @ axes[:2].T, (points - target) @ away
         distance = max(_MARGIN * float((np.abs(across) / slopes + along[:, None]).max()), 1e-6)
         if not centered:
             break
-        seen = across / (distance - along)[:, None]
-        target = target + 0.5 * distance * (seen.min(axis=0) + seen.max(axis=0)) @ axes[:2]
+        depth = distance - along
+        for axis, x in enumerate(across.T):
+            last, first = (x / depth).argmax(), (x / depth).argmin()
+            shift = (x[last] * depth[first] + x[first] * depth[last]) / (depth[first] + depth[last])
+            target = target + shift * axes[axis]
     return target, distance
 
 
@@ -113,7 +116,8 @@ def _fit(
     upwards = np.asarray(camera.up_direction, dtype=np.float64) if up is None else up
     if np.linalg.norm(np.cross(upwards, away)) < 1e-6:
         upwards = np.eye(3)[int(np.argmin(np.abs(away)))]
-    center, distance = fitted(points, away, upwards, (half * max(camera.aspect, 0.05), half))
+    slopes = (half * max(camera.aspect, 0.05), half)
+    center, distance = fitted(points, away, upwards, slopes, centered=up is not None)
     _move(client, center, distance * away, up)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Overwrite, Steps
-from supple.app.cli.commands.view import Open, Port
+from supple.app.cli.commands.view import Full, Open, Port
 from supple.app.cli.console import ExitCode
 
 
@@ -27,6 +27,7 @@ def demo(
     overwrite: Overwrite = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
     live: Annotated[bool, Parameter(name="--live", negative="")] = False,
+    full: Full = False,
     port: Port = None,
     open_: Open = True,
 ) -> int:
@@ -60,6 +61,8 @@ def demo(
     live
         Show the scene in a browser while it runs, until Ctrl-C, so that it can be dragged and tuned. Nothing is
         recorded.
+    full
+        With --live: simulate the meshes as they are, also where that is slower than time.
     port
         With --live: port to serve at; without it, 8080 or the next free one.
     open_
@@ -82,7 +85,7 @@ def demo(
         if live:
             from supple.app.cli.commands.view import view
 
-            view(Path(name), solver=solver, port=port, open_=open_)
+            view(Path(name), solver=solver, full=full, port=port, open_=open_)
             return ExitCode.OK
         from supple.app.cli.commands.run import run
 
@@ -105,7 +108,8 @@ def demo(
         from supple.app.cli.commands.view import serve_page
         from supple.app.viewer.protocol.live_source import LiveSource
 
-        serve_page(LiveSource(chosen.name, chosen.scene(), chosen.solver(solver), chosen.dt), port, open_)
+        scene, used = chosen.scene(), chosen.solver(solver)
+        serve_page(LiveSource(chosen.name, scene, used, chosen.dt, real_time=not full), port, open_)
         return ExitCode.OK
 
     from supple.app.cli.session import Products, run_session

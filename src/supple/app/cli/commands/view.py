@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from supple.app.viewer.protocol.live_source import LiveSource
 
 Port = Annotated[int | None, Parameter(name="--port", converter=whole_number)]
+Full = Annotated[bool, Parameter(name="--full", negative="")]
 Open = Annotated[bool, Parameter(name="--open")]
 
 SCENE_FILES = (".yaml", ".yml", ".urdf")
@@ -24,6 +25,7 @@ def view(
     /,
     *,
     solver: str | None = None,
+    full: Full = False,
     port: Port = None,
     open_: Open = True,
 ) -> None:
@@ -39,6 +41,9 @@ def view(
         holds it).
     solver
         Kind of solver, instead of the file's, with its default parameters.
+    full
+        Simulate the meshes as they are. Without this, a scene that would be slower than time gets meshes of fewer tets
+        on the page, with the same skins.
     port
         Port to serve at; without it, 8080 or the next free one.
     open_
@@ -63,7 +68,7 @@ def view(
     with reading():
         run = load_run(found, ConfinedMeshStore)
     used = run.solver if solver is None else solver_of_kind(solver)
-    live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions)
+    live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions, real_time=not full)
     serve_page(live, port, open_)
 
 

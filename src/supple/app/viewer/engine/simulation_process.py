@@ -8,12 +8,16 @@ import os
 import signal
 import threading
 from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING
 
 from supple.app.viewer.engine.step_watch import StepWatch
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.app.viewer.protocol.outbox import Outbox
 from supple.errors import SuppleError
+
+if TYPE_CHECKING:
+    from supple.app.viewer.engine.scene.live_scene import LiveScene
 
 
 def run_simulation(source: LiveSource, commands: Connection, snapshots: Connection, log_level: int) -> None:
@@ -43,6 +47,7 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
         live = LiveScene(source)
         with CompileBar() as kernels:
             live.warm_up()
+            live, chosen = _in_time(live)
             kernels.compile_rest()  # the first contact, too, does not wait for it
         # Otherwise a collection looks at the objects of all loaded libraries, for a tenth of a second or more.
         gc.freeze()
@@ -50,8 +55,27 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
         snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
         return
     loop = SimulationLoop(live, inbox, Outbox(snapshots))
+    if chosen:
+        logging.getLogger(__name__).info("%s", chosen)
+        loop.notify("info", chosen)
     report_long_steps(loop.watch, loop.outbox)
     loop.run()
+
+
+def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
+    """The live scene, or one with lighter meshes where it is slower than time and may have them; and one line."""
+    from supple.app.viewer.engine.scene.lightening import lightened
+    from supple.app.viewer.engine.scene.live_scene import LiveScene
+
+    source, line = lightened(live) if live.source.real_time else (None, "")
+    if source is None:
+        return live, ""
+    try:
+        lighter = LiveScene(source)
+        lighter.warm_up()
+    except SuppleError:  # its surfaces are others, and may intersect at the start
+        return live, ""
+    return lighter, line
 
 
 def _read(commands: Connection, inbox: CommandQueue) -> None:

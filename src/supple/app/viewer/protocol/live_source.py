@@ -21,6 +21,7 @@ class LiveSource:
     title : of the page
     dt : [s]
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
+    real_time : whether bodies may get lighter meshes where the page would be slower than time
     """
 
     title: str
@@ -28,3 +29,4 @@ class LiveSource:
     solver: Solver
     dt: float
     initial_positions: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    real_time: bool = False

@@ -1,0 +1,77 @@
+"""Meshes of fewer tets for scenes that would be slower than time on a page."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from supple.app.viewer.engine.scene.changes import without_body
+from supple.app.viewer.engine.scene.live_scene import LiveScene
+from supple.app.viewer.engine.scene.solvers import kind_of
+from supple.app.viewer.protocol.live_source import LiveSource
+from supple.materials.elastic_tets.regions import Regions
+from supple.mesh.meshing.coarser import coarser
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
+from supple.mesh.topology import without_unused
+from supple.scene.body import Body
+
+# What a frame of XPBD takes on one core [s]: at all and for each body, and in each substep for each tet, of one body
+# and of many that touch each other. Measured on an AMD EPYC; see notes/measured_trials.md.
+_FRAME, _BODY, _TET_ALONE, _TET_IN_PILE = 1e-3, 5e-4, 1.3e-7, 3e-7
+_SHARE = 0.9  # of the time of a frame that the solver may take
+_FEWEST = 60  # tets of a body: fewer do not bend
+_LEAST_GAIN = 0.8  # what is not lighter than this is not worth another shape
+
+
+def lightened(live: LiveScene) -> tuple[LiveSource | None, str]:
+    """The source with lighter meshes, and one line about them; None where the scene keeps up with time, or none helps.
+
+    Bodies that something refers to, such as a pin or a stitch, keep their meshes, and so do bodies with several
+    materials, with quadratic tets or with a deformed start. Skins stay; a body without one is drawn with its surface.
+
+    Parameters
+    ----------
+    live : after a step, which tells the number of substeps
+    """
+    source, scene = live.source, live.source.scene
+    tets, bodies = len(live.system.tets), len(scene.bodies)
+    in_step = live.report.iterations * tets * (_TET_ALONE if bodies == 1 else _TET_IN_PILE)
+    allowed = max(_SHARE * source.dt - _FRAME - _BODY * bodies, 0.1 * source.dt)
+    if kind_of(source.solver) != "xpbd" or in_step <= allowed:
+        return None, ""
+    # The number of substeps falls with the length of edges: with the third root of the number of tets.
+    share = (allowed / in_step) ** 0.75
+    made: dict[int, TetMesh | None] = {}
+    changed = []
+    for body in scene.bodies:
+        if isinstance(body, Body) and _is_free(body, source):
+            if id(body.mesh) not in made:
+                made[id(body.mesh)] = coarser(body.mesh, max(_FEWEST, int(share * len(body.mesh.tets))))
+            mesh = made[id(body.mesh)]
+            if mesh is not None:
+                skin = body.skin or SurfaceMesh(*without_unused(body.mesh.vertices, body.mesh.surface.triangles))
+                body = replace(body, mesh=mesh, skin=skin)
+        changed.append(body)
+    fewer = sum(len(body.mesh.tets) for body in changed)
+    if fewer > _LEAST_GAIN * tets:
+        return None, ""
+    line = (
+        f"the page simulates {fewer:,} tets instead of {tets:,}, with the same skins, to keep up with time; "
+        "supple view --full keeps the meshes"
+    )
+    return replace(source, scene=replace(scene, bodies=changed)), line
+
+
+def _is_free(body: Body, source: LiveSource) -> bool:
+    """Whether the body may have another mesh."""
+    if body.mesh.order != 1 or body.touches_with_skin or body.name in source.initial_positions:
+        return False
+    if isinstance(body.material, Regions) or any(
+        np.ndim(getattr(body.material, one.name)) for one in fields(body.material)
+    ):  # pyright: ignore[reportArgumentType]
+        return False
+    alone = without_body(source.scene, body.name)
+    of_mesh = ("pins", "forces", "loads", "cavities", "cables", "sensors", "soft_targets", "stitches", "welds")
+    return all(len(getattr(alone, key)) == len(getattr(source.scene, key)) for key in of_mesh)

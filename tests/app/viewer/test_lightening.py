@@ -1,0 +1,72 @@
+"""Scenes that are slower than time get lighter meshes on a page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.app.viewer.engine.scene.lightening import lightened
+from supple.app.viewer.engine.scene.live_scene import LiveScene
+from supple.app.viewer.protocol.live_source import LiveSource
+from supple.mesh.meshing.coarser import coarser
+
+JELLY = sp.StableNeoHookean(youngs=3e4, poisson=0.4)
+
+
+def stepped(dt: float = 1e-4, **parts) -> LiveScene:
+    """Balls beside each other after a step; with so short a frame no scene keeps up with time."""
+    mesh = sp.shapes.sphere(0.1, 0.03)
+    balls = [sp.Body(f"ball {k}", mesh, JELLY, position=(0.3 * k, 0.2, 0)) for k in range(2)]
+    live = LiveScene(LiveSource("balls", sp.Scene(balls, **parts), sp.XPBD(substeps=10), dt))
+    live.step()
+    return live
+
+
+@pytest.fixture(scope="module")
+def slow() -> LiveScene:
+    return stepped()
+
+
+def test_bodies_of_a_slow_scene_get_fewer_tets_and_keep_their_surface(slow):
+    source, line = lightened(slow)
+    assert source is not None
+    before, after = slow.source.scene.bodies[0], source.scene.bodies[0]
+    assert len(after.mesh.tets) < 0.8 * len(before.mesh.tets)
+    np.testing.assert_allclose(after.skin.volume, before.mesh.surface.volume, rtol=1e-12)
+    assert after.mesh is source.scene.bodies[1].mesh  # equal bodies share their mesh
+    assert f"{2 * len(after.mesh.tets):,} tets instead of {2 * len(before.mesh.tets):,}" in line
+
+
+def test_a_scene_that_keeps_up_with_time_stays_as_it_is(slow):
+    slow.source, source = replace(slow.source, dt=10.0), slow.source
+    try:
+        assert lightened(slow) == (None, "")
+    finally:
+        slow.source = source
+
+
+def test_bodies_that_something_refers_to_keep_their_meshes():
+    source, _ = lightened(stepped(pins=[sp.Pin("ball 0", vertices=[0])]))
+    assert source is not None
+    pinned, free = source.scene.bodies
+    assert pinned.skin is None
+    assert len(free.mesh.tets) < len(pinned.mesh.tets)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "tets"), [(sp.shapes.gummy_bear(1.0, 0.13), 150), (sp.shapes.torus(0.4, 0.12, 0.06), 500)]
+)
+def test_a_coarser_mesh_has_the_same_shape(mesh, tets):
+    made = coarser(mesh, tets)
+    assert made is not None
+    assert len(made.tets) <= tets
+    np.testing.assert_allclose(made.volumes.sum(), mesh.volumes.sum(), rtol=0.05)
+    np.testing.assert_allclose(made.vertices.max(axis=0), mesh.vertices.max(axis=0), atol=0.1)
+    assert made.min_dihedrals.min() > 10.0
+
+
+def test_a_shape_that_so_few_tets_cannot_have_has_no_coarser_mesh():
+    assert coarser(sp.shapes.torus(0.4, 0.06, 0.05), 30) is None
