@@ -91,9 +91,11 @@ def test_keys(fresh):
     fresh.screen.wait(
         lambda: camera()[1] > 4.0 and np.abs(camera() - center)[[0, 2]].max() < 0.1, "the view from above"
     )
-    far = camera()
+    near = camera()
+    fresh.screen.client.camera.position = tuple(near + [0.0, 3.0, 0.0])
+    fresh.screen.wait(lambda: camera()[1] > near[1] + 2.9, "the camera to rise")
     keyboard.press("f")
-    fresh.screen.wait(lambda: camera()[1] < far[1] - 0.1, "the picture to fit")
+    fresh.screen.wait(lambda: camera()[1] < near[1] + 1.0, "the picture to fit")
     keyboard.press("1")
     fresh.screen.wait(lambda: abs(camera()[0] - center[0]) > 0.5, "the view from the corner")
     keyboard.press("Control+k")  # viser's list of all of them
