@@ -92,7 +92,7 @@ def test_keys(fresh):
         lambda: camera()[1] > 4.0 and np.abs(camera() - center)[[0, 2]].max() < 0.1, "the view from above"
     )
     near = camera()
-    fresh.screen.client.camera.position = tuple(near + [0.0, 3.0, 0.0])
+    fresh.screen.client.camera.position = tuple(near + np.array([0.0, 3.0, 0.0]))
     fresh.screen.wait(lambda: camera()[1] > near[1] + 2.9, "the camera to rise")
     keyboard.press("f")
     fresh.screen.wait(lambda: camera()[1] < near[1] + 1.0, "the picture to fit")
