@@ -1,23 +1,20 @@
-"""The examples that hypothesis draws, and one browser for all tests of pages: starting it takes seconds."""
+"""What starts once for all tests: one browser, and one process of which meshers and readers are forks."""
 
 from __future__ import annotations
 
 import io
 import os
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from hypothesis import settings
-from hypothesis.internal.conjecture import providers
+from tests import same_examples  # noqa: F401 - it sets hypothesis up
+from tests.forked_children import forked_children
 
-# `make test` draws the same examples each time; `make fuzz` draws those of a seed (`--hypothesis-seed`).
-settings.register_profile("same", derandomize=True, deadline=None)
-settings.register_profile("new", derandomize=False, database=None, deadline=None)  # it is True where CI is set
-settings.load_profile("same")
-# Otherwise examples contain constants of all modules that were imported until then, which depends on the tests before.
-providers._get_local_constants = providers.Constants
+from supple.mesh.io import in_child
+from supple.mesh.meshing import child_process
 
 # Tests share the cores. By default, a thread of OpenMP spins while it waits for another one, which waits for a core:
 # beside other processes, a ball of 5,112 tets in `Implicit` takes ten times the CPU time.
@@ -29,6 +26,19 @@ _FLAGS = (
     "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader "
     "--disable-background-networking"
 )
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _forks() -> Iterator[None]:
+    with forked_children():
+        yield
+
+
+@pytest.fixture
+def own_interpreters(monkeypatch) -> None:
+    """Meshers and libraries run as for users: each in an interpreter of its own."""
+    monkeypatch.setattr(in_child, "subprocess", subprocess)
+    monkeypatch.setattr(child_process, "subprocess", subprocess)
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
+from tests.sources import import_statements
 
 import supple
 
@@ -47,7 +48,7 @@ def name_of(path):
 
 def imports(path):
     """Line, and part of supple, of everything that a file imports from it, inside functions as well."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in import_statements(path):
         if isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}:{node.lineno}: a relative import"
             names = [node.module] if node.module != "supple" else [f"supple.{alias.name}" for alias in node.names]

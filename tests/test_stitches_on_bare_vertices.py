@@ -80,7 +80,7 @@ def by_newton(system, x, h=0.05, steps=200):
     return np.array(path)
 
 
-def by_xpbd(system, x, h=1 / 1200, steps=12_000):
+def by_xpbd(system, x, h=1 / 1200, steps=2_000):
     """Substeps without bodies; the viscous forces of the stitches are solved for exactly."""
     w = system.inverse_masses
     (constraints,) = stitch_constraints(system, w)
@@ -105,7 +105,7 @@ def by_xpbd(system, x, h=1 / 1200, steps=12_000):
     return np.array(path)
 
 
-SOLVERS = pytest.mark.parametrize(("solve", "damping"), [(by_newton, 0.0), (by_xpbd, 0.02)], ids=["implicit", "xpbd"])
+SOLVERS = pytest.mark.parametrize(("solve", "damping"), [(by_newton, 0.0), (by_xpbd, 0.1)], ids=["implicit", "xpbd"])
 
 
 @SOLVERS

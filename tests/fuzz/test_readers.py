@@ -11,7 +11,7 @@ import os
 import shutil
 import struct
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,6 @@ import pytest
 import trimesh
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from tests.forked_readers import forked_readers
 
 import supple as sp
 from supple.app.runs.contents import RunPaths
@@ -259,12 +258,6 @@ def damages(draw, size: int):
         return data
 
     return damaged
-
-
-@pytest.fixture(scope="module", autouse=True)
-def quick() -> Iterator[None]:
-    with forked_readers():
-        yield
 
 
 @pytest.mark.parametrize("name", READERS)

@@ -1,10 +1,5 @@
 """A surface, a body, and helpers that write files and read errors."""
 
-from collections.abc import Iterator
-
-import pytest
-from tests.forked_readers import forked_readers
-
 from supple.mesh import shapes
 
 BALL = shapes.sphere_surface(0.3, 0.2).transformed(translation=(1.0, 2.0, 3.0))
@@ -24,9 +19,3 @@ def the_only_line(error):
     assert len(text) < 400
     assert text.isprintable()
     return text
-
-
-@pytest.fixture(scope="module")
-def quick_readers() -> Iterator[None]:
-    with forked_readers():
-        yield

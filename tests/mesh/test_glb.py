@@ -11,8 +11,6 @@ import supple as sp
 from supple.errors import MeshError
 from supple.results.export.exporter import export
 
-pytestmark = pytest.mark.usefixtures("quick_readers")
-
 TURN = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3), (0.1, 0.0, 0.2))
 MIRROR = np.diag([-2.0, 1.0, 1.0, 1.0])
 

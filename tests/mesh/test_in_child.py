@@ -10,6 +10,7 @@ import supple as sp
 from supple.errors import MeshError
 from supple.mesh.io import in_child
 
+pytestmark = pytest.mark.usefixtures("own_interpreters")
 BOX = sp.shapes.box((1, 1, 1), (1, 1, 1))
 
 

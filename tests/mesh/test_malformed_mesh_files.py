@@ -16,8 +16,6 @@ from supple.mesh.tetmesh import TetMesh
 
 from .conftest import BALL, BODY, SQUARE, the_only_line, write
 
-pytestmark = pytest.mark.usefixtures("quick_readers")
-
 PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 PLY_FACES = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 VTK = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n"

@@ -15,8 +15,6 @@ from supple.mesh.tetmesh import TetMesh
 
 from .conftest import BALL, BODY, write
 
-pytestmark = pytest.mark.usefixtures("quick_readers")
-
 # Round trips
 
 

@@ -9,8 +9,6 @@ import pytest
 import supple as sp
 from supple.errors import MeshError
 
-pytestmark = pytest.mark.usefixtures("quick_readers")
-
 MESH = sp.shapes.box((2, 1, 1), (2, 1, 1))
 LEFT = np.flatnonzero(MESH.vertices[:, 0] < -0.99)
 BONE = np.flatnonzero(MESH.vertices[MESH.tets].mean(axis=1)[:, 0] > 0)

@@ -55,6 +55,7 @@ def assert_fills(mesh: TetMesh, surface: SurfaceMesh, volume: float | None = Non
     assert mesh.surface.volume == pytest.approx(mesh.volume, rel=1e-9)
 
 
+@pytest.mark.usefixtures("own_interpreters")
 @pytest.mark.parametrize(
     ("surface", "max_volume"),
     [
@@ -156,7 +157,7 @@ def test_auto_uses_ftetwild_for_surfaces_with_faults(caplog: pytest.LogCaptureFi
     ball = sphere_surface(radius=0.5, edge_length=0.35)
     surface = joined(ball, moved(ball, 0.5, 0.01, 0.02))
     with caplog.at_level(logging.INFO):
-        mesh, report = tetrahedralize_reported(surface, max_volume=0.02)
+        mesh, report = tetrahedralize_reported(surface, max_volume=0.02, envelope=0.05)
     assert report.mesher == "ftetwild"
     assert "fTetWild" in caplog.text
     assert (mesh.volumes > 0).all()
@@ -289,7 +290,7 @@ def test_auto_goes_on_with_ftetwild_where_tetgen_crashes(tmp_path, monkeypatch, 
     crash = 'import os, pathlib, sys\nif "tetgen" in pathlib.Path(sys.argv[1], "job.json").read_text(): os.abort()\n'
     future = "from __future__ import annotations\n"
     worker(monkeypatch, tmp_path, future + crash + real.replace(future, ""))
-    mesh, report = tetrahedralize_reported(SPHERE, max_volume=0.05)
+    mesh, report = tetrahedralize_reported(SPHERE, max_volume=0.05, envelope=0.02)
     assert report.mesher == "ftetwild"
     assert mesh.volume == pytest.approx(SPHERE.volume, rel=0.05)
     assert "tetgen crashed" in caplog.text
@@ -351,6 +352,7 @@ def test_a_missing_memory_limit_is_a_log_line(monkeypatch: pytest.MonkeyPatch) -
     assert "no memory limit" in limit_process(10.0, 2**30)[0]
 
 
+@pytest.mark.usefixtures("own_interpreters")
 def test_two_threads_can_mesh_at_once() -> None:
     meshes: list[TetMesh] = []
     threads = [threading.Thread(target=lambda: meshes.append(fill(SPHERE))) for _ in range(2)]

@@ -13,8 +13,6 @@ from supple.errors import MeshError
 pxr = pytest.importorskip("pxr")
 from pxr import Gf, Usd, UsdGeom  # noqa: E402
 
-pytestmark = pytest.mark.usefixtures("quick_readers")
-
 BOX = sp.shapes.box((0.1, 0.2, 0.3), (1, 2, 3))
 POINTS = "point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]"
 

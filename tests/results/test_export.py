@@ -182,23 +182,23 @@ def test_a_missing_package_is_named(tmp_path, recorded, monkeypatch, to, module,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_gif_shows_motion(tmp_path, tools):
+def test_gif_shows_motion_before_a_dark_background(tmp_path, tools, capsys):
     image = pytest.importorskip("PIL.Image")
     pytest.importorskip("pyvista")
     tools.record(tmp_path / "short.vtkhdf", 6)
-    try:
-        path = export(tmp_path / "short.vtkhdf", "gif", view="front")
-    except OutputError as error:
-        if "OpenGL" not in str(error) or os.environ.get("CI"):
-            raise
-        pytest.skip(str(error))
-    with image.open(path) as pages:
+    code = main(["export", str(tmp_path / "short.vtkhdf"), "--to", "gif", "--view", "front", "--dark"])
+    error = capsys.readouterr().err
+    if "OpenGL" in error and not os.environ.get("CI"):
+        pytest.skip(error)
+    assert code == 0, error
+    with image.open(tmp_path / "short.gif") as pages:
         assert pages.n_frames == 5  # 0.2 s, at 20 frames per second
         shown = []
         for k in (0, 4):
             pages.seek(k)
             shown.append(np.asarray(pages.convert("RGB")).astype(int))
     assert shown[0].shape == (360, 640, 3)
+    assert shown[0][:5].mean() < 60
     red = (shown[0][..., 0] - shown[0][..., 2]) > 80
     assert red.sum() > 200  # the red body is seen
     assert np.abs(shown[0] - shown[1]).max(axis=2).astype(bool).mean() > 0.01
@@ -228,7 +228,7 @@ def test_a_picture_is_colored_by_a_field_has_a_legend_and_a_shadow(tmp_path, too
     image = pytest.importorskip("PIL.Image")
     pytest.importorskip("pyvista")
     tools.record(tmp_path / "r.vtkhdf", 4)
-    looks = ["--color J --camera follow", "--color J --camera follow --no-shadows", "--dark"]
+    looks = ["--color J --camera follow", "--color J --camera follow --no-shadows"]
     shown = []
     for k, look in enumerate(looks):
         path = tmp_path / f"{k}.png"
@@ -240,7 +240,7 @@ def test_a_picture_is_colored_by_a_field_has_a_legend_and_a_shadow(tmp_path, too
         with image.open(path) as page:
             shown.append(np.asarray(page.convert("RGB")).astype(int))
     assert all(picture.shape == (200, 320, 3) for picture in shown)
-    assert shown[0][:5].mean() > 220 > 60 > shown[2][:5].mean()  # the background is bright, or dark
+    assert shown[0][:5].mean() > 220  # the bright background
     legend = shown[0][40:160, 270:320]
     assert (legend[..., 0] - legend[..., 2] > 80).any()
     assert (legend[..., 2] - legend[..., 0] > 80).any()

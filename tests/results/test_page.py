@@ -1,8 +1,6 @@
-"""The page plays in a browser without a network."""
+"""The page of a recording, which `tests/app/viewer/page/test_replay.py` plays in a browser."""
 
 from __future__ import annotations
-
-import time
 
 import numpy as np
 
@@ -10,43 +8,6 @@ from supple.results.recording.reader import read_recording
 from supple.results.view import page as page_module
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.page import write_page
-
-
-def test_the_page_plays_in_a_browser(tmp_path, tools, browser, pixels):
-    tools.record(tmp_path / "r.vtkhdf", 30)
-    page_file = write_page(tmp_path / "r.vtkhdf", tmp_path / "index.html")
-    page = browser.new_page(viewport={"width": 480, "height": 360})
-    page.set_default_timeout(90_000)
-    errors, asked = [], []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto(page_file.as_uri())
-    page.wait_for_selector("canvas")
-    shots, end = [], time.monotonic() + 90.0
-    while time.monotonic() < end:  # until bodies are drawn, and have moved
-        page.wait_for_timeout(250)
-        shots.append(pixels(page)[:300])  # above the player's bar
-        if _red(shots[0]) <= 100:
-            shots = shots[1:]
-        elif _moved(shots[0], shots[-1]) > 200:
-            break
-    title = page.title()
-    page.close()
-    assert errors == []
-    assert [url for url in asked if not url.startswith("blob:")] == [page_file.as_uri()]
-    assert title == "cube, slab · Supple"
-    assert shots, "the red body was never drawn"
-    assert _moved(shots[0], shots[-1]) > 200
-
-
-def _red(shot: np.ndarray) -> int:
-    """Pixels of the color of the first body; only the orange edge of the warning has it too."""
-    return int(np.count_nonzero((shot[..., 0] - shot[..., 2] > 60) & (shot[..., 1] < 140)))
-
-
-def _moved(a: np.ndarray, b: np.ndarray) -> int:
-    return int(np.count_nonzero(np.abs(a - b).max(axis=2) > 60))
 
 
 def test_pages_are_self_contained_and_leave_no_server(tmp_path, recorded, capfd):

@@ -133,8 +133,10 @@ def plays_alone(browser, pixels, file):
     """An exported page draws a body in colors of viridis, moves it, and needs nothing else."""
     tab = browser.new_page(viewport={"width": 480, "height": 320})
     tab.set_default_timeout(90_000)
-    asked = []
+    asked, errors = [], []
     tab.on("request", lambda request: asked.append(request.url))
+    tab.on("pageerror", lambda error: errors.append(str(error)))
+    tab.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     tab.goto(file.as_uri())
     places, end = [], time.monotonic() + 90.0
     while time.monotonic() < end and not (len(places) > 2 and max(places) - min(places) > 40):
@@ -143,7 +145,9 @@ def plays_alone(browser, pixels, file):
         colored = np.maximum(np.maximum(r, g), b) - np.minimum(np.minimum(r, g), b) > 60
         if colored.sum() > 100:
             places.append(np.nonzero(colored)[1].mean())
+    title = tab.title()
     tab.close()
+    assert (title, errors) == ("ball · Supple", [])
     assert places, "the body was never drawn"
     assert max(places) - min(places) > 40
     # What the page has made itself is not asked of anybody.

@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 from PIL import Image
-from tests.forked_readers import forked_readers
 
 import supple as sp
 from supple.app.cli.app import main
@@ -18,12 +17,6 @@ from supple.results.check.series.recording import Given
 from .generated import FAULTS, SURFACES, WRITERS, clean
 
 NAMES = list(FAULTS)
-
-
-@pytest.fixture(autouse=True)
-def readers():
-    with forked_readers():
-        yield
 
 
 def can_hold(kind, fault):
