@@ -26,7 +26,7 @@ from numba.core import config
 from numba.core.caching import NullCache, _Cache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
-from numba.core.runtime import rtsys
+from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 from numba.np.numpy_support import numpy_version
 from numpy.typing import NDArray
