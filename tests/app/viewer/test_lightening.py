@@ -48,6 +48,15 @@ def test_a_scene_that_keeps_up_with_time_stays_as_it_is(slow):
         slow.source = source
 
 
+def test_a_body_alone_gets_fewer_tets():
+    scene = sp.Scene([sp.Body("ball", sp.shapes.sphere(0.1, 0.03), JELLY)])
+    live = LiveScene(LiveSource("ball", scene, sp.XPBD(substeps=10), 1e-4))
+    live.step()
+    source, _ = lightened(live)
+    assert source is not None
+    assert len(source.scene.bodies[0].mesh.tets) < 0.8 * len(live.system.tets)
+
+
 def test_bodies_that_something_refers_to_keep_their_meshes():
     source, _ = lightened(stepped(pins=[sp.Pin("ball 0", vertices=[0])]))
     assert source is not None

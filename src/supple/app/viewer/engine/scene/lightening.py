@@ -6,7 +6,6 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from supple.app.viewer.engine.scene.changes import without_body
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.scene.solvers import kind_of
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -16,6 +15,7 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.mesh.topology import without_unused
 from supple.scene.body import Body
+from supple.scene.scene import Scene
 
 # What a frame of XPBD takes on one core [s]: at all and for each body, and in each substep for each tet, of one body
 # and of many that touch each other. Measured on an AMD EPYC; see notes/measured_trials.md.
@@ -72,6 +72,12 @@ def _is_free(body: Body, source: LiveSource) -> bool:
         np.ndim(getattr(body.material, one.name)) for one in fields(body.material)
     ):  # pyright: ignore[reportArgumentType]
         return False
-    alone = without_body(source.scene, body.name)
-    of_mesh = ("pins", "forces", "loads", "cavities", "cables", "sensors", "soft_targets", "stitches", "welds")
-    return all(len(getattr(alone, key)) == len(getattr(source.scene, key)) for key in of_mesh)
+    return body.name not in _referred_to(source.scene)
+
+
+def _referred_to(scene: Scene) -> set[str | None]:
+    """The names of the bodies that something else of the scene acts on, measures or joins."""
+    single = (*scene.pins, *scene.forces, *scene.soft_targets, *scene.welds)
+    several = (*scene.loads, *scene.cavities, *scene.cables, *scene.sensors)
+    named = {one.body for one in single} | {name for one in several for name in one.bodies}
+    return named | {name for stitch in scene.stitches for name in (stitch.first, stitch.second)}
