@@ -156,7 +156,7 @@ BEYOND_REPAIR = {
 def test_what_meshes_without_repair_meshes_with_it(case: str, mesher, caplog: pytest.LogCaptureFixture) -> None:
     """MeshFix cannot repair these surfaces; fTetWild needs no repair."""
     surface, volume = BEYOND_REPAIR[case]
-    with caplog.at_level(logging.WARNING):
+    with caplog.at_level(logging.INFO):
         mesh, report = tetrahedralize_reported(surface, repair=True, mesher=mesher, envelope=0.02)
     assert mesh.volume == pytest.approx(volume, rel=0.03)
     assert report.mesher == "ftetwild"

@@ -172,7 +172,7 @@ def tetrahedralize_reported(
             # fTetWild needs no repair, and meshes much that MeshFix cannot repair: components that cut each other.
             if mesher == "tetgen" or not others_can:
                 raise
-            logger.warning("%s; meshing the surface without repair", failure)
+            logger.info("%s; meshing the surface without repair", failure)  # a warning of what is not clean follows
         else:
             surface, report = _facing_outward(fixed)
     fine = surface

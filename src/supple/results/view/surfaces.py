@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from supple.results.view.colors import OBSTACLE_COLOR
 from supple.results.view.look import OBSTACLE, Look
 from supple.results.view.model import Model, ModelBody, Moment
+from supple.runtime.kernel_cache import njit
 
 # A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
 ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
@@ -290,12 +291,24 @@ def split_at_creases(
 
 def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """Unit normals (k, 3) at vertices x (k, 3): of the triangles around each, weighted by area."""
-    area = _area_vectors(x, triangles)
-    normals = np.stack(
-        [np.bincount(triangles.ravel(), np.repeat(area[:, i], 3), minlength=len(x)) for i in range(3)], axis=1
-    )
+    normals = _sums_around(np.ascontiguousarray(x), triangles)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), [0.0, 1.0, 0.0])
+
+
+@njit(cache=True)
+def _sums_around(x, triangles):
+    """(k, 3) twice the sum of the area vectors of the triangles (t, 3) around each vertex x (k, 3)."""
+    out = np.zeros_like(x)
+    for t in range(len(triangles)):
+        a, b, c = triangles[t]
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            area = (x[b, i] - x[a, i]) * (x[c, j] - x[a, j]) - (x[b, j] - x[a, j]) * (x[c, i] - x[a, i])
+            out[a, k] += area
+            out[b, k] += area
+            out[c, k] += area
+    return out
 
 
 def _area_vectors(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
