@@ -20,7 +20,7 @@ from benchmarks.measuring import PEERS_PYTHON, peers_installed, run_json
 from benchmarks.published import publish
 from benchmarks.table import Table
 from supple.results.check.checker import check_series
-from supple.results.check.series.recording import Given
+from supple.results.check.series_recording import Given
 
 PEERS = Path(__file__).parent / "peers"
 sys.path.insert(0, str(PEERS))

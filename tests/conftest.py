@@ -15,6 +15,7 @@ from tests.forked_children import forked_children
 
 from supple.mesh.io import in_child
 from supple.mesh.meshing import child_process
+from supple.results.export import video
 
 # Tests share the cores. By default, a thread of OpenMP spins while it waits for another one, which waits for a core:
 # beside other processes, a ball of 5,112 tets in `Implicit` takes ten times the CPU time.
@@ -36,7 +37,8 @@ def _forks() -> Iterator[None]:
 
 @pytest.fixture
 def own_interpreters(monkeypatch) -> None:
-    """Meshers and libraries run as for users: each in an interpreter of its own."""
+    """Meshers, libraries and films run as for users: each in an interpreter of its own."""
+    monkeypatch.setattr(video, "subprocess", subprocess)
     monkeypatch.setattr(in_child, "subprocess", subprocess)
     monkeypatch.setattr(child_process, "subprocess", subprocess)
 

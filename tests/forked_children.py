@@ -1,4 +1,4 @@
-"""Meshers, and readers that use a library, each in a fork of one process, which has imported what takes long."""
+"""Meshers, readers that use a library, and what draws films: forks of one process that has imported what takes long."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ import pytest
 
 from supple.mesh.io import in_child
 from supple.mesh.meshing import child_process, mesher_worker
+from supple.results.export import video
 
 # Prints the number of each process, then its exit code.
 _PROGRAM = """
@@ -33,6 +35,9 @@ from supple.mesh.meshing import mesher_worker
 
 def work(folder, library="", *job):
     os.chdir(folder)
+    if library == "film":
+        os.dup2(os.open(job[-1], os.O_WRONLY), 2)
+        return video_worker.main(list(job[:-1]))
     if library:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         function, path, memory, seconds = job
@@ -46,9 +51,15 @@ def work(folder, library="", *job):
     return mesher_worker.main(Path(folder))
 
 for line in sys.stdin:
+    job = line.rstrip("\\n").split("\\t")
+    if job[1:2] == ["film"]:
+        import pyvista.plotting
+        from supple.results.export import video_worker
     child = os.fork()
     if child == 0:
-        os._exit(work(*line.rstrip("\\n").split("\\t")))
+        code = work(*job)
+        sys.stderr.flush()
+        os._exit(code)
     print(child, flush=True)
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
@@ -106,6 +117,12 @@ def _reader(command: list[str], *, timeout: float, **_: object) -> SimpleNamespa
             child.wait()
 
 
+def _drawing(command: list[str], **_: object) -> SimpleNamespace:
+    with tempfile.NamedTemporaryFile("r", suffix=".txt") as said:
+        code = _Fork(os.getcwd(), "film", *command[3:], said.name).wait()
+        return SimpleNamespace(returncode=code, stderr=said.read())
+
+
 _PYTHON, _THE_MESHER = sys.executable, Path(mesher_worker.__file__).resolve()
 
 
@@ -119,9 +136,10 @@ def _mesher(command: list[str], **options) -> subprocess.Popen[bytes] | _Fork:
 
 @contextmanager
 def forked_children() -> Iterator[None]:
-    """Within this block, meshers and libraries run the same programs with the same limits, without new interpreters."""
+    """Within this block, the same programs run with the same limits, without new interpreters."""
     with pytest.MonkeyPatch.context() as patch:
         if hasattr(os, "fork"):
             patch.setattr(in_child, "subprocess", SimpleNamespace(**{**vars(subprocess), "run": _reader}))
+            patch.setattr(video, "subprocess", SimpleNamespace(**{**vars(subprocess), "run": _drawing}))
             patch.setattr(child_process, "subprocess", SimpleNamespace(**{**vars(subprocess), "Popen": _mesher}))
         yield

@@ -21,7 +21,7 @@ from .materials.elastic import NeoHookean as NeoHookean
 from .materials.elastic import StableNeoHookean as StableNeoHookean
 from .materials.elastic import StVenantKirchhoff as StVenantKirchhoff
 from .materials.elastic_tets.regions import Regions as Regions
-from .materials.fitting.fit import fit_material as fit_material
+from .materials.fit import fit_material as fit_material
 from .materials.holzapfel_gasser_ogden import HolzapfelGasserOgden as HolzapfelGasserOgden
 from .materials.j2_plastic import J2Plastic as J2Plastic
 from .materials.own.energy_material import EnergyMaterial as EnergyMaterial

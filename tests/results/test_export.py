@@ -182,6 +182,7 @@ def test_a_missing_package_is_named(tmp_path, recorded, monkeypatch, to, module,
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("own_interpreters")
 def test_gif_shows_motion_before_a_dark_background(tmp_path, tools, capsys):
     image = pytest.importorskip("PIL.Image")
     pytest.importorskip("pyvista")

@@ -41,8 +41,8 @@ def breadth_first_order(constraints: list[NDArray[np.int32]], n_vertices: int) -
 @njit(cache=True)
 def _breadth_first(pointers, neighbours):
     n = len(pointers) - 1
-    order = np.empty(n, np.int32)
-    levels = np.full(n, -1, np.int32)
+    order = np.empty(n, dtype=np.int32)
+    levels = np.full(n, -1, dtype=np.int32)
     done = 0
     first_level = 0
     count = 0
@@ -93,11 +93,13 @@ def independent_groups(constraints, starts, n_vertices, width, window):
     counts : (g,) int64 constraints in each group; pointers : (r + 1,) int64 the first group of each run
     """
     m, k = constraints.shape
-    members = np.empty((m, width), np.int64)
-    counts = np.empty(m, np.int64)
-    pointers = np.zeros(len(starts), np.int64)
-    owner = np.full(n_vertices, -1, np.int64)
-    pending = np.empty(window, np.int64)
+    members = np.empty((m, width), dtype=np.int64)
+    counts = np.empty(m, dtype=np.int64)
+    pointers = np.zeros(len(starts), dtype=np.int64)
+    owner = np.empty(n_vertices, dtype=np.int64)
+    for i in range(n_vertices):
+        owner[i] = -1
+    pending = np.empty(window, dtype=np.int64)
     group = 0
     for run in range(len(starts) - 1):
         next_one, waiting = starts[run], 0

@@ -155,7 +155,7 @@ def test_files_that_cannot_be_checked(free, tmp_path, capsys):
 
 def test_the_checker_shares_no_code_with_the_solvers():
     code = (
-        "import sys, supple.results.check.checker, supple.app.cli.commands.check, supple.results.check.shown.page\n"
+        "import sys, supple.results.check.checker, supple.app.cli.commands.check, supple.results.check.shown\n"
         "print([n for n in sys.modules if n.startswith(('supple.solvers', 'supple.contact', 'supple.numerics.cubic',"
         " 'supple.mesh.surface_checks', 'ipctk'))])"
     )

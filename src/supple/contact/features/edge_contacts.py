@@ -45,7 +45,7 @@ def edge_weights(x, pairs, mesh, areas, dhat, known):
     """
     triangles, edges, edge_start, edge_items = mesh
     weights, squares = np.zeros(len(pairs)), np.full(len(pairs), np.inf)
-    keys, grown = np.empty(len(pairs), np.int64), np.full(len(pairs), -1.0)
+    keys, grown = np.empty(len(pairs), dtype=np.int64), np.full(len(pairs), -1.0)
     h = NEARER_SHARE * dhat
     for k in prange(len(pairs)):
         e, f = pairs[k, 0], pairs[k, 1]

@@ -60,7 +60,10 @@ def common_motions(points, motions, pieces, all_share, each, common):
 @njit
 def _turn(points, motions, pieces, each, drifts, centers, turns):
     """Set each turn to Q - 1, with Q the polar factor of sum (X + u - mean) (X - center)^T."""
-    turns[:] = 0.0
+    for k in range(len(turns)):
+        for r in range(3):
+            for c in range(3):
+                turns[k, r, c] = 0.0
     for i in range(0, len(motions), each):
         k = pieces[i]
         X = subtract(row(points, i), row(centers, k))

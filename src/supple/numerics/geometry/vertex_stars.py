@@ -39,14 +39,14 @@ def _may_cover(u, v, n, ray):
 def simple_stars(x, triangles):
     """(n,) whether the triangles (t, 3) at each vertex x (n, 3) are apart from each other, but for what they share."""
     normals, rays = np.zeros((len(x), 3)), np.zeros((len(x), 3))
-    ends, covered = np.zeros(len(x), dtype=np.uint64), np.zeros(len(x), dtype=np.int64)
+    ends, covered = np.zeros(len(x), dtype=np.int64), np.zeros(len(x), dtype=np.int64)
     for t in range(len(triangles)):
         a = row(x, triangles[t, 0])
         n = cross(subtract(row(x, triangles[t, 1]), a), subtract(row(x, triangles[t, 2]), a))
         for k in range(3):
             i, j, q = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
             # Each end of the surface at the vertex would remain.
-            ends[i] += _code(j) - _code(q)
+            ends[i] += np.int64(_code(j) - _code(q))
             for c in range(3):
                 normals[i, c] += n[c]
                 # The middle of the sector of one triangle, the last one.
@@ -60,4 +60,7 @@ def simple_stars(x, triangles):
             u, v = subtract(row(x, triangles[t, (k + 1) % 3]), p), subtract(row(x, triangles[t, (k + 2) % 3]), p)
             facing = dot(n, N) > _FACING * np.sqrt(dot(n, n) * dot(N, N))
             covered[i] += _may_cover(u, v, N, row(rays, i)) if facing else 2
-    return (ends == 0) & (covered == 1)
+    simple = np.empty(len(x), dtype=np.bool_)
+    for i in range(len(x)):
+        simple[i] = ends[i] == 0 and covered[i] == 1
+    return simple

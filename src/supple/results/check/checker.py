@@ -22,9 +22,9 @@ from supple.results.check.checks.tunnelling import Tunnelling
 from supple.results.check.checks.works import Works
 from supple.results.check.frame_check import UNKNOWN, FrameCheck, skipped
 from supple.results.check.report import CheckReport, CheckResult, Verdict
-from supple.results.check.series.recording import Given, SeriesRecording
+from supple.results.check.series_recording import Given, SeriesRecording
 from supple.results.check.settings import CheckSettings
-from supple.results.check.shown.place import place_of
+from supple.results.check.shown import place_of
 from supple.results.check.snapshot import Scene
 from supple.results.recording.reader import Recording, opened
 

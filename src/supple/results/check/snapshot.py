@@ -17,7 +17,7 @@ from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.results.check.geometry.orientation import volume_signs
 from supple.results.check.geometry.surface_pairs import meeting_pairs
 from supple.results.check.load_forces import ActuatorState, actuator_states, add_muscle_forces, load_forces
-from supple.results.check.series.recording import SeriesRecording
+from supple.results.check.series_recording import SeriesRecording
 from supple.results.check.stored_energies import elastic_energy, stitch_energy
 from supple.results.check.surfaces import Surfaces, seam_keys
 from supple.results.recording.frame import RecordedFrame

@@ -118,11 +118,11 @@ def check(
     if json is not None:
         report.save(json)
     if html is not None:
-        from supple.results.check.shown.page import write_page
+        from supple.results.check.shown import write_page
 
         write_page(report, html)
     if picture is not None and report.place is not None:
-        from supple.results.check.shown.picture import draw
+        from supple.results.check.shown import draw
 
         draw(report.place, picture)
     if not quiet or not report.ok:
@@ -134,7 +134,7 @@ def _report(paths: tuple[Path, ...], given: dict[str, Any], settings: dict[str, 
     from supple.errors import OutputError
     from supple.mesh.io.series.open import open_series
     from supple.results.check.checker import check_recording, check_series
-    from supple.results.check.series.recording import Given
+    from supple.results.check.series_recording import Given
     from supple.results.recording.checked_hdf5 import is_of_another_program
 
     folder = paths[0].is_dir() and not (paths[0] / "recording.vtkhdf").exists()

@@ -44,7 +44,7 @@ def fit(
         Picture of the tests and the fit (.png, .pdf or .svg).
     """
     from supple.app.scene_file.entries.families import BY_LAW_KINDS, scene_file_line
-    from supple.materials.fitting.fit import fit_material
+    from supple.materials.fit import fit_material
     from supple.runtime.replacing import refuse_to_replace
 
     if output is not None:

@@ -7,25 +7,56 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
 from supple.errors import MeshError
-from supple.mesh.io.libraries.usd import USD_SUFFIXES
+from supple.mesh.io.cells import FormatError
+from supple.mesh.io.in_child import arrays_in_child
+from supple.mesh.io.libraries.usd import INSTALL, USD_SUFFIXES
+from supple.mesh.io.mesh_files import located
 from supple.mesh.io.series.arrays import is_array_folder, read_folder, read_npz
 from supple.mesh.io.series.file_series import MAX_FRAMES, READERS, FileSeries
-from supple.mesh.io.series.series import Series
-from supple.mesh.io.series.whole_files import read_glb_series, read_usd_series, read_vtkhdf_series
+from supple.mesh.io.series.series import ArraySeries, Cells, Series
 from supple.mesh.io.text import file_contents
+
+
+def _read_in_child(path: Path, library: str) -> ArraySeries:
+    try:
+        facts, arrays, positions = arrays_in_child(path, library)
+    except FormatError as error:
+        raise located(path, error) from None
+    n = positions.shape[1]
+    cells = Cells(
+        n,
+        arrays["tets"].reshape(-1, 4).astype(np.int64),
+        arrays["triangles"].reshape(-1, 3).astype(np.int64),
+        arrays["part"].astype(np.int64),
+        tuple(facts["names"]),
+    )
+    series = ArraySeries(path, cells, positions, arrays.get("times"))
+    series.others = {int(frame): text for frame, text in facts["others"].items()}
+    series.notes = tuple(facts["notes"])
+    return series
+
+
+def _read_usd(path: Path) -> ArraySeries:
+    """TetMesh and Mesh prims of a USD file, with their time samples."""
+    if find_spec("pxr") is None:
+        raise MeshError(f"{path}: {INSTALL}")
+    return _read_in_child(path, "usd_series")
+
 
 WHOLE: dict[str, Callable[[Path], Series]] = {
     ".npz": read_npz,
-    ".glb": read_glb_series,
-    ".vtkhdf": read_vtkhdf_series,
-    ".hdf": read_vtkhdf_series,
-    **dict.fromkeys(USD_SUFFIXES, read_usd_series),
+    ".glb": partial(_read_in_child, library="glb_series"),
+    ".vtkhdf": partial(_read_in_child, library="vtkhdf_series"),
+    ".hdf": partial(_read_in_child, library="vtkhdf_series"),
+    **dict.fromkeys(USD_SUFFIXES, _read_usd),
 }
 _NUMBER = re.compile(r"(\d+)(?!.*\d)")
 

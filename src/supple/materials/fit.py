@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.materials.by_law import ByLaw
-from supple.materials.fitting.curves import MODES, Curve, nominal_stresses, read_curve
-from supple.materials.fitting.families import Family, family_of
+from supple.materials.fit_curves import MODES, Curve, nominal_stresses, read_curve
+from supple.materials.fit_families import Family, family_of
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.runtime.figures import paper_figure
 from supple.runtime.threads import threads_for

@@ -13,7 +13,7 @@ from supple.materials.elastic import Elastic, FixedCorotated, NeoHookean, Stable
 from supple.materials.per_tet import NO_REGION
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.mesh.io.series.series import OtherCells, Series
-from supple.results.check.series.parts import parts_of
+from supple.results.check.series_parts import parts_of
 from supple.results.recording.actions import no_stitches
 from supple.results.recording.details import RecordedDetails
 from supple.results.recording.physics import NOT_KNOWN, RecordedPhysics

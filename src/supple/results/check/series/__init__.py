@@ -1,1 +1,0 @@
-"""Series of other programs as the checks see them."""

@@ -1,1 +1,0 @@
-"""Reports for people: the place of a failure, its picture, and a page."""
