@@ -122,7 +122,7 @@ def test_a_spinning_pair_keeps_its_momenta_and_gains_no_energy(solver, rate, los
     placed = initial_state(scene)
     x = build_system(scene).split(placed.positions)
     velocities = {name: np.array([0.1, 0.0, 0.0]) + np.cross(spin, points - center) for name, points in x.items()}
-    frames = sp.simulate(scene, solver, 1 / rate, rate // 3, initial_velocities=velocities)
+    frames = sp.simulate(scene, solver, 1 / rate, rate // 4, initial_velocities=velocities)
     reports = [frame.report for frame in frames]
     assert {str(report.status) for report in reports} == {"converged"}
     energies = [each.kinetic_energy + each.elastic_energy + each.stitch_energy for each in reports]

@@ -71,7 +71,7 @@ def test_a_damped_oscillator_has_the_analytic_frequency_and_decay(name, mode):
     squares, modes = np.linalg.eigh(stiffness_of_top(name) / (1000.0 / 24.0))
     omega = np.sqrt(squares[mode])
     dt = 2.0 * np.pi / omega / 100
-    for tau in (0.0, 0.01 / omega, 0.05 / omega):
+    for tau in (0.0, 0.05 / omega):
         scene = held_tet(kind(**constants, damping=tau), gravity=(0, 0, 0))
         y = displacements(scene, XPBD(substeps=20), dt, 450, 1e-6 * modes[:, mode]) @ modes[:, mode]
         rate, frequency = decay_and_frequency(y, dt)
