@@ -250,6 +250,26 @@ def test_a_picture_is_colored_by_a_field_has_a_legend_and_a_shadow(tmp_path, too
     assert ((shown[1] - shown[0]).sum(axis=2) < -30).mean() < 1e-3  # a shadow makes nothing brighter
 
 
+def test_the_sides_of_a_cube_are_flat_and_its_edges_sharp(tmp_path, capsys):
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("pyvista")
+    cube = sp.Body("cube", sp.shapes.box(divisions=(2, 2, 2)), sp.StableNeoHookean(youngs=1e4, poisson=0.3))
+    scene, recorder = sp.Scene([cube], gravity=(0, 0, 0)), sp.Recorder(tmp_path / "r.vtkhdf")
+    list(sp.simulate(scene, sp.XPBD(substeps=4), 0.01, 1, sinks=[recorder]))
+    code = main(["picture", str(recorder.path), "-o", str(tmp_path / "cube.png"), "--size", "160x120"])
+    error = capsys.readouterr().err
+    if "OpenGL" in error and not os.environ.get("CI"):
+        pytest.skip(error)
+    assert code == 0, error
+    with image.open(tmp_path / "cube.png") as page:
+        red, _, blue = np.moveaxis(np.asarray(page.convert("RGB")).astype(int), 2, 0)
+    drawn = red - blue > 60
+    within = drawn & np.roll(drawn, 3, 1) & np.roll(drawn, -3, 1) & np.roll(drawn, 3, 0) & np.roll(drawn, -3, 0)
+    steps = np.abs(np.diff(red, axis=1))[within[:, 1:]]
+    assert (steps <= 2).mean() > 0.9  # 0.77 where normals are smooth across the edges
+    assert steps.max() > 10
+
+
 def test_a_field_of_quadratic_tets_has_values_at_middle_nodes(tmp_path):
     path = tmp_path / "q.vtkhdf"
     mesh = sp.shapes.box(divisions=(2, 1, 1), order=2)
