@@ -13,7 +13,7 @@ from playwright.sync_api import sync_playwright
 
 import supple as sp
 from supple.app.viewer.app import opened_page
-from supple.app.viewer.protocol.commands import Grab, ReleaseGrab, Reset, SetParameter, Step
+from supple.app.viewer.protocol.commands import Grab, Pause, Play, ReleaseGrab, Reset, SetParameter, Step
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.mesh.primitives.surfaces import torus_surface
 
@@ -53,7 +53,7 @@ def draw_live(tab, page) -> None:
     client = next(iter(page.server.get_clients().values()))
     eye, center = np.asarray(client.camera.position), np.asarray(page.content.stage.model.view.center)
     with client.atomic():
-        client.camera.position = tuple(center + 0.82 * (eye - center))
+        client.camera.position = tuple(center + 1.05 * (eye - center))
         client.camera.look_at = tuple(center - [0.0, 0.12, 0.0])
 
     def settle(seconds: float = 2.5) -> None:
@@ -65,7 +65,7 @@ def draw_live(tab, page) -> None:
         settle()
         save(tab, name)
 
-    tab.get_by_role("button", name="Play", exact=True).click()
+    controller.simulation.send(Play())
     while controller.snapshot.time < 0.5:
         settle(0.1)
     bear = controller.snapshot.body_positions("bear")
@@ -75,7 +75,7 @@ def draw_live(tab, page) -> None:
     settle(3.0)
     save(tab, "live.png")
     controller.simulation.send(ReleaseGrab(1))
-    tab.get_by_role("button", name="Pause", exact=True).click()
+    controller.simulation.send(Pause())
     settle(1.0)
     for command in (Reset(), SetParameter("youngs", 1.5e4), Step(15)):
         controller.simulation.send(command)
@@ -87,13 +87,13 @@ def draw_live(tab, page) -> None:
     for command in (Reset(), SetParameter("youngs", 6e4), Step(9)):
         controller.simulation.send(command)
     show("live_velocities.png", surface="skin", color_by="body", velocities=True)
-    tab.get_by_role("button", name="Play", exact=True).click()
+    controller.simulation.send(Play())
     settle(2.0)
-    tab.get_by_role("button", name="Pause", exact=True).click()
+    controller.simulation.send(Pause())
     show("live_stitches.png", surface="wireframe", velocities=False, contacts=True)
     show("live_skin.png", surface="skin", contacts=False)
     tab.get_by_role("tab", name="Solver").click()
-    tab.get_by_role("button", name="Play", exact=True).click()
+    controller.simulation.send(Play())
     settle(4.0)
     tab.get_by_text("Spin [rad/s]").scroll_into_view_if_needed()
     save(tab, "live_solver.png")

@@ -10,7 +10,7 @@ from supple.mesh.surface import SurfaceMesh
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
 from supple.results.recording.scene import RecordedObstacle
-from supple.results.view.bounds import view_of_scene
+from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.camera import direction_of, fitted
 from supple.results.view.floor_shadow import FloorShadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame, view_of
@@ -78,7 +78,7 @@ def test_a_bowl_is_seen_whole_and_a_hall_is_not():
     def view(radius):
         shape = {"center": np.zeros(3), "radius": radius, "inside": True}
         bowl = RecordedObstacle("bowl", "Sphere", shape, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
-        return view_of_scene(low, high, up, [bowl])
+        return view_of_scene(box_corners(low, high), up, [bowl])
 
     np.testing.assert_allclose([view(0.2).low[0], view(0.2).high[0]], [-0.2, 0.2], rtol=0.02)
     assert view(0.2).high[1] == 0.1  # its upper half is not drawn

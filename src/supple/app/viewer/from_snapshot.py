@@ -12,7 +12,7 @@ from supple.app.viewer.protocol.snapshots import PUSHER, RIGID, BodyDescription,
 from supple.mesh.skin import Embedding
 from supple.mesh.tetmesh import TetMesh
 from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
-from supple.results.view.bounds import view_of_scene
+from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.model import Model, ModelBody, Moment
 
 
@@ -74,7 +74,7 @@ class MomentBuilder:
             _scene_obstacles(scene),
             np.concatenate([body.rest_positions for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
-            view_of_scene(np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up), _scene_obstacles(scene)),
+            view_of_scene(box_corners(scene.low, scene.high), np.asarray(scene.up), _scene_obstacles(scene)),
             scene.stitches,
             joints=scene.joints,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -44,14 +45,12 @@ class View:
         return max(0.5 * float(np.linalg.norm(self.high - self.low)), 1e-6)
 
 
-def view_of_scene(
-    low: NDArray[np.float64], high: NDArray[np.float64], up: NDArray[np.float64], obstacles: Sequence[RecordedObstacle]
-) -> View:
-    """The view of bodies within bounds (3,), (3,) [m], of the floor not far below them, and of obstacles of their size.
+def view_of_scene(points: NDArray[np.float64], up: NDArray[np.float64], obstacles: Sequence[RecordedObstacle]) -> View:
+    """The view of bodies in the hull of points (k, 3) [m], of the floor not far below, and of obstacles about them.
 
-    Of a room the lower half counts, which is what is drawn.
+    Obstacles that are much larger do not count. Of a room the lower half counts, which is what is drawn.
     """
-    bodies = View(low, high, up)
+    bodies = View(points.min(axis=0), points.max(axis=0), up, points)
     outline = [bodies.outline]
     for recorded in obstacles:
         plane = recorded.obstacle.plane
@@ -60,15 +59,24 @@ def view_of_scene(
             if float(plane[1] @ up) > 0.99 and 0.0 < below < 4.0 * bodies.radius:
                 outline.append((bodies.center - below * up)[None])
             continue
-        points, _ = recorded.obstacle.drawn(bodies.center, bodies.radius)
-        heights = points @ up
+        drawn, _ = recorded.obstacle.drawn(bodies.center, bodies.radius)
+        heights = drawn @ up
         if recorded.obstacle.is_room:
-            points = points[heights <= 0.5 * (heights.min() + heights.max())]
-        both = np.concatenate([bodies.outline, points])
+            drawn = drawn[heights <= 0.5 * (heights.min() + heights.max())]
+        both = np.concatenate([points, drawn])
         if np.linalg.norm(np.ptp(both, axis=0)) < _LARGEST * 2.0 * bodies.radius:
-            outline.append(points)
+            outline.append(drawn)
     whole = np.concatenate(outline)
     return View(whole.min(axis=0), whole.max(axis=0), up, whole)
+
+
+# To corners, edges and sides of a cube: the points that are farthest in these directions stand for all.
+_DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+
+
+def farthest(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(26, 3) the points of (k, 3) that are farthest in 26 directions: a hull that is at most a little smaller."""
+    return points[(points @ _DIRECTIONS.T).argmax(axis=0)]
 
 
 def box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
-from supple.results.view.bounds import View, view_of_scene
+from supple.results.view.bounds import View, box_corners, farthest, view_of_scene
 from supple.results.view.model import Model, ModelBody, Moment
 
 
@@ -46,18 +46,17 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
 
 def view_of(recording: Recording) -> View:
     """See `view_of_scene`; over all frames, of which at most about 200 are read."""
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    points = np.zeros((0, 3))
     for frame in recording[:: max(1, len(recording) // 200)]:
         x = np.concatenate(list(frame.positions.values()))
-        x = x[np.isfinite(x).all(axis=1)]
-        if len(x):
-            low, high = np.minimum(low, x.min(axis=0)), np.maximum(high, x.max(axis=0))
-    if not np.isfinite(low).all():
-        low, high = np.zeros(3), np.ones(3)
+        x = np.concatenate([points, x[np.isfinite(x).all(axis=1)]])
+        points = farthest(x) if len(x) else x
+    if not len(points):
+        points = box_corners(np.zeros(3), np.ones(3))
     g = recording.gravity
     size = np.linalg.norm(g)
     up = -g / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
-    return view_of_scene(low, high, up, recording.obstacles)
+    return view_of_scene(points, up, recording.obstacles)
 
 
 def evenly(count: int, most: int) -> list[int]:
