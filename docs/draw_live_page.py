@@ -53,7 +53,7 @@ def draw_live(tab, page) -> None:
     client = next(iter(page.server.get_clients().values()))
     eye, center = np.asarray(client.camera.position), np.asarray(page.content.stage.model.view.center)
     with client.atomic():
-        client.camera.position = tuple(center + 1.05 * (eye - center))
+        client.camera.position = tuple(center + 0.95 * (eye - center))
         client.camera.look_at = tuple(center - [0.0, 0.12, 0.0])
 
     def settle(seconds: float = 2.5) -> None:
