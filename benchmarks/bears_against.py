@@ -22,7 +22,7 @@ from supple.app.demos.bears import BEARS, HEIGHT
 from supple.mesh.shapes import gummy_bear
 from supple.model.system import build_system
 from supple.solvers.xpbd.assessment.surfaces import SurfaceCheck, crossings
-from supple.solvers.xpbd.contact.collisions import mean_edge_length
+from supple.solvers.xpbd.contact.contact import mean_edge_length
 from supple.solvers.xpbd.solver import XPBD
 
 ROOT = Path(__file__).parents[1]

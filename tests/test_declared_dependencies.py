@@ -24,7 +24,7 @@ IMPORT_NAMES = {
 }
 # Development tools that are run, or loaded by pytest; no test imports them.
 TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-xdist", "ruff"}
-OWN = {"supple", "tests", "benchmarks", "trials"}
+OWN = {"supple", "tests", "benchmarks"}
 
 
 @cache

@@ -62,6 +62,7 @@ def contact_mesh(
     obstacles: tuple[ObstacleRange, ...],
     collide: NDArray[np.bool_],
     start: NDArray[np.float64],
+    touching: float | None = None,
 ) -> ContactMesh:
     """Join the surfaces of a system whose obstacles are vertices (see `with_obstacles`).
 
@@ -69,6 +70,7 @@ def contact_mesh(
     ----------
     collide : (p, p) which owners may touch, bodies before obstacles
     start : (n, 3) where everything is at the start [m]
+    touching : how near stitched parts are at the start that do not collide, see `stitch_filter` [m]
     """
     bodies = len(system.bodies)
     points, triangles = [system.points], [system.triangles]
@@ -96,6 +98,7 @@ def contact_mesh(
         collide=collide,
         stitches=(of_vertex[system.stitching.nodes()], surface.positions(start)),
         welded=_welded_points(system, of_vertex),
+        touching=touching,
         rows=np.where(used < len(system.points), used, -1).astype(np.int32),
     )
 
@@ -122,6 +125,7 @@ def mesh_of_triangles(
     collide: NDArray[np.bool_],
     stitches: tuple[NDArray[np.int32], NDArray[np.float64]] | None = None,
     welded: WeldedPoints | None = None,
+    touching: float | None = None,
     rows: NDArray[np.int32] | None = None,
 ) -> ContactMesh:
     """The mesh of triangles (f, 3) of points with rest positions (s, 3); for the other arguments see `ContactMesh`.
@@ -129,6 +133,7 @@ def mesh_of_triangles(
     Parameters
     ----------
     stitches : nodes (k, 4) of stitches, -1 for none, and (s, 3) where the points are at the start; welded : of welds
+    touching : see `contact_mesh`
     rows : see `ContactMesh`; None where the points belong to no system
     """
     s = len(points)
@@ -143,7 +148,7 @@ def mesh_of_triangles(
     thirds = np.repeat(doubled / 6.0, 3)
     stitched = None
     if stitches is not None and (len(stitches[0]) or welded is not None):
-        stitched = stitch_filter((triangles, edges, triangle_edges), *stitches, owner, collide, welded)
+        stitched = stitch_filter((triangles, edges, triangle_edges), *stitches, owner, collide, welded, touching)
     return ContactMesh(
         points=points,
         triangles=triangles,

@@ -55,6 +55,7 @@ def stitch_filter(
     owner: NDArray[np.int32],
     collide: NDArray[np.bool_],
     welded: WeldedPoints | None = None,
+    touching: float | None = None,
 ) -> StitchFilter:
     """Of stitches with nodes (k, 4) in the mesh's numbers, -1 for none, and of welds.
 
@@ -62,13 +63,13 @@ def stitch_filter(
     ----------
     mesh : triangles (f, 3), edges (e, 2), triangle_edges (f, 3), see `ContactMesh`
     start : (s, 3) where the points are at the start [m]; owner : (s,) which thing each belongs to
-    collide : (p, p) which owners may touch
+    collide : (p, p) which owners may touch; touching : what is nearer at the start touches [m]
     """
     triangles, edges, triangle_edges = mesh
     s, e, f = len(owner), len(edges), len(triangles)
     points, faces = stitched_triangles(nodes, triangles, s)
     one, other = stitched_edges(nodes, edges, s)
-    near_triangles, near_edges = _touching(mesh, nodes, start, owner, collide)
+    near_triangles, near_edges = _touching(mesh, nodes, start, owner, collide, touching)
     if welded is not None:
         more_triangles, more_edges = _welded(mesh, welded, start, owner)
         near_triangles = np.concatenate([near_triangles, more_triangles])
@@ -112,10 +113,11 @@ def _touching(
     start: NDArray[np.float64],
     owner: NDArray[np.int32],
     collide: NDArray[np.bool_],
+    reach: float | None,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Pairs (k, 2) of points with triangles, and of edges with edges, that touch at the start; see the module."""
     triangles, edges, _ = mesh
-    reach = _TOUCHING * float(np.linalg.norm(start[edges[:, 1]] - start[edges[:, 0]], axis=1).mean())
+    reach = reach or _TOUCHING * float(np.linalg.norm(start[edges[:, 1]] - start[edges[:, 0]], axis=1).mean())
     stitched = np.zeros(len(owner), dtype=np.bool_)
     stitched[nodes[nodes >= 0]] = True
     joined = np.zeros_like(collide)

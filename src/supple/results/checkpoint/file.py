@@ -23,9 +23,8 @@ from supple.solvers.implicit.stepping.conservation import EnergyMade
 from supple.solvers.implicit.stepping.integrators import History
 from supple.solvers.xpbd.assessment.assessment import Ledger
 from supple.solvers.xpbd.assessment.softening import MeasuredWork
-from supple.solvers.xpbd.contact.contact_rows import LoadedRows
-from supple.solvers.xpbd.contact.frame_forces import ShapeLoads
-from supple.solvers.xpbd.contact.memory import ContactMemory, ObstacleMemory, SurfaceMemory
+from supple.solvers.xpbd.contact.frame_forces import LoadedRows
+from supple.solvers.xpbd.contact.memory import ContactMemory
 from supple.solvers.xpbd.damping.kelvin_voigt import ViscousMemory
 from supple.solvers.xpbd.memory import ControlMemory, XPBDMemory
 from supple.solvers.xpbd.sleep import SleepMemory
@@ -38,10 +37,7 @@ MEMORIES: tuple[type, ...] = (
     Ledger,
     LoadedRows,
     MeasuredWork,
-    ObstacleMemory,
-    ShapeLoads,
     SleepMemory,
-    SurfaceMemory,
     ViscousMemory,
     XPBDMemory,
 )

@@ -18,9 +18,8 @@ class XPBDDetails(SolverDetails):
     Attributes
     ----------
     contacts : number of contacts that the last substep resolved, and of those between things at rest
-    smallest_gap : smallest signed distance of a vertex from a surface at the beginnings of the substeps [m], below zero
-        where they overlapped, of bodies that do not sleep; None where no gap was smaller than about one edge length.
-        Pairs of edges are not in it.
+    smallest_gap : smallest distance of a contact at the beginnings of the substeps [m], below zero where things began
+        through each other, of bodies that do not sleep; None where nothing came near
     substeps : number of substeps; repeats : how often the frame was undone and repeated with more
     substeps_reason : what asked for this number
     softening : by body, the share of its stiffness that it lacks at this length of the substep, estimated (see
@@ -30,8 +29,8 @@ class XPBDDetails(SolverDetails):
         the frame [N]; zero where they sleep
     contact_forces, friction_forces : by name of the body or obstacle, (3,) means over the frame [N]; each sum to zero
     asleep : by body, whether it rests, so that no substep was taken for it (see `supple.solvers.xpbd.sleep`)
-    held_back : substeps in which the motion of a body was shortened, so that no tet inverts and nothing passes
-        through anything
+    held_back : substeps in which motion was shortened by more than contacts may leave over, so that no tet inverts and
+        nothing passes through anything
     """
 
     smallest_gap: float | None = None

@@ -1,29 +1,17 @@
 """The parts of a substep around the constraints: prediction, velocities, and conversion to world coordinates.
 
-Within a frame the coordinates of every connected component are relative to its own origin, near its center of mass.
-Positions far from the world's origin have few digits left for the small differences that give velocities: at 100 m, a
-substep of 0.2 ms turns the round-off of a position into 7e-11 m/s.
+Within a frame all coordinates are relative to one origin, near the middle of the scene. Positions far from the world's
+origin have few digits left for the small differences that give velocities: at 100 m, a substep of 0.2 ms turns the
+round-off of a position into 7e-11 m/s.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.runtime.kernel_cache import njit, prange
 
 BLOCK = 4096
 # Positions beyond this distance [m] are lost, finite or not: round-off is a tenth of a millimetre there.
 FARTHEST = 1e12
-
-
-def origins_of_components(
-    positions: NDArray[np.float64], components: NDArray[np.integer], origins: NDArray[np.float64]
-) -> None:
-    """Write the origin (n, 3) of each vertex: the rounded mean of the vertices of its component."""
-    counts = np.maximum(1, np.bincount(components))
-    for j in range(3):
-        means = np.bincount(components, positions[:, j]) / counts
-        # Whole multiples of 1/1024 m: differences with positions within 8,000 km of the origin are then exact.
-        origins[:, j] = (np.round(means * 1024.0) / 1024.0)[components]
 
 
 @njit
@@ -90,21 +78,3 @@ def to_world(points, origins, world):
             world[i, j] = origins[i, j] + points[i, j]
             good = good and abs(world[i, j]) <= FARTHEST
     return good
-
-
-@njit(cache=True)
-def apply_changes(points, velocities, h, origins, previous, world, world_previous, impulses):
-    """Apply what contacts changed since `to_world`; what they did not change keeps every bit.
-
-    Positions at the end and at the beginning of the substep may both have changed; the velocity gets the difference,
-    and so does `impulses` (n, 3).
-    """
-    for i in range(len(world)):
-        for j in range(3):
-            change = world[i, j] - (origins[i, j] + points[i, j])
-            change_before = world_previous[i, j] - (origins[i, j] + previous[i, j])
-            points[i, j] += change
-            previous[i, j] += change_before
-            kick = (change - change_before) / h
-            velocities[i, j] += kick
-            impulses[i, j] += kick

@@ -35,8 +35,7 @@ from scipy.sparse.csgraph import connected_components
 from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.model.system import System
 from supple.scene.scene import Scene
-from supple.solvers.xpbd.contact.contact_rows import LoadedRows
-from supple.solvers.xpbd.contact.frame_forces import FrameForces, ShapeLoads
+from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows
 from supple.solvers.xpbd.sweeps.ordering import Layout
 
 EDGES, FALL = 0.5, 0.1
@@ -53,7 +52,7 @@ class SleepMemory:
     islands : (b,) a number for each sleeping island, `AWAKE` for the other bodies
     since : (b,) the time since which each body has stayed at its place [s]
     places : (n, 3) where its vertices were then, in the numbering of the scene [m]
-    contacts, loads : of sleeping bodies with each other and with obstacles (see `FrameForces.at_rest`)
+    contacts : of sleeping bodies with each other and with obstacles (see `FrameForces.at_rest`)
     scene : digest of the scene; poses : (k, 12) of the obstacles at the end of the frame
     """
 
@@ -61,7 +60,6 @@ class SleepMemory:
     since: NDArray[np.float64]
     places: NDArray[np.float64]
     contacts: LoadedRows
-    loads: ShapeLoads
     scene: str
     poses: NDArray[np.float64]
 
@@ -126,8 +124,7 @@ class Sleep:
         poses = self._poses_at(time)
         if memory is None or memory.scene != self._scene or not np.array_equal(memory.poses, poses):
             none = np.full(len(self._starts), AWAKE, dtype=np.int64)
-            nothing = LoadedRows.none(), ShapeLoads.none()
-            return SleepMemory(none, np.full(len(none), time), x, *nothing, self._scene, poses)
+            return SleepMemory(none, np.full(len(none), time), x, LoadedRows.none(), self._scene, poses)
         if not np.array_equal(self._poses_at(time + dt), poses):
             return self.woken(memory, memory.asleep)
         changed = self._largest(np.maximum(np.abs(x - memory.places), np.abs(v))) > 0.0
@@ -182,7 +179,7 @@ class Sleep:
         places = np.where(rows[:, None], x, begun.places)
         v[self._vertices(fallen)] = 0.0
         rest = forces.at_rest(ready)
-        return SleepMemory(np.where(ready, islands, AWAKE), since, places, *rest, self._scene, self._poses_at(time))
+        return SleepMemory(np.where(ready, islands, AWAKE), since, places, rest, self._scene, self._poses_at(time))
 
     def vertices(self, bodies: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(n,) the vertices of bodies (b,), in the solver's numbering, which permutes vertices within a body only."""

@@ -29,8 +29,7 @@ from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
 from supple.solvers.xpbd.constraints.registry import build_constraint_sets
 from supple.solvers.xpbd.constraints.stitches import StitchAnchors, stitch_constraints
-from supple.solvers.xpbd.constraints.volume_guard import VolumeGuard
-from supple.solvers.xpbd.contact.collisions import Collisions
+from supple.solvers.xpbd.contact.contact import Contact
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.damping.kelvin_voigt import make_damping
 from supple.solvers.xpbd.details import XPBDDetails
@@ -42,7 +41,6 @@ from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.momentum import MomentumRestore
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection
-from supple.solvers.xpbd.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.sleep import Sleep
 from supple.solvers.xpbd.start import raise_if_inside
 from supple.solvers.xpbd.substeps import SubstepChoice, Substeps
@@ -147,18 +145,17 @@ class XPBD(Solver):
         system = welded.system
         layout = make_layout(system)
         inner = reordered(system, layout)
-        extended = np.zeros((len(system.masses) + len(inner.stitching.anchors), 4))
-        extended[: len(system.masses), 3] = inner.inverse_masses
-        sets = [*build_constraint_sets(inner, layout), *stitch_constraints(inner, extended[:, 3])]
+        inverse_masses = np.concatenate([inner.inverse_masses, np.zeros(len(inner.stitching.anchors))])
+        sets = [*build_constraint_sets(inner, layout), *stitch_constraints(inner, inverse_masses)]
         threads = self.threads or numba.get_num_threads()
         work = sum(made.work for made in sets)
-        with numba_threads(self.threads or (None if work >= PARALLEL_FROM else 1)):
-            collisions = Collisions(inner, self.contact)
         rigid = RigidBodies(inner)
-        large = work + RIGID_POINT * collisions.rigid_points >= PARALLEL_FROM
+        with numba_threads(self.threads or (None if work >= PARALLEL_FROM else 1)):
+            contact = Contact(inner, rigid, inverse_masses, self.contact)
+        large = work + RIGID_POINT * contact.rigid_points >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
         with numba_threads(self.threads or (None if large else 1)):
-            assessment = Assessment(inner, self.contact, collisions.edge_length)
+            assessment = Assessment(inner, self.contact, contact.edge_length)
         return XPBDWorkspace(
             system=inner,
             layout=layout,
@@ -166,22 +163,19 @@ class XPBD(Solver):
             rigid=rigid,
             joints=JointProjection(system, layout, rigid),
             sets=sets,
-            damping=make_damping(inner, layout, extended[:, 3]),
+            damping=make_damping(inner, layout, inverse_masses),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
-            collisions=collisions,
+            contact=contact,
             loads=ExternalForces(inner),
             actuators=ActuatorProjection(inner),
-            guard=VolumeGuard(inner),
-            fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
             delivered=DeliveredWork(inner, sets),
             works=Works(inner),
-            choice=SubstepChoice(inner, assessment.softening, bool(collisions), rigid),
+            choice=SubstepChoice(inner, assessment.softening, bool(contact), rigid),
             sleep=Sleep(inner, layout, self.sleep_after, self.accuracy),
             threads=self.threads or (None if large else 1),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
-            extended=extended,
         )
 
     def check(self, system: System, state: State, workspace: XPBDWorkspace) -> None:
@@ -196,7 +190,7 @@ class XPBD(Solver):
         refuse_moved_welds(system, state)
         workspace.joints.check(workspace.welded.inner(state))
         if self.start == "refuse":
-            edge_length = workspace.collisions.edge_length
+            edge_length = workspace.contact.edge_length
             with numba_threads(workspace.threads):
                 raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
 
@@ -218,7 +212,7 @@ class XPBD(Solver):
         sleep = ws.sleep.begin(state.positions, state.velocities, state.time, dt, memory.sleep)
         overlaps = overlaps_of(ws, state.time, sleep)
         while True:
-            held_back = advance(ws, state, dt, used.count, memory, overlaps, sleep)
+            advance(ws, state, dt, used.count, memory, overlaps, sleep)
             lost = first_lost(ws.points, ws.velocities)
             if lost < 0:
                 disturbed = disturbed_bodies(ws, time, sleep)
@@ -227,7 +221,7 @@ class XPBD(Solver):
                     load(ws, state)
                     overlaps = overlaps_of(ws, state.time, sleep)
                     continue
-                frame = (time, dt, held_back, used, repeats, memory, overlaps, sleep)
+                frame = (time, dt, used, repeats, memory, overlaps, sleep)
                 new, report, problem = end_frame(ws, *frame, self.accuracy, setting)
             else:
                 problem = Status.NOT_FINITE
@@ -260,7 +254,7 @@ class XPBD(Solver):
 
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
         """No contacts; see `Solver.initial_details`."""
-        pushes, friction = workspace.collisions.forces.by_name()
+        pushes, friction = workspace.contact.forces.by_name()
         return XPBDDetails(
             softening=dict.fromkeys((part.name for part in system.bodies), 0.0),
             asleep=dict.fromkeys((part.name for part in system.bodies), False),

@@ -11,8 +11,8 @@ from supple.contact.start.surfaces import start_surfaces
 from supple.errors import SceneError
 from supple.model.system import System
 from supple.scene.contact_pairs import PairTable, pair_table
-from supple.solvers.xpbd.assessment.surfaces import TOLERATED_DEPTH, SurfaceCheck, colliding_pairs
-from supple.solvers.xpbd.contact.settings import XPBDContact
+from supple.solvers.xpbd.assessment.surfaces import TOLERATED_DEPTH, SurfaceCheck
+from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
 
 _REMEDY = "run `supple run --separate`, which moves it, or give XPBD(start='push_out')"
 

@@ -25,16 +25,13 @@ from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
 from supple.solvers.xpbd.constraints.registry import ConstraintSet
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.solvers.xpbd.constraints.stitches import StitchAnchors
-from supple.solvers.xpbd.constraints.volume_guard import VolumeGuard
-from supple.solvers.xpbd.contact.collisions import Collisions
+from supple.solvers.xpbd.contact.contact import Contact
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
 from supple.solvers.xpbd.external_forces import ExternalForces
-from supple.solvers.xpbd.integration import apply_changes
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.momentum import MomentumRestore
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection
-from supple.solvers.xpbd.rigid_fallback import RigidFallback
 from supple.solvers.xpbd.sleep import Sleep
 from supple.solvers.xpbd.substeps import SubstepChoice
 from supple.solvers.xpbd.sweeps.ordering import Layout, reordered
@@ -51,11 +48,12 @@ class XPBDWorkspace:
     ----------
     growth : which the elastic constants have now
     threads : of Numba's parallel kernels; None leaves their number as it is; most_threads : in the present frame
-    extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
-        of the anchors (inverse mass 0); points : the rows of the vertices
+    extended : (n + a, 4) positions about one origin [m] and inverse masses [1/kg], of the vertices and then
+        of the anchors (inverse mass 0); points : the rows of the vertices. Views of the nodes of contact
     time : of these positions, between two substeps [s]
-    previous : (n, 3) positions at the beginning of the substep [m]; begun : those, which contacts do not change
-    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
+    previous : (n, 3) positions at the beginning of the substep [m]
+    velocities, origins : (n, 3); world : (n, 3) positions in the world at the ends of frames [m]
+    sound : (m,) the tets that keep their volume positive; bounds : (m,) scratch memory
     """
 
     system: System
@@ -66,11 +64,9 @@ class XPBDWorkspace:
     sets: list[ConstraintSet]
     damping: Damping | None
     momentum: MomentumRestore | None
-    collisions: Collisions
+    contact: Contact
     loads: ExternalForces
     actuators: ActuatorProjection
-    guard: VolumeGuard
-    fallback: RigidFallback
     assessment: Assessment
     delivered: DeliveredWork
     works: Works
@@ -79,23 +75,24 @@ class XPBDWorkspace:
     threads: int | None
     pace: ThreadTuner
     anchors: StitchAnchors
-    extended: NDArray[np.float64]
     growth: Growth | None = None
     most_threads: int = 1
     time: float = 0.0
+    extended: NDArray[np.float64] = field(init=False)
     points: NDArray[np.float64] = field(init=False)
     previous: NDArray[np.float64] = field(init=False)
-    begun: NDArray[np.float64] = field(init=False)
     velocities: NDArray[np.float64] = field(init=False)
     origins: NDArray[np.float64] = field(init=False)
     world: NDArray[np.float64] = field(init=False)
-    world_previous: NDArray[np.float64] = field(init=False)
+    sound: NDArray[np.bool_] = field(init=False)
+    bounds: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
-        n = len(self.system.masses)
-        self.points = self.extended[:n]
-        for name in ("previous", "begun", "velocities", "origins", "world", "world_previous"):
-            setattr(self, name, np.zeros((n, 3)))
+        n, m, nodes = len(self.system.masses), len(self.system.tets), self.contact.nodes
+        self.extended = nodes.x[: n + len(self.system.stitching.anchors)]
+        self.points, self.previous, self.velocities = nodes.x[:n], nodes.begin[:n], nodes.v[:n]
+        self.origins, self.world = np.zeros((n, 3)), np.zeros((n, 3))
+        self.sound, self.bounds = np.ones(m, dtype=np.bool_), np.zeros(m)
 
     def with_loads(self, system: System) -> XPBDWorkspace:
         """The workspace for a system that differs only by its loads on vertices and its soft targets."""
@@ -144,12 +141,7 @@ class XPBDWorkspace:
 
     def substep(self, time: float, h: float) -> Substep:
         """The arrays of a substep of h [s] that ends at `time` [s]."""
-        return Substep(self.points, self.velocities, self.origins, self.begun, time, h)
-
-    def apply_changes(self, h: float) -> None:
-        """Apply what contacts changed in `world` and `world_previous`."""
-        places = self.origins, self.previous, self.world, self.world_previous
-        apply_changes(self.points, self.velocities, h, *places, self.works.impulses)
+        return Substep(self.points, self.velocities, self.origins, self.previous, time, h)
 
     def present(self) -> State:
         """The state after the latest substep, in the numbering of the scene, without what later frames must know."""

@@ -73,7 +73,7 @@ def test_a_block_moves_with_a_turntable():
     turn = sp.Keyframes([0, 1], angles=[0, 0.5], axis=(0, 1, 0))
     table = sp.obstacles.Box(center=(0, -0.1, 0), size=(2, 0.2, 2), friction=0.8, motion=turn)
     moved = centers(sp.Scene([block((0.5, 0.05, 0))], [table]), 60)[-1, 0]
-    assert moved == pytest.approx([0.5 * np.cos(0.5), 0.05, -0.5 * np.sin(0.5)], abs=5e-3)
+    assert moved[[0, 2]] == pytest.approx([0.5 * np.cos(0.5), -0.5 * np.sin(0.5)], abs=5e-3)
 
 
 @pytest.mark.parametrize(("mu", "sticks"), [(0.6, True), (0.2, False)])

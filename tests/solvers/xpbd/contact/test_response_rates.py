@@ -5,7 +5,7 @@ import pytest
 
 import supple as sp
 from supple.model.system import build_system
-from supple.solvers.xpbd.contact.response_rates import kept_share, response_rates
+from supple.solvers.xpbd.contact.response_rates import response_rates
 
 
 def test_rates_are_those_of_a_vertex_between_fixed_neighbours():
@@ -18,4 +18,3 @@ def test_rates_are_those_of_a_vertex_between_fixed_neighbours():
     assert rates[1:] == pytest.approx(modulus / (1000 / 4) / np.array([0.1, 0.2, 0.3]) ** 2)
     rigid = sp.EdgesAndVolume(edge_compliance=0.0, volume_compliance=0.0)
     assert np.isinf(response_rates(build_system(sp.Scene([sp.Body("tet", mesh, rigid)])))).all()
-    assert (kept_share(0.0), kept_share(1.0), kept_share(np.inf)) == (1.0, 0.5, 0.0)

@@ -70,6 +70,6 @@ def import_kernels() -> None:
             with suppress(ImportError):  # of an extra that is not installed
                 import_module(module.name)
     from supple.scene.obstacles.half_space import plane_contact
-    from supple.solvers.xpbd.contact.shape_kernels import kernels_of
+    from supple.solvers.xpbd.contact.shapes import kernel_of
 
-    kernels_of(plane_contact)
+    kernel_of(plane_contact)

@@ -14,9 +14,8 @@ from supple.numerics.adjacency import Adjacency, adjacency
 from supple.numerics.geometry.box_tree import boxes_of_labels, boxes_of_triangles, near_boxes, overlap
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.runtime.kernel_cache import njit
-from supple.scene.contact_pairs import pair_table
 from supple.scene.stitches.masks import stitched_crossings
-from supple.solvers.xpbd.contact.settings import XPBDContact
+from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
 
 # Pairs of triangles of two bodies that may meet, because stitches or welds join the bodies there.
 #
@@ -216,23 +215,3 @@ def _note_near(own, owner, boxes, starts, near, chosen):
             if chosen[t]:
                 break
             chosen[t] = overlap(boxes, near[i], own[t])
-
-
-def colliding_pairs(system: System, settings: XPBDContact | None, joined: bool = False) -> NDArray[np.bool_]:
-    """(p, p) which things must stay apart: bodies, then obstacles, without those that are stitched or welded.
-
-    joined : with bodies that are stitched or welded to each other
-    """
-    bodies = len(system.bodies)
-    collide = pair_table(system.scene).collide.copy()
-    if settings is None or not settings.body_collision:
-        collide[:bodies, :bodies] &= np.eye(bodies, dtype=np.bool_)
-    if settings is None or not settings.self_collision:
-        collide[np.arange(bodies), np.arange(bodies)] = False
-    names = [part.name for part in system.bodies] + [str(obstacle.name) for obstacle in system.obstacles]
-    joints = [(stitch.first, stitch.second) for stitch in system.scene.stitches]
-    for first, second in [*joints, *((weld.body, weld.rigid) for weld in system.scene.welds)]:
-        a, b = names.index(first), names.index(second)
-        if not joined or max(a, b) >= bodies:
-            collide[a, b] = collide[b, a] = False
-    return collide

@@ -15,68 +15,11 @@ from numpy.typing import NDArray
 
 from supple.model.energy_balance import add_works, no_works
 from supple.model.system import System
-from supple.numerics.geometry.embedded_points import EmbeddedPoints
-from supple.numerics.mat3 import dot, row
 from supple.runtime.kernel_cache import njit
 from supple.scene.stitches.measures import stitch_energy
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
 from supple.solvers.xpbd.assessment.moment import Substep
-from supple.solvers.xpbd.contact.frame_forces import FrameForces
-
-
-def contact_works(forces: FrameForces, points: EmbeddedPoints, x: np.ndarray, begun: np.ndarray) -> dict[str, float]:
-    """Those of the forces of the latest substep along normals, `contact`, and along surfaces, `friction` [J].
-
-    points : of the system; x, begun : (n, >= 3) its vertices when the substep ends and began [m]
-    """
-    works = np.zeros(2)
-    moved = (points.start, points.vertices, points.weights, x, begun)
-    rows, loads = forces.latest
-    owners = forces.owners
-    if rows is not None:
-        _add_rows(owners.rows, rows.vertices, rows.weights, rows.normals, rows.forces, moved, works)
-    if loads is not None:
-        pushes = owners.masses[loads.vertices, None] * loads.loads
-        _add_vertices(owners.tested[loads.vertices], loads.places, pushes, moved, works)
-    return {"contact": float(works[0]), "friction": float(works[1])}
-
-
-@njit
-def _displacement(i, moved):
-    """That of point i."""
-    start, vertices, weights, x, begun = moved
-    a = b = c = 0.0
-    for k in range(start[i], start[i + 1]):
-        v, w = vertices[k], weights[k]
-        a, b, c = a + w * (x[v, 0] - begun[v, 0]), b + w * (x[v, 1] - begun[v, 1]), c + w * (x[v, 2] - begun[v, 2])
-    return (a, b, c)
-
-
-@njit(cache=True)
-def _add_rows(owners, vertices, weights, normals, forces, moved, works):
-    """Add the works of forces (k, 3) on points (k, 4) of surfaces, of which the first have owners."""
-    for k in range(len(forces)):
-        x = y = z = 0.0
-        for slot in range(4):
-            if vertices[k, slot] < len(owners):
-                d, c = _displacement(owners[vertices[k, slot]], moved), weights[k, slot]
-                x, y, z = x + c * d[0], y + c * d[1], z + c * d[2]
-        _add(row(forces, k), row(normals, k), (x, y, z), works)
-
-
-@njit(cache=True)
-def _add_vertices(points, places, forces, moved, works):
-    """Add the works of forces (k, 3) on points (k,), with normals in the first columns of `places`."""
-    for k in range(len(points)):
-        _add(row(forces, k), row(places, k), _displacement(points[k], moved), works)
-
-
-@njit
-def _add(force, normal, way, works):
-    along = dot(force, normal) * dot(normal, way)
-    works[0] += along
-    works[1] += dot(force, way) - along
-
+from supple.solvers.xpbd.contact.contact import Contact
 
 Floats = NDArray[np.float64]
 Forces = tuple[str, NDArray[np.integer] | slice, Floats]
@@ -89,14 +32,12 @@ class Works:
     ----------
     by_name : so far in the frame [J]; residual : see `Report.energy_residual`
     at_pins : elastic energy of the tets at pins that move, or None
-    impulses : (n, 3) changes of velocities by contact in the present substep [m/s]
     """
 
     def __init__(self, system: System) -> None:
         self.system = system
         self.by_name = no_works(system)
         self.residual = 0.0
-        self.impulses = np.zeros((len(system.masses), 3))
         held = np.zeros(len(system.masses), dtype=np.bool_)
         for pin in system.pins:
             if pin.motion is not None:
@@ -119,7 +60,6 @@ class Works:
 
     def begin_substep(self, extended: Floats) -> None:
         """Begin a substep, before anchors of stitches move; extended : (n + a, 4)."""
-        self.impulses[:] = 0.0
         if self._anchors:
             self._anchored[:] = extended[-self._anchors :, :3]
 
@@ -127,7 +67,7 @@ class Works:
         self,
         at: Substep,
         forces: Iterable[Forces],
-        contact: FrameForces,
+        contact: Contact,
         extended: Floats,
         of_actuators: Callable[[Substep], Floats],
     ) -> None:
@@ -136,7 +76,7 @@ class Works:
         Parameters
         ----------
         forces : of all but contact and actuators: the name of their work, their vertices, and (k, 3) [N]
-        contact : whose last entries are those of this substep; extended : (n + a, 4) with the anchors
+        contact : of the substep; extended : (n + a, 4) with the anchors
         of_actuators : gives their forces (n, 3) [N]
         """
         if self.at_pins is not None:
@@ -146,13 +86,13 @@ class Works:
             add_works(self.by_name, {name: _work(acting, numbers, at.points, at.begun)})
             if self.at_pins is not None:
                 self._on_pins[rows] += acting
-        if any(part is not None for part in contact.latest):
-            works = contact_works(contact, self.system.points, at.points, at.begun)
+        if len(contact.forces.latest.keys):
+            works = contact.forces.works(self.system.points, at.points, at.begun)
             add_works(self.by_name, works)
             if self.at_pins is not None:
-                self._on_pins += sum(contact.on_vertices(self.system.points, len(at.points)))
+                self._on_pins += contact.forces.on_vertices(self.system.points, len(at.points))
             self.residual -= sum(works.values())
-        self.residual += _work_of_impulses(at.points, self.system.masses, self.impulses, at.begun, at.h)
+        self.residual += _work_of_impulses(at.points, self.system.masses, contact.nodes.impulses, at.begun, at.h)
         if self.at_pins is not None:
             self._on_pins += of_actuators(at)
             self._add_pins(self.at_pins, at, extended[len(at.points) :, :3])

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.runtime.kernel_cache import njit
 
 
 def response_rates(system: System) -> NDArray[np.float64]:
@@ -32,21 +31,3 @@ def response_rates(system: System) -> NDArray[np.float64]:
     each = (stiffness * system.rest_volumes)[:, None] * np.einsum("tnj,tnj->tn", b, b)
     sums = np.bincount(system.tets.ravel(), weights=each.ravel(), minlength=len(system.masses))
     return np.where(system.inverse_masses > 0.0, sums, 0.0) * system.inverse_masses
-
-
-@njit
-def kept_share(kappa):
-    """The part of a contact's force with which the next substep begins."""
-    return 1.0 / (1.0 + kappa)
-
-
-@njit(cache=True)
-def keep_shares(forces, shares):
-    """Multiply forces (k, 3) with their shares (k,); returns whether any is left."""
-    left = False
-    for e in range(len(forces)):
-        for j in range(3):
-            if forces[e, j] != 0.0:
-                forces[e, j] *= shares[e]
-                left = left or forces[e, j] != 0.0
-    return left

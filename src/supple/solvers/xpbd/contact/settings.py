@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from supple.errors import SolverError
 from supple.kinds.forms import POSITIVE, Flag
 from supple.kinds.kind import Kind
+from supple.model.system import System
+from supple.scene.contact_pairs import pair_table
 
 
 @dataclass(frozen=True)
@@ -16,8 +21,8 @@ class XPBDContact(Kind):
 
     Parameters
     ----------
-    thickness : gap that is kept between surfaces of bodies, and between bodies and triangle obstacles [m]. None: a
-        twentieth of the mean edge length of the surfaces of all bodies.
+    thickness : gap that is kept between surfaces of bodies, and between bodies and triangle obstacles [m]; a tenth of
+        it from obstacles with a formula. None: a twentieth of the mean edge length of the surfaces of all bodies.
     body_collision : whether bodies collide with each other.
     self_collision : whether a body collides with itself.
 
@@ -33,3 +38,23 @@ class XPBDContact(Kind):
     thickness: Annotated[float | None, POSITIVE] = None
     body_collision: Annotated[bool, Flag()] = True
     self_collision: Annotated[bool, Flag()] = True
+
+
+def colliding_pairs(system: System, settings: XPBDContact | None, joined: bool = False) -> NDArray[np.bool_]:
+    """(p, p) which things must stay apart: bodies, then obstacles, without those that are stitched or welded.
+
+    joined : with bodies that are stitched or welded to each other
+    """
+    bodies = len(system.bodies)
+    collide = pair_table(system.scene).collide.copy()
+    if settings is None or not settings.body_collision:
+        collide[:bodies, :bodies] &= np.eye(bodies, dtype=np.bool_)
+    if settings is None or not settings.self_collision:
+        collide[np.arange(bodies), np.arange(bodies)] = False
+    names = [part.name for part in system.bodies] + [str(obstacle.name) for obstacle in system.obstacles]
+    joints = [(stitch.first, stitch.second) for stitch in system.scene.stitches]
+    for first, second in [*joints, *((weld.body, weld.rigid) for weld in system.scene.welds)]:
+        a, b = names.index(first), names.index(second)
+        if not joined or max(a, b) >= bodies:
+            collide[a, b] = collide[b, a] = False
+    return collide

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from supple.model.state import State, Status, StepReport
-from supple.solvers.xpbd.assessment.findings import Findings
+from supple.solvers.xpbd.assessment.findings import HELD_TOLERANCE, Findings
 from supple.solvers.xpbd.assessment.softening import enough
 from supple.solvers.xpbd.assessment.surfaces import Overlap, crossings
 from supple.solvers.xpbd.details import XPBDDetails
@@ -25,7 +25,6 @@ def end_frame(
     ws: XPBDWorkspace,
     time: float,
     dt: float,
-    held_back: int,
     used: Substeps,
     repeats: int,
     before: XPBDMemory,
@@ -38,14 +37,15 @@ def end_frame(
 
     Parameters
     ----------
-    time : at the end [s]; held_back : in how many substeps the motion of a body was shortened
+    time : at the end [s]
     used : substeps of the frame; repeats : how often it was repeated; before : of the frame before
     overlaps, sleep : as the frame began with them; accuracy : how much stiffness a body may lack
     setting : the solver's parameter that more substeps need
     """
     h = dt / used.count
     to_world(ws.points, ws.origins, ws.world)
-    ws.guard.measure(ws.points)
+    ws.world[ws.system.pinned_vertices] = ws.system.pin_targets(time)
+    held_back = ws.contact.counts.cut
     ws.works.end_frame(ws.velocities, ws.actuators.works())
     held, works = held_back / used.count, ws.works.by_name
     softening = ws.assessment.softening
@@ -53,7 +53,7 @@ def end_frame(
     measured = softening.after(softening.own(before.measured), delivered, h, sleep.asleep)
     shares = softening.by_body(h, measured)
     findings, ledger = ws.assessment.end(
-        ws.moment(time), ws.world, ws.guard.J, h, accuracy, held, sleep.asleep, works, measured
+        ws.moment(time), ws.world, ws.contact.tets.now, h, accuracy, held, sleep.asleep, works, measured
     )
     joints = {"apart": ws.joints.apart(ws.world, time, accuracy), "stalled": ws.joints.stalled(accuracy)}
     findings = replace(findings, **joints)
@@ -61,17 +61,17 @@ def end_frame(
     problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
     if crossings(findings.overlaps) > crossings(overlaps):
         problem = Status.INTERSECTING
-    elif problem is None and held_back:
+    elif problem is None and held > HELD_TOLERANCE:
         problem = Status.INVERTED
     elif problem is None and (findings.softened or findings.apart):
         problem = Status.SOFTENED
-    forces, old_points = ws.collisions.forces, ws.layout.old_points
+    forces, old_points = ws.contact.forces, ws.layout.old_points
     x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
-    sound = status in (Status.CONVERGED, Status.SOFTENED) and not held_back
+    sound = status in (Status.CONVERGED, Status.SOFTENED) and held <= HELD_TOLERANCE
     rest = ws.sleep.end(x, v, time, sleep, forces, sound)
     damping = damping_in(ws, h)
     memory = XPBDMemory(
-        contact=ws.collisions.memory(ws.world),
+        contact=ws.contact.memory(x),
         viscous=None if damping is None else damping.memory(v),
         ledger=ledger,
         measured=measured,
@@ -81,8 +81,8 @@ def end_frame(
     )
     pushes, friction = forces.by_name()
     details = XPBDDetails(
-        contacts=ws.collisions.contacts + sum(len(part[0]) for part in forces.standing),
-        smallest_gap=ws.collisions.smallest_gap,
+        contacts=len(forces.latest.keys) + len(forces.standing.keys),
+        smallest_gap=ws.contact.smallest_gap,
         substeps=used.count,
         repeats=repeats,
         substeps_reason=used.reason,
@@ -98,14 +98,14 @@ def end_frame(
         work=works,
         energy_residual=ws.works.residual,
     )
-    world, surfaces = ws.collisions.obstacles.places(ws.world).copy(), ws.collisions.positions
+    places = ws.contact.places()
     message = findings.message(time, _remedy(findings, used.count, shares, accuracy, setting))
     report = StepReport(
         status,
         used.count,
         message,
         details=details,
-        contacts=lambda: forces.points(world, surfaces, old_points),
+        contacts=lambda: forces.contact_points(places, old_points),
     )
     return State(time, x, v, memory=memory, hinge_angles=ws.joints.hinge_angles()), report, problem
 

@@ -1,0 +1,174 @@
+"""Nodes on rigid bodies: what an impulse at a node moves, and where nodes are.
+
+A rigid body answers to an impulse f at the arm r about its center, both of the beginning of the substep, with the
+displacement f / M of its center and the small rotation I^-1 (r x f). During the sweeps over rows these are collected in
+its twist (u, th), and a node of it is at x + u + th x r. At the end the momenta of its control points take the twist
+over, and they determine its place (`RigidBodies.advance`). Joints act on the same twists.
+
+Source: Müller, Macklin, Chentanez, Jeschke, Kim, "Detailed Rigid Body Simulation with Extended Position Based Dynamics"
+(2020), section 3.3.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.adjacency import Adjacency
+from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.rigid.motion import center_of, inertia_of, solve_symmetric
+
+
+class Bodies(NamedTuple):
+    """The rigid bodies that nodes are on, as kernels take them.
+
+    Attributes
+    ----------
+    body : (N,) the rigid body of each node, or -1
+    arms : (N, 3) from its center at x_n [m]; bends : (N,) how far the way of a node is from a straight one [m]
+    w : (b,) inverse masses [1/kg]; J : (b, 3, 3) inverse inertia at x_n [1/(kg m^2)]; zero where a body is held
+    twists : (b, 6) u [m], th
+    """
+
+    body: NDArray[np.int32]
+    arms: NDArray[np.float64]
+    bends: NDArray[np.float64]
+    w: NDArray[np.float64]
+    J: NDArray[np.float64]
+    twists: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, body: NDArray[np.int32], count: int) -> Bodies:
+        """Of nodes (N,) on `count` bodies."""
+        n, zeros = len(body), np.zeros
+        return cls(body, zeros((n, 3)), zeros(n), zeros(count), zeros((count, 3, 3)), zeros((count, 6)))
+
+
+class Movers(NamedTuple):
+    """What nodes on rigid bodies need: the bodies, and the nodes of each of them."""
+
+    bodies: Bodies
+    nodes: Adjacency
+
+
+@njit(inline="always")
+def place(x, bodies, i):
+    """Where node i is, with the twist of its body; x (N, >= 3) without it [m]."""
+    p = row(x, i)
+    b = bodies.body[i]
+    if b < 0:
+        return p
+    t, r = bodies.twists, row(bodies.arms, i)
+    return (
+        p[0] + t[b, 0] + (t[b, 4] * r[2] - t[b, 5] * r[1]),
+        p[1] + t[b, 1] + (t[b, 5] * r[0] - t[b, 3] * r[2]),
+        p[2] + t[b, 2] + (t[b, 3] * r[1] - t[b, 4] * r[0]),
+    )
+
+
+@njit
+def has_body(bodies, nodes, e):
+    """Whether one of the four nodes of row e is on a rigid body."""
+    return (
+        max(
+            max(bodies.body[nodes[e, 0]], bodies.body[nodes[e, 1]]),
+            max(bodies.body[nodes[e, 2]], bodies.body[nodes[e, 3]]),
+        )
+        >= 0
+    )
+
+
+@njit
+def turn_body(bodies, b, moment):
+    """Rotate body b by an angular impulse [kg m^2]."""
+    J = bodies.J
+    for j in range(3):
+        bodies.twists[b, 3 + j] += J[b, j, 0] * moment[0] + J[b, j, 1] * moment[1] + J[b, j, 2] * moment[2]
+
+
+@njit
+def push_node(points, bodies, i, f):
+    """Move node i (N, 4), or its body, by an impulse [kg m]."""
+    b = bodies.body[i]
+    if b < 0:
+        for j in range(3):
+            points[i, j] += points[i, 3] * f[j]
+    elif bodies.w[b] > 0.0:
+        for j in range(3):
+            bodies.twists[b, j] += bodies.w[b] * f[j]
+        turn_body(bodies, b, cross(row(bodies.arms, i), f))
+
+
+@njit
+def softness(points, bodies, nodes, e, c, n):
+    """How far n . r of row e changes by a unit of impulse along n, with the weights c [1/kg]."""
+    total = 0.0
+    for i in range(4):
+        v = nodes[e, i]
+        b = bodies.body[v]
+        if b < 0:
+            total += points[v, 3] * c[i] * c[i]
+            continue
+        first, share, arm = True, 0.0, (0.0, 0.0, 0.0)
+        for j in range(4):
+            u = nodes[e, j]
+            if bodies.body[u] == b:
+                first = first and j >= i
+                share += c[j]
+                r = row(bodies.arms, u)
+                arm = (arm[0] + c[j] * r[0], arm[1] + c[j] * r[1], arm[2] + c[j] * r[2])
+        if first:
+            m, J = cross(arm, n), bodies.J
+            turned = (
+                J[b, 0, 0] * m[0] + J[b, 0, 1] * m[1] + J[b, 0, 2] * m[2],
+                J[b, 1, 0] * m[0] + J[b, 1, 1] * m[1] + J[b, 1, 2] * m[2],
+                J[b, 2, 0] * m[0] + J[b, 2, 1] * m[1] + J[b, 2, 2] * m[2],
+            )
+            total += bodies.w[b] * share * share + dot(m, turned)
+    return total
+
+
+@njit(cache=True)
+def describe(x, control, masses, free, bodies):
+    """Set what bodies have where the substep begins: x (N, >= 3) x_n, control (b, 4) nodes, free (b,)."""
+    for b in range(len(control)):
+        S = inertia_of(x, control, b)[1]
+        bodies.w[b] = 1.0 / masses[b] if free[b] else 0.0
+        f = 4.0 / masses[b] if free[b] else 0.0
+        for j in range(3):
+            column = solve_symmetric(S, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)))
+            for k in range(3):
+                bodies.J[b, k, j] = f * column[k]
+    bodies.twists[:] = 0.0
+    for i in range(len(bodies.body)):
+        b = bodies.body[i]
+        if b >= 0:
+            r = subtract(row(x, i), center_of(x, control, b))
+            for j in range(3):
+                bodies.arms[i, j] = r[j]
+
+
+@njit(cache=True)
+def take_twists(velocities, control, bodies, h):
+    """Change the velocities (N, 3) of control points by the twists of a substep of h [s]; twists are zero then."""
+    for b in range(len(control)):
+        u, th = row(bodies.twists, b), (bodies.twists[b, 3], bodies.twists[b, 4], bodies.twists[b, 5])
+        for i in control[b]:
+            turned = cross(th, row(bodies.arms, i))
+            for j in range(3):
+                velocities[i, j] += (u[j] + turned[j]) / h
+    bodies.twists[:] = 0.0
+
+
+@njit(cache=True)
+def place_nodes(x, first, control, weights):
+    """Put the nodes from `first` on where their control points (k, 4) of x (N, >= 3) and weights (k, 4) say."""
+    for k in range(len(control)):
+        for j in range(3):
+            value = 0.0
+            for i in range(4):
+                value += weights[k, i] * x[control[k, i], j]
+            x[first + k, j] = value

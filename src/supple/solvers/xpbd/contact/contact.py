@@ -1,0 +1,313 @@
+"""Contact in the substeps of a frame: rows at x_n, their solution, and the guarantee."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.mesh.obstacles import ObstaclePoses
+from supple.model.system import System
+from supple.numerics.mat3 import dot, row, subtract
+from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.contact import admit as guarantee
+from supple.solvers.xpbd.contact import tets as volumes
+from supple.solvers.xpbd.contact.admit import Marks
+from supple.solvers.xpbd.contact.cuts import Cuts, keep_spin, share_motion
+from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows, loaded_rows
+from supple.solvers.xpbd.contact.memory import ContactMemory
+from supple.solvers.xpbd.contact.nodes import Nodes
+from supple.solvers.xpbd.contact.response_rates import response_rates
+from supple.solvers.xpbd.contact.rows import NIL, Rows, detect, is_last_shape, no_walls
+from supple.solvers.xpbd.contact.search.lists import Lists
+from supple.solvers.xpbd.contact.search.overlaps import find_overlaps
+from supple.solvers.xpbd.contact.search.surface import row_surface
+from supple.solvers.xpbd.contact.settings import XPBDContact
+from supple.solvers.xpbd.contact.shapes import RowShapes, Walls
+from supple.solvers.xpbd.contact.solve import keep_impulses, push_kept, solve
+from supple.solvers.xpbd.contact.tets import Tets
+from supple.solvers.xpbd.rigid.bodies import RigidBodies
+
+# Of the mean edge: the gap between surfaces; of the gap: how far nodes may go beyond what was expected when rows
+# were found.
+GAP, SLACK = 0.05, 0.25
+# Of the mean edge: how much of a lack of gap is taken back in a frame.
+RECOVERED = 0.05
+# Of the gap: what the last sweep over the rows may change; the most sweeps.
+RESIDUAL, MOST_SWEEPS = 0.02, 4
+# The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps.
+RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.001, 60
+
+
+@dataclass
+class RowCounts:
+    """What happened in the substeps of a frame: see `XPBDDetails`; `crushed` substeps in which nothing could help."""
+
+    rows: int = 0
+    sweeps: int = 0
+    residual: float = 0.0
+    pairs_cut: int = 0
+    inside_cut: int = 0
+    cut: int = 0
+    crushed: int = 0
+    late: int = 0
+    smallest: float = math.inf
+
+
+class Contact:
+    """The contact of a system in the solver's numbering.
+
+    Attributes
+    ----------
+    nodes : what moves; tets : of the system
+    forces : of the substeps since the frame began; counts : in these
+    edge_length : mean surface edge [m]; gap : that surfaces keep [m]
+    """
+
+    def __init__(
+        self, system: System, rigid: RigidBodies, inverse_masses: NDArray[np.float64], settings: XPBDContact | None
+    ) -> None:
+        n = len(system.masses)
+        self.edge_length = mean_edge_length(system)
+        self._rigid, self._gravity = rigid, system.gravity
+        thickness = settings.thickness if settings is not None else None
+        self.gap = GAP * self.edge_length if thickness is None else thickness
+        lengths = self.edge_length, self.gap
+        self._surface = surface = row_surface(system, rigid, len(inverse_masses) - n, settings, lengths)
+        count, poses = surface.count, ObstaclePoses(system.obstacles)
+        self.nodes = Nodes(surface, rigid, poses, inverse_masses)
+        self._shapes = RowShapes(system, poses)
+        self._lists = Lists(system, surface, self._shapes, self.gap)
+        self.tets = Tets.of(system, count)
+        self._rows = Rows.room(1024)
+        self._chosen = np.zeros(0, dtype=np.bool_)
+        self._rates = np.zeros(count)
+        # Of what has no elastic energy, nothing is kept; a finite number, as infinity times zero is not one.
+        self._rates[:n] = np.minimum(response_rates(system), 1e100)
+        changed = np.zeros(count, np.int64), np.zeros(8 * count, np.int64)
+        self._marks = Marks(*changed, np.zeros(0, np.bool_), np.zeros(1))
+        self._cuts = Cuts.room(0)
+        self._expected, self._far = np.zeros((count, 3)), np.zeros(count, dtype=np.bool_)
+        self._everyone = np.zeros(0, dtype=np.bool_)
+        self._before = np.zeros((count, 3))
+        labels = system.joined_components
+        free = np.ones(int(labels.max()) + 1, dtype=np.bool_)
+        free[labels[system.inverse_masses == 0.0]] = free[labels[system.stitching.anchored_vertices()]] = False
+        masses = np.where(rigid.welded_to >= 0, 0.0, system.masses)
+        self._spins = masses, labels, free, np.zeros((len(free), 13))
+        self._h = self._dt = 0.0
+        self._frames = self._shapes.frames(0.0, np.zeros(3)), self._shapes.frames(0.0, np.zeros(3))
+        self._walls: Walls = no_walls()
+        self._names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
+        self.counts = RowCounts()
+        self.forces = FrameForces(self._names, surface.points)
+
+    def __bool__(self) -> bool:
+        """Whether any contact is possible."""
+        return bool(self._lists)
+
+    @property
+    def rigid_points(self) -> int:
+        """Number of points of rigid bodies' surfaces."""
+        return len(self._surface.embedded[0]) if self else 0
+
+    @property
+    def smallest_gap(self) -> float | None:
+        """See `XPBDDetails`."""
+        return self.counts.smallest if math.isfinite(self.counts.smallest) else None
+
+    def begin_frame(
+        self,
+        times: tuple[float, float, float],
+        origin: NDArray[np.float64],
+        memory: ContactMemory | None,
+        crossing: list[tuple[int, int]],
+        asleep: NDArray[np.bool_],
+    ) -> None:
+        """Begin a frame.
+
+        Parameters
+        ----------
+        times : its begin, its length, and that of its substeps [s]
+        origin : (3,) of the places of nodes [m]; memory : of the frame before
+        crossing : pairs of bodies and obstacles (counted after the bodies) whose surfaces cross
+        asleep : (b,) bodies that do not move
+        """
+        time, self._dt, self._h = times
+        self.counts, self.forces = RowCounts(), FrameForces(self._names, self._surface.points)
+        self.nodes.begin_frame(time, origin)
+        self._frames = self._frames[0], self._shapes.frames(time, origin)
+        volumes.measure(self.nodes.x, self.tets, False, 1.0)
+        still = np.ones(len(self._names), dtype=np.bool_)
+        still[: len(asleep)] = asleep
+        overlaps = find_overlaps(self._surface.simplices, self._surface.closed, self.nodes.x, crossing)
+        self._lists.begin_frame(memory, self._dt, self._h, still, overlaps)
+
+    def guard(self, sound: NDArray[np.bool_]) -> None:
+        """Begin a substep whose tets must keep a share of the volume they have, where they are `sound` (m,)."""
+        self.tets.J[:] = np.where(sound, self.tets.now, -1.0)
+
+    def memory(self, x: NDArray[np.float64]) -> ContactMemory | None:
+        """What the next frame begins with; x (n, 3) are the positions of the state [m]."""
+        return self._lists.memory(x, self._h) if self else None
+
+    def places(self) -> NDArray[np.float64]:
+        """(N, 3) of the nodes in the world [m]; a copy."""
+        return self.nodes.x[:, :3] + self.nodes.origin
+
+    def begin(self, time: float) -> None:
+        """Begin the substep that ends at `time` [s]: valid lists, and the impulses that were kept."""
+        lists, nodes, h = self._lists, self.nodes, self._h
+        nodes.begin_substep(time, h)
+        if not self:
+            return
+        self._frames = self._frames[1], self._shapes.frames(time, nodes.origin)
+        lists.renew(nodes.begin, nodes.v, h, self._frames[0])
+        self._measure_walls()
+        self._before[:] = nodes.v
+        push_kept(nodes.at_begin(), nodes.bodies, nodes.v, lists.near, lists.pairs, self._walls, self.gap, h)
+        nodes.take_twists(h)
+        nodes.impulses += (nodes.v - self._before)[: len(nodes.impulses)]
+
+    def _measure_walls(self) -> None:
+        pairs = self._lists.pairs
+        mine = is_last_shape(pairs, self._lists.near)
+        nodes, shapes = pairs.nodes[mine, 0], pairs.shapes[mine]
+        self._walls = self._shapes.walls(self.nodes.begin, nodes, shapes, *self._frames)
+
+    def detect(self) -> int:
+        """Find the rows of the substep; returns their number."""
+        if not self:
+            return 0
+        self.nodes.bend(self._h)
+        self._expected[:] = self.nodes.x[:, :3]
+        if len(self._chosen) != len(self._lists.pairs.keys):
+            self._chosen = np.zeros(len(self._lists.pairs.keys), dtype=np.bool_)
+        self._chosen[:] = False
+        rows = self._detect(0, (1.0 + 2.0 * SLACK) * self.gap, self._everyone)
+        self.counts.smallest = min(self.counts.smallest, float(self._rows.distances[:rows].min(initial=math.inf)))
+        return rows
+
+    def _detect(self, first: int, reach: float, moved: NDArray[np.bool_]) -> int:
+        lists, nodes = self._lists, self.nodes
+        self._make_room(first + len(lists.near))
+        whole = nodes.begin, nodes.x, nodes.bodies, self._surface.simplices.first
+        listed = lists.near, lists.pairs, self._walls
+        return detect(*whole, *listed, reach, NIL * self.gap, self._chosen, moved, first, self._rows)
+
+    def _make_room(self, count: int) -> None:
+        if count > len(self._rows.pairs):
+            rows = Rows.room(count + count // 2)
+            for new, old in zip(rows, self._rows, strict=True):
+                new[: len(old)] = old
+            self._rows = rows
+        most = len(self._rows.pairs)
+        if len(self._marks.planes) < most:
+            self._marks = self._marks._replace(planes=np.zeros(most, dtype=np.bool_))
+        if len(self._cuts.shares) < most + len(self.tets.J):
+            self._cuts = Cuts.room(most + len(self.tets.J))
+
+    def solve(self, rows: int, most: int | None = None) -> bool:
+        """Solve the rows with at most so many sweeps; returns whether that was enough."""
+        if not rows:
+            return True
+        tolerance, rigid, nodes = RESIDUAL * self.gap, self._rigid, self.nodes
+        if len(rigid):
+            fall = math.hypot(*self._gravity) * self._h**2
+            tolerance = min(tolerance, RIGID_RESIDUAL * fall) if fall > 0.0 else tolerance
+        most = most or (MOST_RIGID_SWEEPS if len(rigid) else MOST_SWEEPS)
+        n = len(nodes.impulses)
+        x, v = nodes.x[:n, :3].copy(), nodes.v[rigid.control]
+        sweeps, residual = solve(nodes.x, nodes.bodies, nodes.begin, self._rows, rows, tolerance, most)
+        changes = (nodes.x[:n, :3] - x) / self._h
+        nodes.v[:n] += changes
+        nodes.impulses += changes
+        nodes.move_bodies(self._h)
+        nodes.impulses[rigid.control] += nodes.v[rigid.control] - v
+        self.counts.sweeps += sweeps
+        self.counts.residual = max(self.counts.residual, residual)
+        return residual <= tolerance
+
+    def keep(self, rows: int) -> None:
+        """Note the forces, and keep the impulses with which the next substep begins."""
+        lists, r, h = self._lists, self._rows, self._h
+        self.counts.rows = rows
+        if not self:
+            return
+        owners = self._surface.simplices.owner, self._shapes.owners
+        self.forces.end_substep(LoadedRows(*loaded_rows(r, rows, lists.pairs, *owners, self.nodes.origin, h)))
+        keep_impulses(r, rows, self._before, h, self._rates, lists.near, lists.pairs)
+
+    def cut_inside(self, base: NDArray[np.float64], low: int, keep: float) -> int:
+        """Shorten motions from `base` (N, 3) of the nodes of the first `low` tets; see `admit`."""
+        self._make_room(0)
+        room = self._rows, 0, self.tets, low, 0, keep, 0.0, self._marks, self._cuts
+        cut, _ = guarantee.admit(base, self.nodes.x, self.nodes.movers, *room)
+        self.counts.inside_cut += cut
+        return volumes.measure(self.nodes.x, self.tets, False, guarantee.KEEP_J)
+
+    def admit(self, rows: int, low: int) -> None:
+        """Widen gaps and put nodes back onto walls, then shorten motions until the guarantee holds.
+
+        low : number of tets that have lost too much, as listed
+        """
+        nodes, h, moved = self.nodes, self._h, 0
+        self._marks.longest[0] = 0.0
+        if self:
+            loose = np.where(self._rigid.joined, 0.0, nodes.bodies.w)
+            recovered = RECOVERED * self.edge_length * h / self._dt
+            moved = guarantee.widen(nodes.x, nodes.movers, loose, self._rows, rows, recovered, self._marks)
+            # Pairs that were left out are asked again where something went farther than was expected.
+            if _farther(nodes.x, self._expected, SLACK * self.gap, self._far):
+                rows = self._detect(rows, 0.0, self._far)
+        else:
+            self._make_room(0)
+        v = nodes.v[: len(nodes.impulses)].copy()
+        cut = self._cut(rows, low, moved)
+        if self and not self._lists.cover(nodes.begin, nodes.x, h, self._frames[0]):
+            # A node has left what the lists expect of it: lists of this very motion, and again.
+            self.counts.late += 1
+            self._chosen = np.zeros(len(self._lists.pairs.keys), dtype=np.bool_)
+            self._measure_walls()
+            cut += self._cut(self._detect(0, 0.0, self._everyone), 0, 0)
+        if cut or moved:
+            keep_spin(nodes.begin, nodes.x, nodes.v[: len(v)], h, *self._spins)
+            nodes.impulses += nodes.v[: len(v)] - v
+        # What is cut less than rows leave over is not held back.
+        self.counts.cut += math.sqrt(self._marks.longest[0]) > RESIDUAL * self.gap
+
+    def _cut(self, rows: int, low: int, moved: int) -> int:
+        if not (rows or low or moved):
+            return 0
+        nearest, nodes = guarantee.NEAREST * self.gap, self.nodes
+        room = self._rows, rows, self.tets, low, moved, guarantee.KEEP_J, nearest, self._marks, self._cuts
+        base = nodes.carried()
+        cut, _ = guarantee.admit(base, nodes.x, nodes.movers, *room)
+        if cut:
+            self.counts.pairs_cut += cut
+            nodes.settle()
+            share_motion(nodes.x, nodes.movers, self._rows, nodes.begin, nodes.v, self._cuts, cut)
+            nodes.take_twists(1.0)
+            crossing = guarantee.count_crossing(base, nodes.x, self._rows, rows, nearest)
+            low = volumes.measure(nodes.x, self.tets, False, 0.5 * guarantee.KEEP_J)
+            self.counts.crushed += crossing + low > 0
+        return cut
+
+
+@njit(cache=True)
+def _farther(points, reference, most, far):
+    """Which nodes (N,) are farther than `most` [m] from a reference (N, 3); returns whether there are any."""
+    found = False
+    for i in range(len(reference)):
+        d = subtract(row(points, i), row(reference, i))
+        far[i] = not dot(d, d) <= most * most
+        found = found or far[i]
+    return found
+
+
+def mean_edge_length(system: System) -> float:
+    """Mean edge length of all the bodies' surfaces at rest [m]."""
+    a, b, c = system.rest_points[system.triangles].transpose(1, 0, 2)
+    return float(np.mean([np.linalg.norm(a - b, axis=1), np.linalg.norm(b - c, axis=1), np.linalg.norm(c - a, axis=1)]))

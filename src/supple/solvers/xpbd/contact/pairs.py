@@ -1,0 +1,200 @@
+"""Pairs that may touch: what lists hold between substeps, and the geometry of a pair.
+
+A pair has four nodes with weights c_i, and r = sum c_i x_i - q is the vector from the nearest place of its second side
+to that of its first. It is a point and a triangle, two edges, or a point and a simple shape (a plane or the wall of a
+room): then all four nodes are the point, c = (1, 0, 0, 0), and q is the nearest place of the shape. Otherwise q = 0 and
+the weights add up to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle
+from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit
+
+POINT, EDGES, SHAPE = 0, 1, 2
+
+
+class Pairs(NamedTuple):
+    """k pairs.
+
+    Attributes
+    ----------
+    nodes : (k, 4); kinds : (k,) int8
+    shapes : (k,) of pairs with a shape, its number; of pairs with a triangle, that of the triangle
+    keys : (k,) the parts of the pair as one number, by which impulses are handed on to the next list; of bodies they
+        are the same with other obstacles
+    pushes : (k,) whether the pair pushes; pairs of one body that are near each other at rest are only kept apart
+    deep : (k,) whether the sides were through each other when the frame began; then they are not kept on their sides,
+        but pushed out along the normals of then
+    friction : (k,) its coefficient; gaps : (k,) the distance that is kept [m]
+    normals : (k, 3) as of the latest look; impulses : (k, 3) with which the next substep begins [kg m]
+    """
+
+    nodes: NDArray[np.int32]
+    kinds: NDArray[np.int8]
+    shapes: NDArray[np.int32]
+    keys: NDArray[np.int64]
+    pushes: NDArray[np.bool_]
+    deep: NDArray[np.bool_]
+    friction: NDArray[np.float64]
+    gaps: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    impulses: NDArray[np.float64]
+
+    @classmethod
+    def none(cls) -> Pairs:
+        """No pairs."""
+        zeros = np.zeros
+        return cls(
+            zeros((0, 4), np.int32),
+            zeros(0, np.int8),
+            zeros(0, np.int32),
+            zeros(0, np.int64),
+            zeros(0, np.bool_),
+            zeros(0, np.bool_),
+            zeros(0),
+            zeros(0),
+            zeros((0, 3)),
+            zeros((0, 3)),
+        )
+
+
+@njit
+def weights_of(x, nodes, k, kind):
+    """The weights (4) of a pair of surfaces at places x, and r."""
+    p, q, r, s = row(x, nodes[k, 0]), row(x, nodes[k, 1]), row(x, nodes[k, 2]), row(x, nodes[k, 3])
+    if kind == POINT:
+        u = closest_on_triangle(p, q, r, s)
+        c = (1.0, -u[0], -u[1], -u[2])
+    else:
+        a, b = closest_on_segments(p, q, r, s)
+        c = (1.0 - a, a, b - 1.0, -b)
+    return c, (
+        c[0] * p[0] + c[1] * q[0] + c[2] * r[0] + c[3] * s[0],
+        c[0] * p[1] + c[1] * q[1] + c[2] * r[1] + c[3] * s[1],
+        c[0] * p[2] + c[1] * q[2] + c[2] * r[2] + c[3] * s[2],
+    )
+
+
+@njit
+def facing(x, pairs, k, nil):
+    """The weights (4) of a pair of surfaces, the unit normal from its second side to its first, and the distance.
+
+    Below zero where the sides of a deep pair are on the wrong sides of each other. The normal of a point that touches
+    a triangle is that of the triangle, and edges that touch have none; what is nearer than `nil` [m] touches.
+    """
+    c, r = weights_of(x, pairs.nodes, k, pairs.kinds[k])
+    size = math.sqrt(dot(r, r))
+    old = row(pairs.normals, k)
+    if pairs.deep[k]:
+        if size <= nil:
+            return c, old, 0.0
+        if dot(r, old) < 0.0:
+            return c, (-r[0] / size, -r[1] / size, -r[2] / size), -size
+    elif size <= nil:
+        if pairs.kinds[k] == EDGES:
+            return c, (0.0, 0.0, 0.0), 0.0
+        p = row(x, pairs.nodes[k, 1])
+        m = cross(subtract(row(x, pairs.nodes[k, 2]), p), subtract(row(x, pairs.nodes[k, 3]), p))
+        length = math.sqrt(dot(m, m))
+        return c, (m[0] / length, m[1] / length, m[2] / length), 0.0
+    return c, (r[0] / size, r[1] / size, r[2] / size), size
+
+
+@njit(inline="always")
+def along(x, i, n):
+    """The coordinate of node i along n."""
+    return x[i, 0] * n[0] + x[i, 1] * n[1] + x[i, 2] * n[2]
+
+
+@njit
+def is_loaded(impulses, k):
+    return impulses[k, 0] != 0.0 or impulses[k, 1] != 0.0 or impulses[k, 2] != 0.0
+
+
+@njit(cache=True)
+def describe_pairs(first, points, edges, simplices, far, pairs):
+    """Fill in what pairs of surfaces are, from row `first` on: nodes, kinds, keys, whether they push, friction, gaps.
+
+    points : (k, 2) points and triangles; edges : (l, 2); far : [m] pairs of one body push that are farther at rest
+    """
+    s = simplices
+    for e in range(len(points) + len(edges)):
+        k = first + e
+        if e < len(points):
+            p, t = points[e, 0], points[e, 1]
+            pairs.nodes[k, 0] = s.nodes[p]
+            for j in range(3):
+                pairs.nodes[k, 1 + j] = s.triangles[t, j]
+            pairs.kinds[k], pairs.shapes[k] = POINT, t
+            pairs.keys[k] = np.int64(p) << 31 | t
+        else:
+            a, b = edges[e - len(points), 0], edges[e - len(points), 1]
+            for j in range(2):
+                pairs.nodes[k, j], pairs.nodes[k, 2 + j] = s.edges[a, j], s.edges[b, j]
+            pairs.kinds[k] = EDGES
+            pairs.keys[k] = -1 - (np.int64(a) << 31 | b)
+        one, other = s.owner[pairs.nodes[k, 0]], s.owner[pairs.nodes[k, 3]]
+        pairs.friction[k], pairs.gaps[k] = s.friction[one, other], s.gaps[one, other]
+        pairs.pushes[k] = True
+        if one == other:
+            _, r = weights_of(s.rest, pairs.nodes, k, pairs.kinds[k])
+            pairs.pushes[k] = dot(r, r) > far * far
+
+
+@njit
+def room_between(begin, end, nodes, k, kind, n):
+    """The width of the slab across n that neither side of a pair enters, at the beginning and at the end."""
+    p, q, r, s = nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3]
+    low = min(along(begin, p, n), along(end, p, n))
+    high = max(max(along(begin, r, n), along(end, r, n)), max(along(begin, s, n), along(end, s, n)))
+    one, other = along(begin, q, n), along(end, q, n)
+    if kind == POINT:
+        return low - max(high, max(one, other))
+    return min(low, min(one, other)) - high
+
+
+@njit
+def relative_speed(v, nodes, k, kind):
+    """The largest relative speed of nodes of the two sides of a pair."""
+    p, q, r, s = row(v, nodes[k, 0]), row(v, nodes[k, 1]), row(v, nodes[k, 2]), row(v, nodes[k, 3])
+    if kind == SHAPE:
+        return math.sqrt(dot(p, p))
+    a, b = subtract(p, r), subtract(p, s)
+    most = max(dot(a, a), dot(b, b))
+    if kind == POINT:
+        c = subtract(p, q)
+        return math.sqrt(max(most, dot(c, c)))
+    a, b = subtract(q, r), subtract(q, s)
+    return math.sqrt(max(most, max(dot(a, a), dot(b, b))))
+
+
+@njit(cache=True)
+def near_pairs(x, v, pairs, time, reach, out):
+    """The pairs that may come nearer than `reach` while their nodes go on for a time; all pairs with shapes."""
+    count = 0
+    nodes = pairs.nodes
+    for k in range(len(nodes)):
+        kind = pairs.kinds[k]
+        if kind == SHAPE or pairs.deep[k] or is_loaded(pairs.impulses, k):
+            out[count] = k
+            count += 1
+            continue
+        far = reach + time * relative_speed(v, nodes, k, kind)
+        if room_between(x, x, nodes, k, kind, row(pairs.normals, k)) > far:
+            continue
+        _, r = weights_of(x, nodes, k, kind)
+        size = math.sqrt(dot(r, r))
+        for j in range(3):
+            pairs.normals[k, j] = r[j] / size if size > 0.0 else 0.0
+        if size <= far:
+            out[count] = k
+            count += 1
+    return count

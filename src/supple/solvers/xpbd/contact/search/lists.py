@@ -1,0 +1,300 @@
+"""Lists of the pairs that may touch, valid while nodes go on as they go.
+
+The wide list holds what may come near for a while, if every node goes straight on with its velocity; only relative
+motion counts, so what flies or turns together stays in it. Where a node has left its expected place by its margin, its
+pairs are searched anew. Of the wide list, the near list holds what may come near within the next few substeps.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.system import System
+from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.contact.memory import ContactMemory
+from supple.solvers.xpbd.contact.pairs import SHAPE, Pairs, describe_pairs, near_pairs
+from supple.solvers.xpbd.contact.search.overlaps import Overlaps
+from supple.solvers.xpbd.contact.search.patch_search import PatchSearch
+from supple.solvers.xpbd.contact.search.surface import RowSurface
+from supple.solvers.xpbd.contact.shapes import RowShapes
+
+# Of the gap: that from simple shapes.
+SKIN = 0.01
+# Of the mean edge: how far nodes may leave their expected places; and the share of it from which lists are renewed
+# before a substep rather than after it, and from which a node is searched together with those that must be.
+WIDE, NEAR = 0.13, 0.05
+SOON, TOGETHER = 0.7, 0.5
+# Of the mean edge: how far the fastest node goes while the wide list is valid; the number of substeps of the near list.
+WAY, STEPS = 0.6, 6
+
+
+class _Expected:
+    """Where nodes were and how fast, when a list was made; until when the list holds."""
+
+    def __init__(self, count: int) -> None:
+        self.x, self.v = np.full((count, 3), np.inf), np.zeros((count, 3))
+        self.age = self.until = 0.0
+
+
+class Lists:
+    """The lists of a scene. `pairs` have the impulses that are kept, `near` (m,) the numbers of the near ones.
+
+    Parameters
+    ----------
+    gap : the distance that surfaces keep [m]; skin : the distance from shapes [m]
+    """
+
+    def __init__(self, system: System, surface: RowSurface, shapes: RowShapes, gap: float) -> None:
+        self._surface, self._shapes, self._gap = surface, shapes, gap
+        self._edge = surface.edge_length
+        self._search = PatchSearch(system, surface)
+        self._left = np.zeros(surface.count, dtype=np.bool_)
+        self._collide, self._on_shapes = surface.simplices.collide.copy(), shapes.collide
+        self._any = bool(self._collide.any()) or bool(self._on_shapes.any())
+        self._number = np.zeros(surface.count, dtype=np.int64)
+        self._number[surface.simplices.nodes] = np.arange(len(surface.simplices.nodes))
+        self.begin_frame(
+            None, 1.0, 1.0, np.zeros(len(self._collide), dtype=np.bool_), Overlaps.none(len(self._collide))
+        )
+
+    def __bool__(self) -> bool:
+        """Whether anything may touch."""
+        return self._any
+
+    def begin_frame(
+        self, memory: ContactMemory | None, dt: float, h: float, still: NDArray[np.bool_], overlaps: Overlaps
+    ) -> None:
+        """Begin a frame of dt [s] in substeps of h [s], without lists, with the forces of the frame before.
+
+        still : (p,) things that do not move; overlaps : of things that begin in each other
+        """
+        count, s = self._surface.count, self._surface.simplices
+        self._deep = overlaps
+        np.logical_and(self._collide & ~overlaps.crossing, ~(still[:, None] & still), out=s.collide)
+        self._on_shapes = self._shapes.collide & ~still[:, None]
+        self.wide, self.tight = _Expected(count), _Expected(count)
+        self._points = self._edges = np.zeros((0, 2), dtype=np.int32)
+        self.pairs = _room_for(0 if memory is None else len(memory.keys))
+        if memory is not None:
+            self.pairs.keys[:], self.pairs.normals[:] = memory.keys, memory.normals
+            self.pairs.impulses[:] = h * h * memory.forces
+        self.near = np.zeros(0, dtype=np.int64)
+        self._deviations = np.inf, np.inf
+        self._remaining = dt
+
+    def memory(self, x: NDArray[np.float64], h: float) -> ContactMemory:
+        """What the next frame begins with, after substeps of h [s]; x (n, 3) are the vertices [m]."""
+        k = np.flatnonzero(self.pairs.impulses.any(axis=1))
+        k = k[np.argsort(self.pairs.keys[k])]
+        return ContactMemory(self.pairs.keys[k], self.pairs.impulses[k] / (h * h), self.pairs.normals[k], x)
+
+    def renew(self, x: NDArray[np.float64], v: NDArray[np.float64], h: float, frames: NDArray[np.float64]) -> None:
+        """Make the lists valid for the substep of h [s] that begins at x (N, >= 3) with velocities v (N, 3).
+
+        frames : of the shapes then
+        """
+        wide, tight, least = self.wide, self.tight, h * (1.0 - 1e-9)
+        remaining, self._remaining = self._remaining, self._remaining - h
+        limits = SOON * WIDE * self._edge, SOON * NEAR * self._edge
+        if wide.age + least > wide.until:
+            self._find(x, v, min(self._time(v, h), max(h, remaining + 0.5 * h)), frames, None)
+            self._choose(x, v, STEPS * h)
+        elif not self._deviations[0] <= limits[0]:
+            nodes = self._nodes_off(x, TOGETHER * WIDE)
+            self._find(x, v, 0.0, frames, nodes)
+            self._choose(x, v, STEPS * h)
+        elif tight.age + least > tight.until or not self._deviations[1] <= limits[1]:
+            self._choose(x, v, min(wide.until - wide.age, STEPS * h))
+
+    def cover(
+        self, begin: NDArray[np.float64], end: NDArray[np.float64], h: float, frames: NDArray[np.float64]
+    ) -> bool:
+        """Whether the lists held for the motion of a substep; otherwise they are made anew for this very motion."""
+        wide, tight = self.wide, self.tight
+        wide.age += h
+        tight.age += h
+        self._deviations = self._deviation(wide, end), self._deviation(tight, end)
+        inside = [d <= margin * self._edge for d, margin in zip(self._deviations, (WIDE, NEAR), strict=True)]
+        if all(inside):
+            return True
+        v = (end[:, :3] - begin[:, :3]) / h
+        if not inside[0]:
+            nodes = self._nodes_off(end, TOGETHER * WIDE)
+            wide.age -= h
+            self._find(begin, v, 0.0, frames, nodes)
+            wide.age += h
+        self._choose(begin, v, h)
+        tight.age = h
+        self._deviations = self._deviation(wide, end), self._deviation(tight, end)
+        return False
+
+    def _deviation(self, expected: _Expected, x: NDArray[np.float64]) -> float:
+        return math.sqrt(_largest_deviation(x, expected.x, expected.v, expected.age, self._surface.simplices.nodes))
+
+    def _nodes_off(self, x: NDArray[np.float64], share: float) -> NDArray[np.bool_]:
+        wide = self.wide
+        _deviating(x, wide.x, wide.v, wide.age, self._surface.simplices.nodes, share * self._edge, self._left)
+        return self._left
+
+    def _find(
+        self,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64],
+        time: float,
+        frames: NDArray[np.float64],
+        nodes: NDArray[np.bool_] | None,
+    ) -> None:
+        """Search the pairs of some nodes (N,), or a new list of all that holds for a time [s]."""
+        s, p, wide = self._surface.simplices, self._surface.patches, self.wide
+        if nodes is None:
+            wide.x, wide.v = x[:, :3].copy(), v.copy()
+            wide.age, wide.until = 0.0, time
+            asked = np.ones(len(p.owner), dtype=np.bool_)
+            at = wide.x
+        else:
+            wide.v[nodes] = v[nodes]
+            wide.x[nodes] = x[nodes, :3] - wide.age * v[nodes]
+            asked = _asked(nodes, p.node_start, p.nodes)
+            at = wide.x + wide.age * wide.v
+        way = (wide.until - wide.age) * wide.v
+        found = self._search.find(at, way, self._gap + 2.0 * WIDE * self._edge, asked)
+        parts = (p.patch_of_point, p.patch_of_triangle), (p.patch_of_edge, p.patch_of_edge)
+        kept = []
+        for old, (one, other), new in zip((self._points, self._edges), parts, found, strict=True):
+            stays = ~(asked[one[old[:, 0]]] | asked[other[old[:, 1]]])
+            kept.append(np.concatenate([old[stays], new]))
+        self._points, self._edges = kept
+        walls = self._walls(at, way, frames)
+        deep, p = self._deep, len(self._points)
+        points, edges = np.concatenate([self._points, deep.points]), np.concatenate([deep.edges, self._edges])
+        k = len(points) + len(edges)
+        pairs = _room_for(k + len(walls[0]))
+        describe_pairs(0, points, edges, s, 2.0 * self._gap, pairs)
+        pairs.deep[p : p + len(deep.normals)] = True
+        pairs.normals[p : p + len(deep.normals)] = deep.normals
+        self._describe_walls(pairs, k, *walls)
+        _hand_on(self.pairs, pairs)
+        self.pairs = pairs
+
+    def _walls(
+        self, x: NDArray[np.float64], way: NDArray[np.float64], frames: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """The nodes and shapes (k,) that may touch."""
+        s = self._surface.simplices
+        nodes = s.nodes[s.owner[s.nodes] < len(self._shapes.collide)]
+        reach = self._gap + WIDE * self._edge + np.sqrt(np.einsum("ij,ij->i", way[nodes], way[nodes]))
+        points, shapes = [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=np.int32)]
+        for o in range(len(self._shapes)):
+            every = np.full(len(nodes), o, dtype=np.int32)
+            gaps = self._shapes.walls(x, nodes, every, frames, frames).gaps
+            near = self._on_shapes[s.owner[nodes], o] & ((gaps < reach) | self._shapes.moving[o])
+            points.append(nodes[near])
+            shapes.append(every[near])
+        return np.concatenate(points), np.concatenate(shapes)
+
+    def _describe_walls(self, pairs: Pairs, first: int, nodes: NDArray[np.int32], shapes: NDArray[np.int32]) -> None:
+        s, mine = self._surface.simplices, slice(first, None)
+        pairs.nodes[mine] = nodes[:, None]
+        pairs.kinds[mine], pairs.shapes[mine], pairs.pushes[mine] = SHAPE, shapes, True
+        pairs.keys[mine] = 1 << 62 | shapes.astype(np.int64) << 31 | self._number[nodes]
+        pairs.gaps[mine] = SKIN * self._gap
+        pairs.friction[mine] = self._shapes.friction[s.owner[nodes], shapes]
+
+    def _choose(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
+        tight = self.tight
+        tight.x, tight.v, tight.age, tight.until = x[:, :3].copy(), v.copy(), 0.0, time
+        room = np.empty(len(self.pairs.keys), dtype=np.int64)
+        count = near_pairs(x, v, self.pairs, time, self._gap + 2.0 * NEAR * self._edge, room)
+        self.near = room[:count]
+        self._deviations = self._deviations[0], 0.0
+
+    def _time(self, v: NDArray[np.float64], h: float) -> float:
+        """For how long to search ahead: while the fastest node, seen from its body, goes `WAY` edges."""
+        s = self._surface.simplices
+        fastest = math.sqrt(_fastest(v, s.nodes, s.owner, len(s.collide)))
+        return max(h, WAY * self._edge / max(fastest, WAY * self._edge / (200.0 * h)))
+
+
+def _room_for(k: int) -> Pairs:
+    return Pairs(
+        np.empty((k, 4), np.int32),
+        np.empty(k, np.int8),
+        np.full(k, -1, np.int32),
+        np.empty(k, np.int64),
+        np.empty(k, np.bool_),
+        np.zeros(k, np.bool_),
+        np.empty(k),
+        np.empty(k),
+        np.zeros((k, 3)),
+        np.zeros((k, 3)),
+    )
+
+
+def _hand_on(old: Pairs, new: Pairs) -> None:
+    """Give the impulses of loaded pairs to the same pairs of a new list."""
+    held = np.flatnonzero(old.impulses.any(axis=1))
+    if not len(held) or not len(new.keys):
+        return
+    held = held[np.argsort(old.keys[held])]
+    place = np.minimum(np.searchsorted(old.keys[held], new.keys), len(held) - 1)
+    found = np.flatnonzero(old.keys[held[place]] == new.keys)
+    new.impulses[found], new.normals[found] = old.impulses[held[place[found]]], old.normals[held[place[found]]]
+
+
+@njit(cache=True)
+def _largest_deviation(x, begin, v, age, nodes):
+    """The square of how far a node is from where it was expected; inf where that is not finite."""
+    most = 0.0
+    for i in nodes:
+        a, b, c = (
+            x[i, 0] - begin[i, 0] - age * v[i, 0],
+            x[i, 1] - begin[i, 1] - age * v[i, 1],
+            x[i, 2] - begin[i, 2] - age * v[i, 2],
+        )
+        square = a * a + b * b + c * c
+        if not square <= most:
+            most = square if square < np.inf else np.inf
+    return most
+
+
+@njit(cache=True)
+def _deviating(x, begin, v, age, nodes, margin, left):
+    left[:] = False
+    for i in nodes:
+        a, b, c = (
+            x[i, 0] - begin[i, 0] - age * v[i, 0],
+            x[i, 1] - begin[i, 1] - age * v[i, 1],
+            x[i, 2] - begin[i, 2] - age * v[i, 2],
+        )
+        left[i] = not a * a + b * b + c * c <= margin * margin
+
+
+@njit(cache=True)
+def _asked(left, start, nodes):
+    """(q,) the patches with a node that is in `left` (N,)."""
+    out = np.zeros(len(start) - 1, dtype=np.bool_)
+    for q in range(len(out)):
+        for k in range(start[q], start[q + 1]):
+            out[q] = out[q] or left[nodes[k]]
+    return out
+
+
+@njit(cache=True)
+def _fastest(v, nodes, owner, owners):
+    """The square of the largest velocity of a node relative to the mean of its thing."""
+    means = np.zeros((owners, 4))
+    for i in nodes:
+        o = owner[i]
+        means[o, 3] += 1.0
+        for j in range(3):
+            means[o, j] += v[i, j]
+    most = 0.0
+    for i in nodes:
+        o = owner[i]
+        f = 1.0 / means[o, 3]
+        a, b, c = v[i, 0] - f * means[o, 0], v[i, 1] - f * means[o, 1], v[i, 2] - f * means[o, 2]
+        most = max(most, a * a + b * b + c * c, 0.02 * (v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2))
+    return most

@@ -1,0 +1,236 @@
+"""The surfaces of a scene on the nodes of the solver, and their division into patches.
+
+Nodes are the rows of the solver's arrays: the vertices, then the anchors of stitches, then the vertices of obstacles
+that have triangles. Whatever touches is a node, so that one kernel serves bodies and obstacles; what is held or follows
+a script has the inverse mass zero.
+
+A patch is a group of neighbouring triangles of one thing. Every point and every edge belongs to the first patch that
+has it. Searches compare patches, then what patches own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
+from supple.contact.mesh.obstacles import ObstacleRange, with_obstacles
+from supple.model.system import System
+from supple.numerics.adjacency import Adjacency, adjacency
+from supple.numerics.sparse.partition import bisected_groups
+from supple.scene.contact_pairs import pair_table
+from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
+from supple.solvers.xpbd.rigid.bodies import RigidBodies
+
+# Triangles of a patch. With 8 or 32, searches of `bears` take 10 to 20 % longer.
+PATCH = 16
+# Of the gap between surfaces: that from obstacles that are given by a formula, so that what stands on a table looks so.
+# A fifth of it is what rows may leave over.
+ON_SOLIDS = 0.1
+
+
+class Patches(NamedTuple):
+    """q patches: starts (q + 1,) and items of their triangles, edges and points, the owner (q,) of each, and nodes.
+
+    Attributes
+    ----------
+    node_start, nodes : all nodes of a patch's triangles
+    patch_of_edge, patch_of_point, patch_of_triangle : the patch of each part
+    """
+
+    owner: NDArray[np.int32]
+    triangle_start: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+    edge_start: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    point_start: NDArray[np.int32]
+    points: NDArray[np.int32]
+    node_start: NDArray[np.int32]
+    nodes: NDArray[np.int32]
+    patch_of_triangle: NDArray[np.int32]
+    patch_of_edge: NDArray[np.int32]
+    patch_of_point: NDArray[np.int32]
+
+
+class Simplices(NamedTuple):
+    """The parts of the surface, as kernels take them.
+
+    Attributes
+    ----------
+    nodes : (s,) the node of each point; triangles : (f, 3), edges : (e, 2) nodes
+    owner : (N,) the body or obstacle of each node, -1 for nodes that are on no surface
+    collide : (p, p) which owners may touch; friction, gaps : (p, p), gaps that are kept [m]
+    excluded_triangles : of each point, excluded_edges : of each edge, what it never touches (see `StitchFilter`)
+    rest : (N, 3) places at rest [m]
+    first : (f, 6) whether a triangle is the first of those with its corner j, and with the side across from it
+    """
+
+    nodes: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    owner: NDArray[np.int32]
+    collide: NDArray[np.bool_]
+    friction: NDArray[np.float64]
+    gaps: NDArray[np.float64]
+    excluded_triangles: Adjacency
+    excluded_edges: Adjacency
+    rest: NDArray[np.float64]
+    first: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class RowSurface:
+    """What may touch in a scene.
+
+    Attributes
+    ----------
+    closed : (p,) which things have a closed surface
+    count : number of nodes; first : the first node of obstacles
+    anchors : (o, 3) of the obstacles' nodes at time 0 [m]; of_anchor : (o,) their obstacle
+    body : (N,) the rigid body of each node, or -1; points : (N,) the point of the system that it is, or -1
+    embedded : nodes on rigid bodies, the last ones, by their control
+        points (k, 4) and weights (k, 4)
+    """
+
+    simplices: Simplices
+    closed: NDArray[np.bool_]
+    patches: Patches
+    count: int
+    first: int
+    anchors: NDArray[np.float64]
+    of_anchor: NDArray[np.int64]
+    edge_length: float
+    body: NDArray[np.int32]
+    points: NDArray[np.int32]
+    embedded: tuple[NDArray[np.int32], NDArray[np.float64]]
+
+
+def row_surface(
+    system: System,
+    rigid: RigidBodies,
+    anchors: int,
+    settings: XPBDContact | None,
+    lengths: tuple[float, float],
+) -> RowSurface:
+    """The surfaces of a system in the solver's numbering, whose arrays have rows for `anchors` after the vertices.
+
+    lengths : the mean surface edge and the gap [m]
+    Stitched points and what is nearer to them than the gap at the start do not collide.
+    """
+    n, (edge_length, gap) = len(system.masses), lengths
+    extended, ranges = with_obstacles(system)
+    solid = tuple(part for part in ranges if part.obstacle.contact_mesh is not None)
+    collide = colliding_pairs(system, settings, joined=True)
+    placed = [part.body.place(system.rest_positions[part.vertices]) for part in system.bodies]
+    rest = [system.rest_positions[sum(map(len, placed)) :], extended.rest_positions[len(system.rest_positions) :]]
+    mesh = contact_mesh(extended, solid, collide, np.concatenate([*placed, *rest]), gap)
+    single = mesh.points.single
+    # The obstacles' nodes are numbered by their range; obstacles without triangles have none.
+    node_of = np.full(len(extended.masses), -1, dtype=np.int32)
+    node_of[:n] = np.arange(n)
+    count = n + anchors
+    for part in solid:
+        node_of[part.vertices] = np.arange(count, count + len(part.vertices))
+        count += len(part.vertices)
+    first_embedded, inside = count, np.flatnonzero(single < 0)
+    count += len(inside)
+    embedded = mesh.points.taken(inside)
+    control, weights = embedded.vertices.reshape(-1, 4), embedded.weights.reshape(-1, 4)
+    nodes = np.where(single >= 0, node_of[single], 0).astype(np.int32)
+    nodes[inside] = np.arange(first_embedded, count)
+    owner = np.full(count, -1, dtype=np.int32)
+    owner[nodes] = mesh.owner
+    rest = np.zeros((count, 3))
+    rest[nodes] = mesh.points.positions(extended.rest_positions)
+    body = np.full(count, -1, dtype=np.int32)
+    body[:n] = np.where(rigid.of_vertex >= 0, rigid.of_vertex, rigid.welded_to)
+    body[first_embedded:] = rigid.of_vertex[control[:, 0]]
+    points = np.full(count, -1, dtype=np.int32)
+    points[nodes] = mesh.rows
+    simplices = Simplices(
+        nodes,
+        np.ascontiguousarray(nodes[mesh.triangles]),
+        np.ascontiguousarray(nodes[mesh.edges]),
+        owner,
+        np.ascontiguousarray(mesh.collide),
+        np.ascontiguousarray(pair_table(system.scene).friction),
+        _gaps(system, gap),
+        *_excluded(mesh),
+        rest,
+        _is_first(mesh),
+    )
+    closed = np.ones(len(collide), dtype=np.bool_)
+    closed[mesh.owner[mesh.edges[np.diff(mesh.edge_triangles.start) != 2, 0]]] = False
+    return RowSurface(
+        simplices,
+        closed,
+        _patches(mesh, nodes, rest),
+        count,
+        n + anchors,
+        np.concatenate([np.zeros((0, 3)), *(part.anchors for part in solid)]),
+        _numbers(solid),
+        edge_length,
+        body,
+        points,
+        (np.ascontiguousarray(control), np.ascontiguousarray(weights)),
+    )
+
+
+def _gaps(system: System, gap: float) -> NDArray[np.float64]:
+    """(p, p) the gaps between bodies and obstacles [m]; small ones from solids of a formula, on which bodies stand."""
+    factors = np.ones(len(system.bodies) + len(system.obstacles))
+    for k, obstacle in enumerate(system.obstacles):
+        factors[len(system.bodies) + k] = ON_SOLIDS if obstacle.surface_mesh is None else 1.0
+    return gap * np.minimum(factors[:, None], factors)
+
+
+def _is_first(mesh: ContactMesh) -> NDArray[np.bool_]:
+    """See `Simplices.first`."""
+    out = np.zeros((len(mesh.triangles), 6), dtype=np.bool_)
+    for column, parts in ((0, mesh.triangles), (3, mesh.triangle_edges)):
+        order = np.unique(parts.ravel(), return_index=True)[1]
+        out[order // 3, column + order % 3] = True
+    return out
+
+
+def _numbers(ranges: tuple[ObstacleRange, ...]) -> NDArray[np.int64]:
+    return np.concatenate([np.zeros(0, dtype=np.int64), *(np.full(len(part.vertices), part.index) for part in ranges)])
+
+
+def _excluded(mesh: ContactMesh) -> tuple[Adjacency, Adjacency]:
+    if mesh.stitched is not None:
+        return mesh.stitched.triangles_of_point, mesh.stitched.edges_of_edge
+    none = np.zeros(0, dtype=np.int32)
+    return (
+        Adjacency(np.zeros(len(mesh.points) + 1, dtype=np.int32), none),
+        Adjacency(np.zeros(len(mesh.edges) + 1, dtype=np.int32), none),
+    )
+
+
+def _patches(mesh: ContactMesh, nodes: NDArray[np.int32], rest: NDArray[np.float64]) -> Patches:
+    """Groups of near triangles of each thing at rest."""
+    own = mesh.owner[mesh.triangles[:, 0]]
+    centers = rest[nodes][mesh.triangles].mean(axis=1)
+    groups = bisected_groups(centers, own, max(1, -(-len(own) // PATCH)))
+    q = len(groups)
+    patch_of_triangle = np.empty(len(own), dtype=np.int32)
+    owner = np.empty(q, dtype=np.int32)
+    for number, group in enumerate(groups):
+        patch_of_triangle[group], owner[number] = number, own[group[0]]
+    patch_of_edge = _first(mesh.triangle_edges, patch_of_triangle, len(mesh.edges))
+    patch_of_point = _first(mesh.triangles, patch_of_triangle, len(nodes))
+    triangles = adjacency(patch_of_triangle, np.arange(len(own)), q)
+    edges = adjacency(patch_of_edge, np.arange(len(mesh.edges)), q)
+    points = adjacency(patch_of_point, np.arange(len(nodes)), q)
+    of_patch = adjacency(np.repeat(patch_of_triangle, 3), nodes[mesh.triangles].ravel(), q)
+    return Patches(owner, *triangles, *edges, *points, *of_patch, patch_of_triangle, patch_of_edge, patch_of_point)
+
+
+def _first(parts: NDArray[np.int32], patch: NDArray[np.int32], count: int) -> NDArray[np.int32]:
+    """(count,) the lowest patch of the triangles that have each part (f, 3)."""
+    out = np.full(count, len(patch), dtype=np.int32)
+    np.minimum.at(out, parts.ravel(), np.repeat(patch, 3))
+    return out

@@ -1,0 +1,200 @@
+"""The solution of the rows: Gauss-Seidel sweeps with accumulated impulses, until what a sweep changes is small.
+
+Each row keeps its impulse f. A sweep sets the part along n to max(0, what makes n . r the target), and the part across
+n to what takes back the slip, not longer than the friction coefficient times the first. Both sides get opposite
+impulses. The part across acts at two places that are d n apart, and a couple on the nodes takes its moment back.
+
+Source: Catto, "Iterative Dynamics with Temporal Coherence" (2005), section 6.
+"""
+
+from __future__ import annotations
+
+import math
+
+from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.contact.bodies import has_body, place, push_node, softness, turn_body
+from supple.solvers.xpbd.contact.pairs import SHAPE, facing, is_loaded, weights_of
+from supple.solvers.xpbd.contact.rows import NIL
+
+
+@njit
+def vector(x, bodies, rows, e):
+    """r of a row at places x and the twists of bodies."""
+    a, b, c, d = rows.weights[e, 0], rows.weights[e, 1], rows.weights[e, 2], rows.weights[e, 3]
+    p, q = place(x, bodies, rows.nodes[e, 0]), place(x, bodies, rows.nodes[e, 1])
+    r, s = place(x, bodies, rows.nodes[e, 2]), place(x, bodies, rows.nodes[e, 3])
+    o = row(rows.places, e)
+    return (
+        a * p[0] + b * q[0] + c * r[0] + d * s[0] - o[0],
+        a * p[1] + b * q[1] + c * r[1] + d * s[1] - o[1],
+        a * p[2] + b * q[2] + c * r[2] + d * s[2] - o[2],
+    )
+
+
+@njit
+def displace(points, bodies, rows, e, f):
+    """Move what a row pushes by the impulse f on its first side and its opposite on the second."""
+    for i in range(4):
+        c = rows.weights[e, i]
+        if c != 0.0:
+            push_node(points, bodies, rows.nodes[e, i], (c * f[0], c * f[1], c * f[2]))
+
+
+@njit
+def _turn(out, scale, points, bodies, begin, nodes, e, moment):
+    """Put a couple with this moment about x_n on a rigid body, or on the four nodes, if all of them can move.
+
+    out : (N, >= 3) places, or velocities, that change by the displacements times `scale`
+    """
+    for i in range(4):
+        b = bodies.body[nodes[e, i]]
+        if b >= 0:
+            turn_body(bodies, b, moment)
+            return
+    cx = cy = cz = 0.0
+    for i in range(4):
+        v = nodes[e, i]
+        if points[v, 3] == 0.0:
+            return
+        cx, cy, cz = cx + 0.25 * begin[v, 0], cy + 0.25 * begin[v, 1], cz + 0.25 * begin[v, 2]
+    xx = yy = zz = xy = yz = zx = 0.0
+    for i in range(4):
+        v = nodes[e, i]
+        a, b, d = begin[v, 0] - cx, begin[v, 1] - cy, begin[v, 2] - cz
+        xx += b * b + d * d
+        yy += a * a + d * d
+        zz += a * a + b * b
+        xy -= a * b
+        yz -= b * d
+        zx -= d * a
+    first, second, third = (xx, xy, zx), (xy, yy, yz), (zx, yz, zz)
+    one, two, three = cross(second, third), cross(third, first), cross(first, second)
+    det = dot(first, one)
+    # Nodes in a line have no moment about it.
+    if not det > 1e-9 * (0.5 * (xx + yy + zz)) ** 3:
+        return
+    th = (dot(one, moment) / det, dot(two, moment) / det, dot(three, moment) / det)
+    for i in range(4):
+        v = nodes[e, i]
+        d = cross(th, (begin[v, 0] - cx, begin[v, 1] - cy, begin[v, 2] - cz))
+        for j in range(3):
+            out[v, j] += scale * points[v, 3] * d[j]
+
+
+@njit(cache=True)
+def solve(points, bodies, begin, rows, count, tolerance, most):
+    """Sweep over the rows until no sweep changes an n . r by more than the tolerance [m], at most so many times.
+
+    Returns the number of sweeps, and the largest change in the last one [m].
+    """
+    sweeps, residual = 0, math.inf
+    while sweeps < most and residual > tolerance:
+        sweeps += 1
+        residual = 0.0
+        for e in range(count):
+            mass = rows.masses[e]
+            if mass == 0.0:
+                continue
+            n, f = row(rows.normals, e), row(rows.impulses, e)
+            r = vector(points, bodies, rows, e)
+            s, before = dot(n, r), dot(f, n)
+            push = max(0.0, before + (rows.targets[e] - s) * mass)
+            if push == 0.0 and before == 0.0:
+                continue
+            residual = max(residual, abs(push - before) / mass)
+            held = (f[0] - before * n[0], f[1] - before * n[1], f[2] - before * n[2])
+            slip = (r[0] - s * n[0], r[1] - s * n[1], r[2] - s * n[2])
+            if has_body(bodies, rows.nodes, e):
+                # A rigid body answers differently along the surface.
+                length = math.sqrt(dot(slip, slip))
+                if length > 0.0:
+                    along = (slip[0] / length, slip[1] / length, slip[2] / length)
+                    c = rows.weights[e]
+                    mass = 1.0 / softness(points, bodies, rows.nodes, e, (c[0], c[1], c[2], c[3]), along)
+            t = (held[0] - slip[0] * mass, held[1] - slip[1] * mass, held[2] - slip[2] * mass)
+            size, limit = math.sqrt(dot(t, t)), rows.friction[e] * push
+            share = limit / size if size > limit else 1.0
+            t = (share * t[0], share * t[1], share * t[2])
+            new = (push * n[0] + t[0], push * n[1] + t[1], push * n[2] + t[2])
+            displace(points, bodies, rows, e, subtract(new, f))
+            if rows.kinds[e] != SHAPE:
+                m, d = cross(n, subtract(t, held)), rows.distances[e]
+                if m[0] != 0.0 or m[1] != 0.0 or m[2] != 0.0:
+                    _turn(points, 1.0, points, bodies, begin, rows.nodes, e, (-d * m[0], -d * m[1], -d * m[2]))
+            for j in range(3):
+                rows.impulses[e, j] = new[j]
+    return sweeps, residual
+
+
+@njit(cache=True)
+def push_kept(points, bodies, velocities, near, pairs, walls, gap, h):
+    """Begin a substep with the impulses that are kept, along the normals of now; those that no longer hold are zero."""
+    shape = len(near) - len(walls.gaps)
+    for m in range(len(near)):
+        k = near[m]
+        if not is_loaded(pairs.impulses, k):
+            continue
+        if pairs.kinds[k] == SHAPE:
+            d, n = walls.gaps[m - shape], row(walls.normals, m - shape)
+        else:
+            _, n, d = facing(points, pairs, k, NIL * gap)
+        f, old = row(pairs.impulses, k), row(pairs.normals, k)
+        if d > 2.0 * gap or dot(n, old) < 0.5:
+            pairs.impulses[k, :] = 0.0
+            continue
+        push = dot(f, old)
+        t = (f[0] - push * old[0], f[1] - push * old[1], f[2] - push * old[2])
+        push -= dot(t, n)
+        for j in range(3):
+            pairs.impulses[k, j] = push * n[j] + t[j]
+            pairs.normals[k, j] = n[j]
+    # Velocities change only now; the places are those of x_n throughout.
+    for k in near:
+        if not is_loaded(pairs.impulses, k):
+            continue
+        c = (1.0, 0.0, 0.0, 0.0)
+        if pairs.kinds[k] != SHAPE:
+            c, _ = weights_of(points, pairs.nodes, k, pairs.kinds[k])
+        for i in range(4):
+            v, g = pairs.nodes[k, i], c[i]
+            f = (g * pairs.impulses[k, 0], g * pairs.impulses[k, 1], g * pairs.impulses[k, 2])
+            if bodies.body[v] >= 0:
+                push_node(points, bodies, v, f)
+                continue
+            for j in range(3):
+                velocities[v, j] += points[v, 3] * f[j] / h
+        if pairs.kinds[k] != SHAPE:
+            _, _, d = facing(points, pairs, k, NIL * gap)
+            m = cross(row(pairs.normals, k), row(pairs.impulses, k))
+            if m[0] != 0.0 or m[1] != 0.0 or m[2] != 0.0:
+                _turn(velocities, 1.0 / h, points, bodies, points, pairs.nodes, k, (-d * m[0], -d * m[1], -d * m[2]))
+
+
+@njit(cache=True)
+def keep_impulses(rows, count, velocities, h, rates, near, pairs):
+    """Keep what the next substep begins with: not what stopped the approach with which this one began.
+
+    Parameters
+    ----------
+    velocities : (N, 3) at the beginning of the substep; rates : (N,) see `response_rates`
+    """
+    for k in near:
+        pairs.impulses[k, :] = 0.0
+    for e in range(count):
+        if rows.masses[e] == 0.0:
+            continue
+        n, f = row(rows.normals, e), row(rows.impulses, e)
+        push = dot(f, n)
+        if not push > 0.0:
+            continue
+        speed, kappa, total = 0.0, 0.0, 0.0
+        for i in range(4):
+            v, c = rows.nodes[e, i], rows.weights[e, i]
+            speed += c * dot(n, row(velocities, v))
+            kappa += abs(c) * rates[v]
+            total += abs(c)
+        approach = max(0.0, -h * speed - max(0.0, rows.distances[e] - rows.targets[e]))
+        share = max(0.0, 1.0 - approach * rows.masses[e] / push) / (1.0 + h * h * kappa / total)
+        for j in range(3):
+            pairs.impulses[rows.pairs[e], j] = share * f[j]

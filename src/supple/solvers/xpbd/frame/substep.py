@@ -1,0 +1,103 @@
+"""One substep of XPBD: contact is found at x_n, where nothing crosses, and nothing can cross.
+
+The numbers are those of docs/theory/xpbd.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.energy_balance import add_works
+from supple.solvers.xpbd.damping.kelvin_voigt import Damping
+from supple.solvers.xpbd.frame.volumes import hold_volumes, restore
+from supple.solvers.xpbd.integration import first_lost, hold, predict
+from supple.solvers.xpbd.workspace import XPBDWorkspace
+
+# How often joints and contacts are solved in turn in a substep with contact, at most, and below which correction of
+# a joint, as a share of its size, they are not solved again. What a heavy body and a joint push at from both sides
+# takes as many as the ratio of the masses.
+JOINT_PASSES, JOINT_EXACT = 100, 1e-5
+
+
+def substep(
+    ws: XPBDWorkspace, damping: Damping | None, targets: NDArray[np.float64], end: float, h: float, last: bool
+) -> None:
+    """Advance the arrays of the workspace by h [s], to the time `end` [s].
+
+    Parameters
+    ----------
+    damping : whose cycle has begun, None where nothing is damped; targets : (k, 3) of the pinned vertices [m]
+    last : whether it is the last one of the frame, in which the stress that sweeps deliver is measured
+    """
+    x_n, x, v, contact = ws.previous, ws.points, ws.velocities, ws.contact
+    ws.time = end
+    contact.guard(ws.sound)
+    contact.begin(end)
+    predict(x, x_n, v, ws.system.gravity, h)
+    if len(targets):
+        hold(x, ws.system.pinned_vertices, targets, ws.origins)
+    ws.rigid.follow(x, v)
+    ws.works.begin_substep(ws.extended)
+    ws.anchors.place(ws.extended, ws.origins, end)
+    at = ws.substep(end, h)
+    ws.loads.add_forces(at)
+    push(ws, damping, h)
+    if last:
+        ws.delivered.begin(ws.extended)
+    for constraints in ws.sets:
+        constraints.project(ws.extended, h)
+    ws.actuators.project_within(at)
+    restore(ws, h)
+    ws.loads.pull_to_targets(at)
+    ws.loads.pull_springs(at)
+    ws.actuators.project_between(at)
+    move_rigid(ws, end, h)
+    if first_lost(x, v) >= 0:
+        return
+    rows = contact.detect()
+    contact.solve(rows)
+    hold_joints(ws, rows, end, h)
+    low = hold_volumes(ws, rows, h)
+    contact.keep(rows)
+    contact.admit(rows, low)
+    if len(ws.joints):
+        add_works(ws.works.by_name, {"joints": ws.joints.end_substep(x, ws.origins, end, h)})
+    ws.actuators.end_substep(at)
+    forces = [*ws.loads.acting] if damping is None else [*ws.loads.acting, ("damping", *damping.acting)]
+    ws.works.end_substep(at, forces, contact, ws.extended, ws.actuators.acting)
+
+
+def push(ws: XPBDWorkspace, damping: Damping | None, h: float) -> None:
+    """Apply viscous forces to the prediction."""
+    if damping is not None:
+        damping.push(ws.points, h)
+    welded = ws.rigid.welding.vertices
+    internal = (ws.points[welded, :3] - ws.previous[welded]) / h - ws.velocities[welded]
+    ws.rigid.gather(ws.points, ws.velocities, h)
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+    if len(welded):
+        # Constraints see welded vertices where their bodies are to be. Momenta are restored to those without internal
+        # forces, of which bodies have their part already.
+        ws.velocities[welded] -= internal
+
+
+def move_rigid(ws: XPBDWorkspace, end: float, h: float) -> None:
+    """Move rigid bodies as all impulses of a substep, and their joints, determine."""
+    ws.rigid.gather(ws.points, ws.velocities, h)
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+    if len(ws.joints):
+        ws.joints.project(ws.points, ws.previous, ws.velocities, ws.origins, end, h)
+        ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+
+
+def hold_joints(ws: XPBDWorkspace, rows: int, end: float, h: float) -> None:
+    """Solve joints and contacts in turn, where contacts have moved what joints hold."""
+    contact = ws.contact
+    for _ in range(JOINT_PASSES if len(ws.joints) and rows else 0):
+        moved = ws.joints.project_again(ws.points, ws.previous, ws.velocities, ws.origins, end, h)
+        ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+        contact.nodes.follow()
+        contact.solve(rows)
+        if moved <= JOINT_EXACT:
+            return
