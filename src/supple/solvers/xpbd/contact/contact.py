@@ -209,10 +209,10 @@ class Contact:
         if len(self._cuts.shares) < most + len(self.tets.J):
             self._cuts = Cuts.room(most + len(self.tets.J))
 
-    def solve(self, rows: int, most: int | None = None) -> bool:
-        """Solve the rows with at most so many sweeps; returns whether that was enough."""
+    def solve(self, rows: int, most: int | None = None) -> float:
+        """Solve the rows with at most so many sweeps; returns what the last one changed, in gaps."""
         if not rows:
-            return True
+            return 0.0
         tolerance, rigid, nodes = RESIDUAL * self.gap, self._rigid, self.nodes
         if len(rigid):
             fall = math.hypot(*self._gravity) * self._h**2
@@ -228,7 +228,7 @@ class Contact:
         nodes.impulses[rigid.control] += nodes.v[rigid.control] - v
         self.counts.sweeps += sweeps
         self.counts.residual = max(self.counts.residual, residual)
-        return residual <= tolerance
+        return residual / self.gap
 
     def keep(self, rows: int) -> None:
         """Note the forces, and keep the impulses with which the next substep begins."""
