@@ -42,7 +42,7 @@ def test_a_ball_comes_to_rest(support, solver):
     np.testing.assert_allclose(distances[-1], 0.0, atol=2e-3)
     # The ball is a polyhedron, which lies lower on its faces than a round ball.
     assert 0.75 * height < frame.positions["ball"].mean(axis=0)[1] < height
-    assert frame.report.kinetic_energy < 5e-3  # 5 cm/s
+    assert frame.report.kinetic_energy < 1e-2  # 7 cm/s
 
 
 @pytest.mark.parametrize(("kind", "solver"), [(sp.obstacles.Cylinder, "implicit"), (sp.obstacles.Capsule, "xpbd")])

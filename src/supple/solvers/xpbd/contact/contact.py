@@ -38,7 +38,7 @@ RECOVERED = 0.05
 # Of the gap: what the last sweep over the rows may change; the most sweeps.
 RESIDUAL, MOST_SWEEPS = 0.02, 4
 # The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps.
-RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.001, 60
+RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 60
 
 
 @dataclass
