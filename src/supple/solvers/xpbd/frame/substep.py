@@ -1,6 +1,6 @@
 """One substep of XPBD: contact is found at x_n, where nothing crosses, and nothing can cross.
 
-The numbers are those of docs/theory/xpbd.md.
+The numbers of steps and equations are those of docs/theory/xpbd.md and docs/theory/contact.md.
 """
 
 from __future__ import annotations
@@ -33,34 +33,34 @@ def substep(
     x_n, x, v, contact = ws.previous, ws.points, ws.velocities, ws.contact
     ws.time = end
     contact.guard(ws.sound)
-    contact.begin(end)
-    predict(x, x_n, v, ws.system.gravity, h)
+    contact.begin(end)  # 1: lists at x_n, impulses that are kept (C5)
+    predict(x, x_n, v, ws.system.gravity, h)  # 2
     if len(targets):
         hold(x, ws.system.pinned_vertices, targets, ws.origins)
     ws.rigid.follow(x, v)
     ws.works.begin_substep(ws.extended)
     ws.anchors.place(ws.extended, ws.origins, end)
     at = ws.substep(end, h)
-    ws.loads.add_forces(at)
-    push(ws, damping, h)
+    ws.loads.add_forces(at)  # 3
+    push(ws, damping, h)  # (X6)
     if last:
         ws.delivered.begin(ws.extended)
     for constraints in ws.sets:
-        constraints.project(ws.extended, h)
+        constraints.project(ws.extended, h)  # 4: (X1) to (X4)
     ws.actuators.project_within(at)
-    restore(ws, h)
-    ws.loads.pull_to_targets(at)
+    restore(ws, h)  # 5: (X5)
+    ws.loads.pull_to_targets(at)  # 6
     ws.loads.pull_springs(at)
     ws.actuators.project_between(at)
     move_rigid(ws, end, h)
     if first_lost(x, v) >= 0:
         return
-    rows = contact.detect()
+    rows = contact.detect()  # 7: (C4)
     contact.solve(rows)
     hold_joints(ws, rows, end, h)
-    low = hold_volumes(ws, rows, h)
+    low = hold_volumes(ws, rows, h)  # (X7)
     contact.keep(rows)
-    contact.admit(rows, low)
+    contact.admit(rows, low)  # 8: (C7)
     if len(ws.joints):
         add_works(ws.works.by_name, {"joints": ws.joints.end_substep(x, ws.origins, end, h)})
     ws.actuators.end_substep(at)
