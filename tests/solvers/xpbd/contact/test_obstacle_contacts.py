@@ -87,7 +87,7 @@ def test_a_dropped_ball_lands_on_a_ball_and_rolls_off(kind):
 
 def fly(obstacle, position, velocity, time, substeps=20, rotation=(0, 0, 0)):
     """Simulate a soft grain without gravity: its last positions and velocities, and all kinetic energies."""
-    grain = sp.Body("dust", DUST, SOFT, position=position, velocity=velocity, rotation=rotation)
+    grain = sp.Body("dust", DUST, JELLY, position=position, velocity=velocity, rotation=rotation)
     solver = XPBD(substeps=substeps, start="push_out", sleep_after=None)
     frames = list(sp.simulate(sp.Scene([grain], [obstacle], gravity=(0, 0, 0)), solver, 1 / 60, round(60 * time)))
     reports = [frame.report for frame in frames]
