@@ -24,7 +24,7 @@ from supple.solvers.implicit.stepping.integrators import History
 from supple.solvers.xpbd.assessment.assessment import Ledger
 from supple.solvers.xpbd.assessment.softening import MeasuredWork
 from supple.solvers.xpbd.contact.frame_forces import LoadedRows
-from supple.solvers.xpbd.contact.memory import ContactMemory
+from supple.solvers.xpbd.contact.memory import ContactMemory, ListMemory
 from supple.solvers.xpbd.damping.kelvin_voigt import ViscousMemory
 from supple.solvers.xpbd.memory import ControlMemory, XPBDMemory
 from supple.solvers.xpbd.sleep import SleepMemory
@@ -35,6 +35,7 @@ MEMORIES: tuple[type, ...] = (
     EnergyMade,
     History,
     Ledger,
+    ListMemory,
     LoadedRows,
     MeasuredWork,
     SleepMemory,

@@ -36,7 +36,7 @@ GAP, SLACK = 0.05, 0.25
 # Of the mean edge: how much of a lack of gap is taken back in a frame.
 RECOVERED = 0.05
 # Of the gap: what the last sweep over the rows may change; the most sweeps.
-RESIDUAL, MOST_SWEEPS = 0.02, 4
+RESIDUAL, MOST_SWEEPS = 0.02, 3
 # The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps.
 RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 60
 
@@ -143,7 +143,7 @@ class Contact:
         still = np.ones(len(self._names), dtype=np.bool_)
         still[: len(asleep)] = asleep
         overlaps = find_overlaps(self._surface.simplices, self._surface.closed, self.nodes.x, crossing)
-        self._lists.begin_frame(memory, self._dt, self._h, still, overlaps)
+        self._lists.begin_frame(memory, self.nodes.begin, origin, self._h, still, overlaps)
 
     def guard(self, sound: NDArray[np.bool_]) -> None:
         """Begin a substep whose tets must keep a share of the volume they have, where they are `sound` (m,)."""
@@ -151,7 +151,7 @@ class Contact:
 
     def memory(self, x: NDArray[np.float64]) -> ContactMemory | None:
         """What the next frame begins with; x (n, 3) are the positions of the state [m]."""
-        return self._lists.memory(x, self._h) if self else None
+        return self._lists.memory(x, self.nodes.origin, self._h) if self else None
 
     def places(self) -> NDArray[np.float64]:
         """(N, 3) of the nodes in the world [m]; a copy."""

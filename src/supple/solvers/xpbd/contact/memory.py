@@ -9,6 +9,31 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, eq=False)
+class ListMemory:
+    """The pairs that may touch, and what they hold for, in the numbering of the solver.
+
+    Attributes
+    ----------
+    points : (k, 2) points and triangles; edges : (l, 2); walls : (m, 2) nodes and shapes
+    x, v : (N, 3) where nodes were and how fast, when the list began [m], [m/s]
+    age, until : the time since then, and how long the list holds [s]
+    collide : (p, p) which things could touch; on_shapes : (p, s) which of them simple shapes
+    shapes : (s, ...) the frames and numbers of these, one row each
+    """
+
+    points: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    walls: NDArray[np.int32]
+    x: NDArray[np.float64]
+    v: NDArray[np.float64]
+    age: float
+    until: float
+    collide: NDArray[np.bool_]
+    on_shapes: NDArray[np.bool_]
+    shapes: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
 class ContactMemory:
     """The forces with which the next frame begins, of pairs that push.
 
@@ -16,12 +41,14 @@ class ContactMemory:
     ----------
     keys : (k,) the pairs, see `Pairs`; forces : (k, 3) on their first side [N]; normals : (k, 3)
     positions : (n, 3) of the vertices at the end of that frame [m]
+    lists : which pairs may touch; None where none may
     """
 
     keys: NDArray[np.int64]
     forces: NDArray[np.float64]
     normals: NDArray[np.float64]
     positions: NDArray[np.float64]
+    lists: ListMemory | None
 
     def belongs_to(self, positions: NDArray[np.float64], tolerance: float) -> bool:
         """Whether every vertex is where it was, up to a tolerance [m]. Obstacles may be others."""

@@ -152,6 +152,10 @@ class RowShapes:
     def __len__(self) -> int:
         return len(self.owners)
 
+    def described(self) -> NDArray[np.float64]:
+        """(k, 12 + p) the frames at time 0 and the numbers of the shapes."""
+        return np.concatenate([self._shapes.frames.reshape(len(self), 12), self._shapes.parameters], axis=1)
+
     def frames(self, time: float, origin: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k, 4, 3) at `time` [s], about an origin [m]."""
         frames = self._shapes.placed(self._poses, time).copy()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.contact.memory import ContactMemory
+from supple.solvers.xpbd.contact.memory import ContactMemory, ListMemory
 from supple.solvers.xpbd.contact.pairs import SHAPE, Pairs, describe_pairs, near_pairs
 from supple.solvers.xpbd.contact.search.overlaps import Overlaps
 from supple.solvers.xpbd.contact.search.patch_search import PatchSearch
@@ -28,7 +28,7 @@ SKIN = 0.01
 WIDE, NEAR = 0.13, 0.05
 SOON, TOGETHER = 0.7, 0.5
 # Of the mean edge: how far the fastest node goes while the wide list is valid; the number of substeps of the near list.
-WAY, STEPS = 0.6, 6
+WAY, STEPS = 0.35, 6
 
 
 class _Expected:
@@ -53,22 +53,31 @@ class Lists:
         self._search = PatchSearch(system, surface)
         self._left = np.zeros(surface.count, dtype=np.bool_)
         self._collide, self._on_shapes = surface.simplices.collide.copy(), shapes.collide
+        self._fixed = shapes.described()
         self._any = bool(self._collide.any()) or bool(self._on_shapes.any())
         self._number = np.zeros(surface.count, dtype=np.int64)
         self._number[surface.simplices.nodes] = np.arange(len(surface.simplices.nodes))
-        self.begin_frame(
-            None, 1.0, 1.0, np.zeros(len(self._collide), dtype=np.bool_), Overlaps.none(len(self._collide))
-        )
+        nobody = np.zeros(len(self._collide), dtype=np.bool_), Overlaps.none(len(self._collide))
+        self.begin_frame(None, np.zeros((surface.count, 3)), np.zeros(3), 1.0, *nobody)
 
     def __bool__(self) -> bool:
         """Whether anything may touch."""
         return self._any
 
     def begin_frame(
-        self, memory: ContactMemory | None, dt: float, h: float, still: NDArray[np.bool_], overlaps: Overlaps
+        self,
+        memory: ContactMemory | None,
+        x: NDArray[np.float64],
+        origin: NDArray[np.float64],
+        h: float,
+        still: NDArray[np.bool_],
+        overlaps: Overlaps,
     ) -> None:
-        """Begin a frame of dt [s] in substeps of h [s], without lists, with the forces of the frame before.
+        """Begin a frame in substeps of h [s], with the lists and forces of the frame before.
 
+        Parameters
+        ----------
+        x : (N, >= 3) the nodes about an origin (3,) [m]
         still : (p,) things that do not move; overlaps : of things that begin in each other
         """
         count, s = self._surface.count, self._surface.simplices
@@ -76,20 +85,45 @@ class Lists:
         np.logical_and(self._collide & ~overlaps.crossing, ~(still[:, None] & still), out=s.collide)
         self._on_shapes = self._shapes.collide & ~still[:, None]
         self.wide, self.tight = _Expected(count), _Expected(count)
-        self._points = self._edges = np.zeros((0, 2), dtype=np.int32)
+        self._points = self._edges = self._on_walls = np.zeros((0, 2), dtype=np.int32)
         self.pairs = _room_for(0 if memory is None else len(memory.keys))
         if memory is not None:
             self.pairs.keys[:], self.pairs.normals[:] = memory.keys, memory.normals
             self.pairs.impulses[:] = h * h * memory.forces
         self.near = np.zeros(0, dtype=np.int64)
         self._deviations = np.inf, np.inf
-        self._remaining = dt
+        known = None if memory is None else memory.lists
+        if known is not None and not len(overlaps.normals) and self._is_of(known):
+            self.wide.x, self.wide.v = known.x - origin, known.v.copy()
+            self.wide.age, self.wide.until = known.age, known.until
+            self._points, self._edges, self._on_walls = known.points, known.edges, known.walls
+            self._describe()
+            self._deviations = self._deviation(self.wide, x), np.inf
 
-    def memory(self, x: NDArray[np.float64], h: float) -> ContactMemory:
-        """What the next frame begins with, after substeps of h [s]; x (n, 3) are the vertices [m]."""
-        k = np.flatnonzero(self.pairs.impulses.any(axis=1))
+    def _is_of(self, known: ListMemory) -> bool:
+        """Whether a list is of this scene, with the same things at rest."""
+        s = self._surface.simplices
+        same = [
+            known.x.shape == self.wide.x.shape == known.v.shape,
+            np.array_equal(known.collide, s.collide),
+            np.array_equal(known.on_shapes, self._on_shapes),
+            np.array_equal(known.shapes, self._fixed),
+        ]
+        ends = (
+            (known.points, (len(s.nodes), len(s.triangles))),
+            (known.edges, (len(s.edges), len(s.edges))),
+            (known.walls, (len(self._number), len(self._shapes))),
+        )
+        return all(same) and all(bool(((pairs >= 0) & (pairs < np.array(end))).all()) for pairs, end in ends)
+
+    def memory(self, x: NDArray[np.float64], origin: NDArray[np.float64], h: float) -> ContactMemory:
+        """What the next frame begins with, after substeps of h [s]; x (n, 3) are the vertices in the world [m]."""
+        k, wide = np.flatnonzero(self.pairs.impulses.any(axis=1)), self.wide
         k = k[np.argsort(self.pairs.keys[k])]
-        return ContactMemory(self.pairs.keys[k], self.pairs.impulses[k] / (h * h), self.pairs.normals[k], x)
+        masks = self._surface.simplices.collide.copy(), self._on_shapes, self._fixed
+        pairs = self._points, self._edges, self._on_walls
+        lists = ListMemory(*pairs, wide.x + origin, wide.v.copy(), wide.age, wide.until, *masks)
+        return ContactMemory(self.pairs.keys[k], self.pairs.impulses[k] / (h * h), self.pairs.normals[k], x, lists)
 
     def renew(self, x: NDArray[np.float64], v: NDArray[np.float64], h: float, frames: NDArray[np.float64]) -> None:
         """Make the lists valid for the substep of h [s] that begins at x (N, >= 3) with velocities v (N, 3).
@@ -97,10 +131,9 @@ class Lists:
         frames : of the shapes then
         """
         wide, tight, least = self.wide, self.tight, h * (1.0 - 1e-9)
-        remaining, self._remaining = self._remaining, self._remaining - h
         limits = SOON * WIDE * self._edge, SOON * NEAR * self._edge
         if wide.age + least > wide.until:
-            self._find(x, v, min(self._time(v, h), max(h, remaining + 0.5 * h)), frames, None)
+            self._find(x, v, self._time(v, h), frames, None)
             self._choose(x, v, STEPS * h)
         elif not self._deviations[0] <= limits[0]:
             nodes = self._nodes_off(x, TOGETHER * WIDE)
@@ -148,7 +181,7 @@ class Lists:
         nodes: NDArray[np.bool_] | None,
     ) -> None:
         """Search the pairs of some nodes (N,), or a new list of all that holds for a time [s]."""
-        s, p, wide = self._surface.simplices, self._surface.patches, self.wide
+        p, wide = self._surface.patches, self.wide
         if nodes is None:
             wide.x, wide.v = x[:, :3].copy(), v.copy()
             wide.age, wide.until = 0.0, time
@@ -167,15 +200,19 @@ class Lists:
             stays = ~(asked[one[old[:, 0]]] | asked[other[old[:, 1]]])
             kept.append(np.concatenate([old[stays], new]))
         self._points, self._edges = kept
-        walls = self._walls(at, way, frames)
-        deep, p = self._deep, len(self._points)
+        self._on_walls = np.column_stack(self._walls(at, way, frames))
+        self._describe()
+
+    def _describe(self) -> None:
+        """Make the pairs of the lists; those that push keep their impulses."""
+        s, deep, p = self._surface.simplices, self._deep, len(self._points)
         points, edges = np.concatenate([self._points, deep.points]), np.concatenate([deep.edges, self._edges])
         k = len(points) + len(edges)
-        pairs = _room_for(k + len(walls[0]))
+        pairs = _room_for(k + len(self._on_walls))
         describe_pairs(0, points, edges, s, 2.0 * self._gap, pairs)
         pairs.deep[p : p + len(deep.normals)] = True
         pairs.normals[p : p + len(deep.normals)] = deep.normals
-        self._describe_walls(pairs, k, *walls)
+        self._describe_walls(pairs, k, *self._on_walls.T)
         _hand_on(self.pairs, pairs)
         self.pairs = pairs
 
