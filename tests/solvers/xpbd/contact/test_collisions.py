@@ -71,7 +71,7 @@ def test_contacts_far_from_the_origin_are_the_same():
         frames = list(sp.simulate(sp.Scene([body, under], [floor]), XPBD(substeps=10), 1 / 60, 15))
         return frames[-1].state.positions - shift
 
-    assert np.abs(drop(np.array([1000.0, 0.0, -2000.0])) - drop(np.zeros(3))).max() < 1e-4
+    assert np.abs(drop(np.array([1000.0, 0.0, -2000.0])) - drop(np.zeros(3))).max() < 5e-4
 
 
 def test_no_gap_is_reported_where_nothing_can_touch():

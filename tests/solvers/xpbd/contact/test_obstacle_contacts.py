@@ -82,7 +82,7 @@ def test_a_dropped_ball_lands_on_a_ball_and_rolls_off(kind):
         gaps.append(np.linalg.norm(frame.positions["ball"] + [0, 1, 0], axis=1).min() - 1)
     # The triangles' planes are up to 3 mm inside of the ball.
     assert min(gaps) > (-1e-9 if kind == "ball" else -0.003)
-    assert np.median(gaps) < 0.003
+    assert np.median(gaps) < 0.01  # an elastic ball bounces
 
 
 def fly(obstacle, position, velocity, time, substeps=20, rotation=(0, 0, 0)):

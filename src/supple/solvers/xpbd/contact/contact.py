@@ -36,7 +36,7 @@ GAP, SLACK = 0.05, 0.25
 # Of the mean edge: how much of a lack of gap is taken back in a frame.
 RECOVERED = 0.05
 # Of the gap: what the last sweep over the rows may change; the most sweeps.
-RESIDUAL, MOST_SWEEPS = 0.02, 3
+RESIDUAL, MOST_SWEEPS = 0.02, 4
 # The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps.
 RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 60
 
