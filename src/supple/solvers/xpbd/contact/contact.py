@@ -79,7 +79,7 @@ class Contact:
         count, poses = surface.count, ObstaclePoses(system.obstacles)
         self.nodes = Nodes(surface, rigid, poses, inverse_masses)
         self._shapes = RowShapes(system, poses)
-        self._lists = Lists(system, surface, self._shapes, self.gap)
+        self._lists = Lists(surface, self._shapes, self.gap)
         self.tets = Tets.of(system, count)
         self._rows = Rows.room(1024)
         self._chosen = np.zeros(0, dtype=np.bool_)
@@ -167,6 +167,8 @@ class Contact:
         lists.renew(nodes.begin, nodes.v, h, self._frames[0])
         self._measure_walls()
         self._before[:] = nodes.v
+        if not lists.loaded:  # so that no kernel is compiled for what does not push
+            return
         push_kept(nodes.at_begin(), nodes.bodies, nodes.v, lists.near, lists.pairs, self._walls, self.gap, h)
         nodes.take_twists(h)
         nodes.impulses += (nodes.v - self._before)[: len(nodes.impulses)]
@@ -236,6 +238,10 @@ class Contact:
         self.counts.rows = rows
         if not self:
             return
+        lists.loaded = rows > 0
+        if not rows:
+            self.forces.end_substep(LoadedRows.none())
+            return
         owners = self._surface.simplices.owner, self._shapes.owners
         self.forces.end_substep(LoadedRows(*loaded_rows(r, rows, lists.pairs, *owners, self.nodes.origin, h)))
         keep_impulses(r, rows, self._before, h, self._rates, lists.near, lists.pairs)
@@ -258,7 +264,8 @@ class Contact:
         if self:
             loose = np.where(self._rigid.joined, 0.0, nodes.bodies.w)
             recovered = RECOVERED * self.edge_length * h / self._dt
-            moved = guarantee.widen(nodes.x, nodes.movers, loose, self._rows, rows, recovered, self._marks)
+            if rows:
+                moved = guarantee.widen(nodes.x, nodes.movers, loose, self._rows, rows, recovered, self._marks)
             # Pairs that were left out are asked again where something went farther than was expected.
             if _farther(nodes.x, self._expected, SLACK * self.gap, self._far):
                 rows = self._detect(rows, 0.0, self._far)

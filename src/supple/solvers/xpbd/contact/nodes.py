@@ -82,7 +82,8 @@ class Nodes:
 
     def take_twists(self, h: float) -> None:
         """Give what twists displaced in h [s] to the velocities of bodies."""
-        take_twists(self.v, self._rigid.control, self.bodies, h)
+        if len(self._rigid):
+            take_twists(self.v, self._rigid.control, self.bodies, h)
 
     def move_bodies(self, h: float) -> None:
         """Move rigid bodies as their momenta and the twists determine."""

@@ -12,7 +12,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.memory import ContactMemory, ListMemory
 from supple.solvers.xpbd.contact.pairs import SHAPE, Pairs, describe_pairs, near_pairs
@@ -42,15 +41,17 @@ class _Expected:
 class Lists:
     """The lists of a scene. `pairs` have the impulses that are kept, `near` (m,) the numbers of the near ones.
 
+    `loaded`: whether any pair may have an impulse.
+
     Parameters
     ----------
     gap : the distance that surfaces keep [m]; skin : the distance from shapes [m]
     """
 
-    def __init__(self, system: System, surface: RowSurface, shapes: RowShapes, gap: float) -> None:
+    def __init__(self, surface: RowSurface, shapes: RowShapes, gap: float) -> None:
         self._surface, self._shapes, self._gap = surface, shapes, gap
         self._edge = surface.edge_length
-        self._search = PatchSearch(system, surface)
+        self._search = PatchSearch(surface)
         self._left = np.zeros(surface.count, dtype=np.bool_)
         self._collide, self._on_shapes = surface.simplices.collide.copy(), shapes.collide
         self._fixed = shapes.described()
@@ -91,6 +92,7 @@ class Lists:
             self.pairs.keys[:], self.pairs.normals[:] = memory.keys, memory.normals
             self.pairs.impulses[:] = h * h * memory.forces
         self.near = np.zeros(0, dtype=np.int64)
+        self.loaded = memory is not None and len(memory.keys) > 0
         self._deviations = np.inf, np.inf
         known = None if memory is None else memory.lists
         if known is not None and not len(overlaps.normals) and self._is_of(known):

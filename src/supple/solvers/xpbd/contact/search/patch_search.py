@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.mesh.distances import edge_edge_square, point_triangle_square
-from supple.model.system import System
 from supple.numerics.adjacency import in_list
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.contact.search.own_pairs import keeps_apart, measure_patches, own_pairs, slot_of
 from supple.solvers.xpbd.contact.search.surface import RowSurface
 
 # Points and edges of a patch of 16 triangles, at most.
@@ -102,7 +100,7 @@ def _reaching(start, items, q, boxes, other, o, reach, out):
 
 
 @njit(cache=True)
-def search_patches(x, way, reach, asked, simplices, patches, boxes, order, own, measured, out_points, out_edges):
+def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_points, out_edges):
     """List pairs with a part in a patch that is asked (q,). Returns the numbers of both kinds, which may not fit.
 
     Parameters
@@ -124,27 +122,6 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, own, 
             if not (asked[a] or asked[b]) or not s.collide[p.owner[a], p.owner[b]]:
                 continue
             if not _meet(of_patches, a, of_patches, b, reach):
-                continue
-            low, high = min(a, b), max(a, b)
-            slot = slot_of(own.start, own.neighbours, low, high) if p.owner[a] == p.owner[b] else -1
-            if slot >= 0 and keeps_apart(own, slot, a, b, *measured, reach):
-                # Deformed too little for anything but what is near at rest.
-                for i in range(own.point_start[slot], own.point_start[slot + 1]):
-                    k, t = own.points[i, 0], own.points[i, 1]
-                    if not _point_near(x, way, s.nodes[k], s.triangles, t, reach) or in_list(
-                        s.excluded_triangles, k, t
-                    ):
-                        continue
-                    if points < len(out_points):
-                        out_points[points, 0], out_points[points, 1] = k, t
-                    points += 1
-                for i in range(own.edge_start[slot], own.edge_start[slot + 1]):
-                    e, f = own.edges[i, 0], own.edges[i, 1]
-                    if not _edges_near(x, way, s.edges, e, f, reach) or in_list(s.excluded_edges, e, f):
-                        continue
-                    if edges < len(out_edges):
-                        out_edges[edges, 0], out_edges[edges, 1] = e, f
-                    edges += 1
                 continue
             for turn in range(1 if a == b else 2):
                 u, w = (a, b) if turn == 0 else (b, a)
@@ -189,14 +166,9 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, own, 
 class PatchSearch:
     """Searches a surface; keeps the memory of its results."""
 
-    def __init__(self, system: System, surface: RowSurface) -> None:
+    def __init__(self, surface: RowSurface) -> None:
         s, p = surface.simplices, surface.patches
         self._surface = surface
-        self._own = own_pairs(system, surface)
-        self._tets = np.ascontiguousarray(system.tets), system.rest_shape_inverse
-        q = len(p.owner)
-        self._F = np.zeros((int(np.diff(self._own.tet_start).max(initial=0)), 2, 9))
-        self._measured = np.zeros((q, 2, 9)), np.zeros(q), np.zeros(q)
         self._parts = s.nodes[:, None], s.triangles, s.edges
         self._boxes = [np.empty((len(part), 6)) for part in (*self._parts, p.owner)]
         self._room = [np.empty((1024, 2), dtype=np.int32) for _ in range(2)]
@@ -213,9 +185,8 @@ class PatchSearch:
         axis = int(np.argmax(of_patches[:, 3:].max(axis=0) - of_patches[:, :3].min(axis=0))) if len(of_patches) else 0
         order = np.argsort(of_patches[:, axis], kind="stable")
         boxes = (*self._boxes, axis)
-        measure_patches(x, way, self._own, asked, *self._tets, self._F, *self._measured)
         while True:
-            counts = search_patches(x, way, reach, asked, s, p, boxes, order, self._own, self._measured, *self._room)
+            counts = search_patches(x, way, reach, asked, s, p, boxes, order, *self._room)
             if all(count <= len(room) for count, room in zip(counts, self._room, strict=True)):
                 break
             self._room = [np.empty((count + count // 2 + 64, 2), dtype=np.int32) for count in counts]
