@@ -43,16 +43,16 @@ RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 60
 
 @dataclass
 class RowCounts:
-    """What happened in the substeps of a frame: see `XPBDDetails`; `crushed` substeps in which nothing could help."""
+    """What happened in the substeps of a frame.
 
-    rows: int = 0
-    sweeps: int = 0
-    residual: float = 0.0
-    pairs_cut: int = 0
-    inside_cut: int = 0
+    Attributes
+    ----------
+    cut : substeps in which motion was shortened; crushed : those in which that could not help
+    smallest : distance of a contact where a substep began [m]
+    """
+
     cut: int = 0
     crushed: int = 0
-    late: int = 0
     smallest: float = math.inf
 
 
@@ -222,20 +222,17 @@ class Contact:
         most = most or (MOST_RIGID_SWEEPS if len(rigid) else MOST_SWEEPS)
         n = len(nodes.impulses)
         x, v = nodes.x[:n, :3].copy(), nodes.v[rigid.control]
-        sweeps, residual = solve(nodes.x, nodes.bodies, nodes.begin, self._rows, rows, tolerance, most)
+        _, residual = solve(nodes.x, nodes.bodies, nodes.begin, self._rows, rows, tolerance, most)
         changes = (nodes.x[:n, :3] - x) / self._h
         nodes.v[:n] += changes
         nodes.impulses += changes
         nodes.move_bodies(self._h)
         nodes.impulses[rigid.control] += nodes.v[rigid.control] - v
-        self.counts.sweeps += sweeps
-        self.counts.residual = max(self.counts.residual, residual)
         return residual / self.gap
 
     def keep(self, rows: int) -> None:
         """Note the forces, and keep the impulses with which the next substep begins."""
         lists, r, h = self._lists, self._rows, self._h
-        self.counts.rows = rows
         if not self:
             return
         lists.loaded = rows > 0
@@ -250,8 +247,7 @@ class Contact:
         """Shorten motions from `base` (N, 3) of the nodes of the first `low` tets; see `admit`."""
         self._make_room(0)
         room = self._rows, 0, self.tets, low, 0, keep, 0.0, self._marks, self._cuts
-        cut, _ = guarantee.admit(base, self.nodes.x, self.nodes.movers, *room)
-        self.counts.inside_cut += cut
+        guarantee.admit(base, self.nodes.x, self.nodes.movers, *room)
         return volumes.measure(self.nodes.x, self.tets, False, guarantee.KEEP_J)
 
     def admit(self, rows: int, low: int) -> None:
@@ -275,7 +271,6 @@ class Contact:
         cut = self._cut(rows, low, moved)
         if self and not self._lists.cover(nodes.begin, nodes.x, h, self._frames[0]):
             # A node has left what the lists expect of it: lists of this very motion, and again.
-            self.counts.late += 1
             self._chosen = np.zeros(len(self._lists.pairs.keys), dtype=np.bool_)
             self._measure_walls()
             cut += self._cut(self._detect(0, 0.0, self._everyone), 0, 0)
@@ -293,7 +288,6 @@ class Contact:
         base = nodes.carried()
         cut, _ = guarantee.admit(base, nodes.x, nodes.movers, *room)
         if cut:
-            self.counts.pairs_cut += cut
             nodes.settle()
             share_motion(nodes.x, nodes.movers, self._rows, nodes.begin, nodes.v, self._cuts, cut)
             nodes.take_twists(1.0)

@@ -116,7 +116,10 @@ class Lists:
             (known.edges, (len(s.edges), len(s.edges))),
             (known.walls, (len(self._number), len(self._shapes))),
         )
-        return all(same) and all(bool(((pairs >= 0) & (pairs < np.array(end))).all()) for pairs, end in ends)
+        return all(same) and all(
+            pairs.dtype == np.int32 and pairs.shape[1:] == (2,) and bool(((pairs >= 0) & (pairs < np.array(end))).all())
+            for pairs, end in ends
+        )
 
     def memory(self, x: NDArray[np.float64], origin: NDArray[np.float64], h: float) -> ContactMemory:
         """What the next frame begins with, after substeps of h [s]; x (n, 3) are the vertices in the world [m]."""
