@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,10 @@ def test_obstacles_are_closed_and_face_outward(model):
     assert volumes["Box"] == pytest.approx(0.25)
     assert volumes["Sphere"] == pytest.approx(4.0 / 3.0 * np.pi * 0.027, rel=0.03)
     assert volumes["TriangleObstacle"] == pytest.approx(4.0 / 3.0 * 0.008)
+    hidden = {name: surface.hides_its_backs(model) for name, surface in drawn.items()}
+    assert hidden == {"Box": True, "Sphere": True, "TriangleObstacle": True, "HalfSpace": False}
+    inward = replace(drawn["Box"], triangles=drawn["Box"].triangles[:, ::-1])
+    assert not inward.hides_its_backs(model)
     floor = drawn["HalfSpace"]
     np.testing.assert_allclose(floor.vertices[:, 1], 0.0, atol=1e-12)
     normals = vertex_normals(floor.vertices, floor.triangles)

@@ -63,7 +63,9 @@ class Studio:
                 look = _FIELD | {"scalars": "field"} | colors
             room = surface.room
             opacity = 1.0 if room else surface.opacity
-            actor = plotter.add_mesh(mesh, opacity=opacity, culling="front" if room else None, **look)
+            # Sides that cannot be seen are not drawn: a third of the time of a renderer on a processor.
+            hidden = "front" if room else "back" if flat.hides_its_backs(model) else None
+            actor = plotter.add_mesh(mesh, opacity=opacity, culling=hidden, **look)
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
         self._bodies = len(model.bodies)
@@ -227,7 +229,7 @@ def _write_mp4(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, s
         fps=rate,  # pyright: ignore[reportArgumentType]
         codec="libx264",
         quality=7,
-        output_params=["-f", "mp4", "-movflags", "+faststart"],
+        output_params=["-f", "mp4", "-movflags", "+faststart", "-preset", "veryfast"],
     )
     writer.send(None)
     sent = 0

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from supple.mesh.closed_surfaces import is_closed
 from supple.results.view.colors import OBSTACLE_COLOR
 from supple.results.view.look import OBSTACLE, Look
 from supple.results.view.model import Model, ModelBody, Moment
@@ -49,6 +50,10 @@ class Surface(ABC):
     @abstractmethod
     def _with_vertices(self, rows: NDArray[np.int64], triangles: NDArray[np.int32]) -> Self:
         """The same surface with these of its vertices, and triangles of them."""
+
+    def hides_its_backs(self, model: Model) -> bool:
+        """Whether it is closed and its triangles face outwards."""
+        return is_closed(self.triangles) and _volume(self.at_rest(model), self.triangles) > 0.0
 
     def creased(self, model: Model) -> Self:
         """The same surface; vertices on creases are there once for each side, so that edges stay sharp."""
@@ -291,14 +296,12 @@ def split_at_creases(
 
 def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """Unit normals (k, 3) at vertices x (k, 3): of the triangles around each, weighted by area."""
-    normals = _sums_around(np.ascontiguousarray(x), triangles)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), [0.0, 1.0, 0.0])
+    return _normals_at(np.ascontiguousarray(x), triangles)
 
 
 @njit(cache=True)
-def _sums_around(x, triangles):
-    """(k, 3) twice the sum of the area vectors of the triangles (t, 3) around each vertex x (k, 3)."""
+def _normals_at(x, triangles):
+    """(k, 3) the direction of the sum of the area vectors of the triangles (t, 3) around each vertex x (k, 3)."""
     out = np.zeros_like(x)
     for t in range(len(triangles)):
         a, b, c = triangles[t]
@@ -308,6 +311,12 @@ def _sums_around(x, triangles):
             out[a, k] += area
             out[b, k] += area
             out[c, k] += area
+    for row in out:
+        length = np.sqrt(row[0] ** 2 + row[1] ** 2 + row[2] ** 2)
+        if length > 0.0:
+            row /= length
+        else:
+            row[1] = 1.0
     return out
 
 
