@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 import supple as sp
 from benchmarks.published import publish
 from benchmarks.table import Table
+from supple.contact.candidates import CandidateFinder
 from supple.contact.ccd import largest_step
 from supple.contact.mesh.contact_mesh import ContactMesh, mesh_of_triangles
-from supple.contact.search.finder import CandidateFinder
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 COUNTS = (5, 10, 20, 50, 100)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf, overlapping
+from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf
 from supple.runtime.kernel_cache import njit
 
 
@@ -33,39 +33,22 @@ def pairs_of(nodes, labels, order, label_of, same, out):
     return count
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 3, 64, 65, 500])
-def test_overlaps_are_those_of_brute_force_also_after_a_refit(count):
-    tree = BoxTree.over(boxes(count, 0))
-    for seed in (0, 1):
-        tree.refit(boxes(count, seed))
-        queries = boxes(40, 2)
-        start, found = overlapping(tree, queries)
-        expected = overlaps(queries, boxes(count, seed))
-        for k in range(len(queries)):
-            assert sorted(found[start[k] : start[k + 1]]) == np.flatnonzero(expected[k]).tolist()
-
-
-def test_boxes_that_touch_overlap():
-    tree = BoxTree.over(np.array([[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]))
-    assert overlapping(tree, np.array([[1.0, 0.5, 0.5, 2.0, 2.0, 2.0]]))[1].tolist() == [0]
-    assert overlapping(tree, np.array([[np.nextafter(1.0, 2.0), 0.5, 0.5, 2.0, 2.0, 2.0]]))[1].tolist() == []
-
-
 @pytest.mark.parametrize("same", [True, False])
-def test_pairs_of_one_set_are_found_once_and_labels_leave_branches_out(same):
-    each = boxes(300, 3)
-    labels = (np.arange(300) // 37).astype(np.int32)
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 64, 65, 300])
+def test_pairs_of_one_set_are_found_once_and_labels_leave_branches_out(count, same):
+    each = boxes(count, 3)
+    labels = (np.arange(count) // 37).astype(np.int32)
     tree = BoxTree.over(each, labels)
     out = np.empty((100_000, 2), dtype=np.int64)
     found = out[: pairs_of(tree.nodes, tree.labels, tree.order, labels, same, out)]
     wanted = np.triu(overlaps(each, each), 1) & ((labels[:, None] == labels) == same)
     assert sorted(map(tuple, found.tolist())) == list(map(tuple, np.argwhere(wanted).tolist()))
-    assert len(found) > 40
+    assert len(found) > 40 or count < 300
 
 
-def test_a_tree_whose_boxes_have_moved_far_no_longer_suits_them():
-    each = boxes(200, 4, 0.01)
-    tree = BoxTree.over(each)
-    assert tree.refit(each + 0.5)
-    shuffled = each[np.random.default_rng(5).permutation(200)]
-    assert not tree.refit(shuffled)
+def test_boxes_that_touch_overlap():
+    out = np.empty((1, 2), dtype=np.int64)
+    labels = np.zeros(2, dtype=np.int32)
+    for low, count in ((1.0, 1), (np.nextafter(1.0, 2.0), 0)):
+        tree = BoxTree.over(np.array([[0.0, 0.0, 0.0, 1.0, 1.0, 1.0], [low, 0.5, 0.5, 2.0, 2.0, 2.0]]))
+        assert pairs_of(tree.nodes, tree.labels, tree.order, labels, True, out) == count

@@ -24,9 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.candidates import CandidateFinder, Candidates
 from supple.contact.mesh.contact_mesh import ContactMesh
-from supple.contact.search.candidates import Candidates
-from supple.contact.search.finder import CandidateFinder
 from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle, combine
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange

@@ -31,6 +31,11 @@ def adjacency(rows: NDArray[np.integer], items: NDArray[np.integer], count: int)
     return Adjacency(start.astype(np.int32), found.astype(np.int32))
 
 
+def no_lists(count: int) -> Adjacency:
+    """Empty lists of `count` things."""
+    return Adjacency(np.zeros(count + 1, dtype=np.int32), np.zeros(0, dtype=np.int32))
+
+
 @njit
 def in_list(lists, k, item):
     """Whether an item is in the list of thing k; `lists` are an `Adjacency` or its two arrays."""

@@ -36,7 +36,7 @@ def test_it_falls_and_is_measured(live):
     assert body.skin is not None
     assert len(body.skin[0]) == 8
     assert described.low[1] == pytest.approx(0.0, abs=1e-3)
-    found = contact_points(live.system, live.state.positions, live.state.time)
+    found = contact_points(live)
     assert len(found) == 4
     assert np.abs(found[:, 1]).max() < 1e-3
     assert measures(live).kinetic_energy < 1e-6

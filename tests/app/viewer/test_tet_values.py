@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.engine.describe import contact_points
 from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import build_system
@@ -74,53 +73,3 @@ def test_the_energy_of_volumes_is_that_of_the_report():
 
     total = measure(system, State(0.0, x, np.zeros_like(x))).elastic_energy
     assert tet_values(system.laws, x, "energy") @ system.rest_volumes == pytest.approx(total)
-
-
-OBSTACLES = {
-    "floor": sp.HalfSpace(point=(0, -0.5, 0)),
-    "ball": sp.obstacles.Sphere(center=(0, -1.5, 0), radius=1.0),
-    "bowl": sp.obstacles.Sphere(radius=np.sqrt(0.75), inside=True),
-    "box": sp.obstacles.Box(center=(0, -1.0, 0), size=(3, 1, 3)),
-    "turned box": sp.obstacles.Box(center=(0, -1.0, 0), size=(3, 3, 1), rotation=(np.pi / 2, 0, 0)),
-    "moving floor": sp.HalfSpace(point=(0, -2.5, 0), motion=sp.Keyframes([0, 1], [[0, 0, 0], [0, 2, 0]])),
-}
-
-
-@pytest.mark.parametrize("name", OBSTACLES)
-def test_vertices_on_obstacles_are_contact_points(name):
-    system = cube_system(RUBBER, obstacles=[OBSTACLES[name]])
-    x = system.rest_positions
-    found = contact_points(system, x, 1.0)
-    bottom = x[np.isclose(x[:, 1], -0.5)]
-    expected = {"ball": [[0, -0.5, 0]], "bowl": x[np.isclose(np.abs(x).min(axis=1), 0.5)]}.get(name, bottom)
-    assert sorted(map(tuple, found)) == sorted(map(tuple, np.asarray(expected)))
-    away = 0.8 * x if name == "bowl" else x + np.array([0, 0.2, 0])
-    assert len(contact_points(system, away, 1.0)) == 0
-
-
-def test_contact_points_between_bodies():
-    mesh = sp.shapes.box((1, 1, 1), (2, 2, 2))
-    bodies = [sp.Body(name, mesh, RUBBER, position=(0, y, 0)) for name, y in (("low", 0.0), ("high", 1.01))]
-    sheet = sp.obstacles.TriangleObstacle(
-        surface=sp.shapes.box_surface((4, 1, 4), (1, 1, 1)), motion=sp.Keyframes([0], [[0, -1.01, 0]])
-    )
-    system = build_system(sp.Scene(bodies, [sheet]))
-    x = np.concatenate([body.place(mesh.vertices) for body in bodies])
-    heights = contact_points(system, x, 0.0)[:, 1]
-    assert np.abs(heights) == pytest.approx(np.full(len(heights), 0.505), abs=0.005)
-    assert heights.min() < 0.0 < heights.max()
-    apart = x + np.repeat([[0, 0.3, 0], [0, 0.6, 0]], len(mesh.vertices), axis=0)
-    assert len(contact_points(system, apart, 0.0)) == 0
-
-
-def test_values_of_quadratic_tets_are_those_of_their_means():
-    mesh = sp.shapes.box((1, 1, 1), (1, 1, 1), order=2)
-    system = build_system(sp.Scene([sp.Body("cube", mesh, RUBBER)]))
-    x = system.rest_positions + 0.02 * np.random.default_rng(0).normal(size=system.rest_positions.shape)
-    measured = measure(system, State(0.0, x, np.zeros_like(x)))
-    energies = tet_values(system.laws, x, "energy")
-    assert energies @ system.rest_volumes == pytest.approx(measured.elastic_energy, rel=1e-12)
-    np.testing.assert_allclose(tet_values(system.laws, x, "J"), sp.TetMesh(x, mesh.nodes).volumes / mesh.volumes)
-    assert measured.min_det_F < tet_values(system.laws, x, "J").min()
-    stretched = system.rest_positions * [1.0 + 1e-5, 1.0 - 3e-6, 1.0 - 3e-6]
-    assert tet_values(system.laws, stretched, "von_mises") == pytest.approx(np.full(6, 1.0), rel=1e-3)

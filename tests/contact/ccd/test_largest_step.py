@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.contact.candidates import CandidateFinder
 from supple.contact.ccd import largest_step, largest_step_in_pieces
 from supple.contact.mesh.contact_mesh import intersects, mesh_of_triangles
-from supple.contact.search.finder import CandidateFinder
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 

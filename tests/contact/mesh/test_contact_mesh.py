@@ -7,8 +7,8 @@ import pytest
 
 import supple as sp
 from supple.contact.mesh.contact_mesh import contact_mesh, intersects, mesh_of_triangles
-from supple.contact.mesh.distances import edges_nearer, points_nearer
 from supple.contact.mesh.obstacles import obstacle_positions, with_obstacles
+from supple.contact.search.distances import edges_nearer, points_nearer
 from supple.model.system import build_system, initial_state
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.contact_pairs import pair_table

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.contact.candidates import CandidateFinder
 from supple.contact.mesh.contact_mesh import mesh_of_triangles
-from supple.contact.mesh.distances import edges_nearer, points_nearer
-from supple.contact.search.finder import CandidateFinder
+from supple.contact.search.distances import edges_nearer, points_nearer
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 DHAT = 0.02
@@ -117,7 +117,7 @@ def test_places_on_the_way_need_no_search(monkeypatch):
     way = 0.2 * rng.normal(size=x.shape)
     finder = CandidateFinder(mesh, DHAT)
     finder.find(x, x + way)
-    monkeypatch.setattr("supple.contact.search.candidates.SurfaceTrees.find", None)
+    monkeypatch.setattr("supple.contact.candidates.PatchSearch.find", None)
     for place in along(x, x + way, (1.0, 0.5, 0.25, 0.1, 0.01)):
         assert_contains(finder.at(place), near_pairs(mesh, [place]))
 

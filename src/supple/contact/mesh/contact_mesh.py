@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.obstacles import ObstacleRange
 from supple.contact.mesh.stitch_filter import StitchFilter, WeldedPoints, stitch_filter
+from supple.contact.search.patches import Parts, Patches, patches_of
 from supple.mesh.topology import edge_keys
 from supple.model.system import System
-from supple.numerics.adjacency import Adjacency, adjacency
+from supple.numerics.adjacency import Adjacency, adjacency, no_lists
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.geometry.triangle_crossings import crossing_triangles
 from supple.runtime.kernel_cache import ROWS
@@ -36,7 +37,9 @@ class ContactMesh:
     edge_lengths : (e,) at rest [m]
     body_count : how many of the owners are bodies; names : of all owners
     collide : (p, p) which owners may touch
+    patches : of neighbouring triangles, for searches
     stitched : pairs that do not collide because they are stitched or welded; None where there are none
+    rows : (s,) the point of the system that each is, or -1
     """
 
     points: EmbeddedPoints
@@ -53,8 +56,22 @@ class ContactMesh:
     body_count: int
     names: tuple[str, ...]
     collide: NDArray[np.bool_]
+    patches: Patches
     stitched: StitchFilter | None
     rows: NDArray[np.int32]
+
+    @property
+    def excluded(self) -> tuple[Adjacency, Adjacency]:
+        """See `Parts`."""
+        if self.stitched is not None:
+            return self.stitched.triangles_of_point, self.stitched.edges_of_edge
+        return no_lists(len(self.owner)), no_lists(len(self.edges))
+
+    @property
+    def parts(self) -> Parts:
+        """As a search takes them."""
+        every = np.arange(len(self.owner), dtype=np.int32)
+        return Parts(every, self.triangles, self.edges, self.collide, *self.excluded)
 
 
 def contact_mesh(
@@ -146,9 +163,10 @@ def mesh_of_triangles(
     a, b, c = rest[triangles].transpose(1, 0, 2)
     doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     thirds = np.repeat(doubled / 6.0, 3)
-    stitched = None
+    patches, stitched = patches_of(triangles, triangle_edges, owner, rest), None
     if stitches is not None and (len(stitches[0]) or welded is not None):
-        stitched = stitch_filter((triangles, edges, triangle_edges), *stitches, owner, collide, welded, touching)
+        mesh = triangles, edges, triangle_edges, patches
+        stitched = stitch_filter(mesh, *stitches, owner, collide, welded, touching)
     return ContactMesh(
         points=points,
         triangles=triangles,
@@ -164,6 +182,7 @@ def mesh_of_triangles(
         body_count=body_count,
         names=names,
         collide=np.ascontiguousarray(collide),
+        patches=patches,
         stitched=stitched,
         rows=np.full(s, -1, dtype=np.int32) if rows is None else rows,
     )

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from supple.contact.mesh.distances import touching_pairs
-from supple.numerics.adjacency import Adjacency, adjacency
+from supple.contact.search.patch_search import pairs_nearer
+from supple.contact.search.patches import Parts, Patches
+from supple.numerics.adjacency import Adjacency, adjacency, no_lists
 from supple.scene.stitches.masks import stitched_crossings, stitched_edges, stitched_triangles
 
 # Parts that are nearer than this share of the mean edge at the start touch.
@@ -41,6 +42,9 @@ class StitchFilter:
     crossing: Adjacency
 
 
+Mesh = tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], Patches]
+
+
 class WeldedPoints(NamedTuple):
     """Points (w,) of the mesh that are welded, and the pairs (k, 2) of things that welds join."""
 
@@ -49,7 +53,7 @@ class WeldedPoints(NamedTuple):
 
 
 def stitch_filter(
-    mesh: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]],
+    mesh: Mesh,
     nodes: NDArray[np.int32],
     start: NDArray[np.float64],
     owner: NDArray[np.int32],
@@ -61,11 +65,11 @@ def stitch_filter(
 
     Parameters
     ----------
-    mesh : triangles (f, 3), edges (e, 2), triangle_edges (f, 3), see `ContactMesh`
+    mesh : triangles (f, 3), edges (e, 2), triangle_edges (f, 3), patches, see `ContactMesh`
     start : (s, 3) where the points are at the start [m]; owner : (s,) which thing each belongs to
     collide : (p, p) which owners may touch; touching : what is nearer at the start touches [m]
     """
-    triangles, edges, triangle_edges = mesh
+    triangles, edges, triangle_edges, _ = mesh
     s, e, f = len(owner), len(edges), len(triangles)
     points, faces = stitched_triangles(nodes, triangles, s)
     one, other = stitched_edges(nodes, edges, s)
@@ -108,7 +112,7 @@ def _crossings(
 
 
 def _touching(
-    mesh: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]],
+    mesh: Mesh,
     nodes: NDArray[np.int32],
     start: NDArray[np.float64],
     owner: NDArray[np.int32],
@@ -116,7 +120,7 @@ def _touching(
     reach: float | None,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Pairs (k, 2) of points with triangles, and of edges with edges, that touch at the start; see the module."""
-    triangles, edges, _ = mesh
+    triangles, edges, _, _ = mesh
     reach = reach or _TOUCHING * float(np.linalg.norm(start[edges[:, 1]] - start[edges[:, 0]], axis=1).mean())
     stitched = np.zeros(len(owner), dtype=np.bool_)
     stitched[nodes[nodes >= 0]] = True
@@ -125,20 +129,20 @@ def _touching(
         both = (nodes[:, 0] >= 0) & (nodes[:, k] >= 0)
         one, other = owner[nodes[both, 0]], owner[nodes[both, k]]
         joined[one, other] = joined[other, one] = True
-    near_triangles, near_edges = touching_pairs(start, triangles, edges, owner, joined & collide, reach)
+    near_triangles, near_edges = _nearer(mesh, start, joined & collide, reach)
     of_triangles = stitched[near_triangles[:, 0]] | stitched[triangles[near_triangles[:, 1]]].any(axis=1)
     of_edges = stitched[edges[near_edges]].any(axis=(1, 2))
     return near_triangles[of_triangles], near_edges[of_edges]
 
 
 def _welded(
-    mesh: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]],
+    mesh: Mesh,
     welded: WeldedPoints,
     start: NDArray[np.float64],
     owner: NDArray[np.int32],
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Pairs (k, 2) of points with triangles, and of edges with edges, that welds exclude; see the module."""
-    triangles, edges, _ = mesh
+    triangles, edges, _, _ = mesh
     is_welded = np.zeros(len(owner), dtype=np.bool_)
     is_welded[welded.points] = True
     ring = edges[is_welded[edges].any(axis=1)]
@@ -148,8 +152,18 @@ def _welded(
     count = int(max(owner.max(), welded.joined.max())) + 1
     joined = np.zeros((count, count), dtype=np.bool_)
     joined[tuple(welded.joined.T)] = joined[tuple(welded.joined[:, ::-1].T)] = True
-    near_triangles, near_edges = touching_pairs(start, triangles, edges, owner, joined, reach)
+    near_triangles, near_edges = _nearer(mesh, start, joined, reach)
     of_triangles = near[near_triangles[:, 0]] | near[triangles[near_triangles[:, 1]]].all(axis=1)
     whole = np.asarray(near[edges].all(axis=1))
     of_edges = whole[near_edges[:, 0]] | whole[near_edges[:, 1]]
     return near_triangles[of_triangles], near_edges[of_edges]
+
+
+def _nearer(
+    mesh: Mesh, x: NDArray[np.float64], collide: NDArray[np.bool_], reach: float
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Pairs (k, 2) of points with triangles, and of edges with edges, of the owners that `collide` (p, p)."""
+    triangles, edges, _, patches = mesh
+    every = np.arange(len(x), dtype=np.int32)
+    parts = Parts(every, triangles, edges, collide, no_lists(len(x)), no_lists(len(edges)))
+    return pairs_nearer(np.ascontiguousarray(x), parts, patches, reach)

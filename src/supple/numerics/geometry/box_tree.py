@@ -1,14 +1,14 @@
 """Overlaps of axis-aligned boxes: a binary tree of boxes over primitives in Morton order.
 
 The tree is complete: node k has the children 2 k and 2 k + 1, and the primitives are its leaves, in the order of their
-centers' Morton codes. When boxes change, only the boxes of the nodes are computed again.
+centers' Morton codes.
 
 A node also has the label that all primitives below it share, or -1. Searches use it to leave out whole branches.
 Primitives of one label are therefore next to each other in the order, and the labels in that of their boxes' centers.
 
 Kernels search with a stack of nodes:
 
-    top = from_root(nodes, box, stack)                  # or after_leaf(nodes, leaf, box, stack): only later leaves
+    top = after_leaf(nodes, leaf, box, stack)
     while top > 0:
         leaf, top = next_leaf(nodes, labels, box, label, same, stack, top)
         if leaf >= 0:
@@ -24,16 +24,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit
 
 # Entries of a search's stack: a tree over 2^31 primitives has 32 levels, and a search begins with one node of each.
 STACK = 80
 # Boxes that are compared with one node at once.
 GROUP = 16
-# Subtrees that are refitted independently of each other.
-_SUBTREES = 64
-# A tree is sorted again where its nodes have grown by this factor since it was sorted.
-_GROWTH = 1.5
 
 
 @dataclass(eq=False)
@@ -50,7 +46,6 @@ class BoxTree:
     order: NDArray[np.int32]
     nodes: NDArray[np.float64]
     labels: NDArray[np.int32]
-    _size: float
 
     @classmethod
     def over(cls, boxes: NDArray[np.float64], labels: NDArray[np.int32] | None = None) -> BoxTree:
@@ -61,12 +56,8 @@ class BoxTree:
         own = np.zeros(len(boxes), dtype=np.int32) if labels is None else labels
         order = np.lexsort((morton_codes(boxes), _places_of_labels(boxes, own)[own])).astype(np.int32)
         nodes = np.empty((2 * leaves, 6))
-        size = _refit(boxes, order, nodes)
-        return cls(order, nodes, _labels_of_nodes(own, order, leaves), size)
-
-    def refit(self, boxes: NDArray[np.float64]) -> bool:
-        """Take over new boxes (m, 6) of the same primitives; returns whether the order still suits them."""
-        return _refit(boxes, self.order, self.nodes) <= _GROWTH * self._size
+        _fill(boxes, order, nodes)
+        return cls(order, nodes, _labels_of_nodes(own, order, leaves))
 
 
 def boxes_of_triangles(
@@ -88,24 +79,6 @@ def _boxes_of_triangles(x, triangles, moves, out):
         for j in range(3):
             out[t, j] = min(x[a, j], x[b, j], x[c, j]) - margin
             out[t, 3 + j] = max(x[a, j], x[b, j], x[c, j]) + margin
-
-
-def overlapping(tree: BoxTree, boxes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Which of the tree's primitives have a box that overlaps each of the boxes (q, 6); touching counts.
-
-    Returns
-    -------
-    start : (q + 1,); found : (start[-1],) the primitives of box k at found[start[k]:start[k + 1]]
-    """
-    start = np.zeros(len(boxes) + 1, dtype=np.int64)
-    if len(boxes) == 0 or len(tree.order) == 0:
-        return start, np.zeros(0, dtype=np.int32)
-    none = np.zeros(0, dtype=np.int32)
-    _overlapping(tree.nodes, tree.labels, tree.order, boxes, start, none)
-    np.cumsum(start, out=start)
-    found = np.empty(start[-1], dtype=np.int32)
-    _overlapping(tree.nodes, tree.labels, tree.order, boxes, start, found)
-    return start, found
 
 
 def _places_of_labels(boxes: NDArray[np.float64], labels: NDArray[np.int32]) -> NDArray[np.int64]:
@@ -158,15 +131,6 @@ def which_overlap(nodes, i, boxes):
             & (boxes[5, k] >= nodes[i, 2])
         ) << k
     return found
-
-
-@njit
-def from_root(nodes, box, stack):
-    """Begin a search of the whole tree; returns the height of the stack."""
-    if overlap(nodes, 1, box):
-        stack[0] = 1
-        return 1
-    return 0
 
 
 @njit
@@ -236,46 +200,22 @@ def morton_codes(boxes):
     return codes
 
 
-@njit
-def _join(nodes, i):
-    """Compute node i from its children; returns the sum of its sides."""
-    size = 0.0
-    for j in range(3):
-        nodes[i, j] = min(nodes[2 * i, j], nodes[2 * i + 1, j])
-        nodes[i, 3 + j] = max(nodes[2 * i, 3 + j], nodes[2 * i + 1, 3 + j])
-        size += max(0.0, nodes[i, 3 + j] - nodes[i, j])
-    return size
-
-
 @njit(cache=True)
-def _refit(boxes, order, nodes):
-    """Compute all nodes; returns the sum of the sides of those that are not leaves."""
+def _fill(boxes, order, nodes):
+    """Compute all nodes."""
     leaves = len(nodes) // 2
-    subtrees = min(leaves, _SUBTREES)
-    each = leaves // subtrees
-    sizes = np.zeros(subtrees)
-    for s in range(subtrees):
-        for k in range(s * each, (s + 1) * each):
-            if k < len(order):
-                for j in range(6):
-                    nodes[leaves + k, j] = boxes[order[k], j]
-            else:
-                for j in range(3):
-                    nodes[leaves + k, j] = np.inf
-                    nodes[leaves + k, 3 + j] = -np.inf
-        size = 0.0
-        width = each // 2
-        while width >= 1:
-            for i in range((subtrees + s) * width, (subtrees + s + 1) * width):
-                size += _join(nodes, i)
-            width //= 2
-        sizes[s] = size
-    total = 0.0
-    for s in range(subtrees):
-        total += sizes[s]
-    for i in range(subtrees - 1, 0, -1):
-        total += _join(nodes, i)
-    return total
+    for k in range(leaves):
+        if k < len(order):
+            for j in range(6):
+                nodes[leaves + k, j] = boxes[order[k], j]
+        else:
+            for j in range(3):
+                nodes[leaves + k, j] = np.inf
+                nodes[leaves + k, 3 + j] = -np.inf
+    for i in range(leaves - 1, 0, -1):
+        for j in range(3):
+            nodes[i, j] = min(nodes[2 * i, j], nodes[2 * i + 1, j])
+            nodes[i, 3 + j] = max(nodes[2 * i, 3 + j], nodes[2 * i + 1, 3 + j])
 
 
 @njit(cache=True)
@@ -290,23 +230,6 @@ def _labels_of_nodes(labels, order, leaves):
         else:
             out[i] = b if a == -2 else -1
     return out
-
-
-@njit(cache=True, parallel=True)
-def _overlapping(nodes, labels, order, boxes, start, found):
-    """Count the overlaps of box k in start[k + 1]; where `found` has room for them, write them instead."""
-    for q in prange(len(boxes)):
-        stack = np.empty(STACK, dtype=np.int64)
-        count = 0
-        top = from_root(nodes, boxes[q], stack)
-        while top > 0:
-            leaf, top = next_leaf(nodes, labels, boxes[q], -1, False, stack, top)
-            if leaf >= 0:
-                if len(found) > 0:
-                    found[start[q] + count] = order[leaf]
-                count += 1
-        if len(found) == 0:
-            start[q + 1] = count
 
 
 def near_boxes(boxes: NDArray[np.float64], together: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -9,13 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.viewer.engine.scene.live_scene import LiveScene
-from supple.app.viewer.engine.scene.pusher import signed_distance
 from supple.app.viewer.engine.scene.solvers import kind_of, solver_values
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.parameters import PARAMETERS, Value
 from supple.app.viewer.protocol.snapshots import RIGID, BodyDescription, Measures, Reading, SceneDescription
-from supple.contact.mesh.distances import middles_of_edges, middles_of_points, touching_pairs
-from supple.mesh.topology import unique_edges
 from supple.model.actuator_readings import cable_readings, cavity_readings
 from supple.model.diagnostics import measure
 from supple.model.state import State
@@ -24,65 +21,8 @@ from supple.results.readings.frame_readings import joint_readings
 from supple.results.readings.sensor_readings import sensor_readings
 from supple.results.recording.actions import joints_of, recorded_stitches
 from supple.results.recording.scene import RecordedObstacle
-from supple.scene.contact_pairs import pair_table
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.solvers.xpbd.details import XPBDDetails
-
-# Largest distance of a contact point, as a share of the mean edge length of the surfaces.
-NEAR = 0.1
-
-
-def contact_points(system: System, positions: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-    """(c, 3) points [m] where surfaces are closer than NEAR mean edges; at most `MOST_CONTACT_POINTS`.
-
-    On half-spaces, boxes and spheres these are vertices of bodies. Between bodies, and on triangle obstacles, they are
-    the middles between vertices and triangles, and between edges, that are near each other.
-    """
-    near = NEAR * _mean_edge(system)
-    skin = np.unique(system.triangles)
-    positions = system.points.positions(positions)
-    points = [_between_surfaces(system, positions, time, near)]
-    for obstacle in system.obstacles:
-        if obstacle.surface_mesh is None:
-            points.append(positions[skin][signed_distance(obstacle, positions[skin], time)[0] < near])
-    found = np.concatenate([np.zeros((0, 3)), *points])
-    stride = -(-len(found) // limits.MOST_CONTACT_POINTS)
-    return np.ascontiguousarray(found[:: max(stride, 1)])
-
-
-def _mean_edge(system: System) -> float:
-    a, b = system.rest_points[system.triangles[:, :2]].transpose(1, 0, 2)
-    return float(np.linalg.norm(a - b, axis=1).mean())
-
-
-def _between_surfaces(system: System, positions: NDArray[np.float64], time: float, near: float) -> NDArray[np.float64]:
-    """(c, 3) middles of the pairs of things that may touch and are nearer than `near` [m]; of points (p, 3)."""
-    points, triangles, owner = [positions], [system.triangles], [_body_of_points(system)]
-    count = len(positions)
-    for k, obstacle in enumerate(system.obstacles):
-        mesh = obstacle.surface_mesh
-        if mesh is not None:
-            R, t = obstacle.pose(time)
-            points.append(mesh.vertices @ R.T + t)
-            triangles.append(mesh.triangles + count)
-            owner.append(np.full(len(mesh.vertices), len(system.bodies) + k, dtype=np.int32))
-            count += len(mesh.vertices)
-    numbered = np.concatenate(triangles)
-    used, compact = np.unique(numbered, return_inverse=True)
-    faces = np.ascontiguousarray(compact.reshape(numbered.shape), dtype=np.int32)
-    edges = unique_edges(faces, len(used))
-    x = np.concatenate(points)[used]
-    collide = pair_table(system.scene).collide
-    of_points, of_edges = touching_pairs(x, faces, edges, np.concatenate(owner)[used], collide, near)
-    return np.concatenate([middles_of_points(x, faces, of_points), middles_of_edges(x, edges, of_edges)])
-
-
-def _body_of_points(system: System) -> NDArray[np.int32]:
-    """(p,) the number of each point's body."""
-    owner = np.empty(len(system.points), dtype=np.int32)
-    for k, part in enumerate(system.bodies):
-        owner[part.points] = k
-    return owner
 
 
 def describe(live: LiveScene) -> SceneDescription:
@@ -178,6 +118,12 @@ def readings(live: LiveScene) -> tuple[Reading, ...]:
     for name, cable in cable_readings(report.details).items():
         found.append(Reading(name, "N", max(cable.tension, default=0.0)))
     return tuple(found)
+
+
+def contact_points(live: LiveScene) -> NDArray[np.float64]:
+    """(c, 3) points [m] of the contacts of the last step; at most `MOST_CONTACT_POINTS`."""
+    points = np.zeros((0, 3)) if live.report.contacts is None else live.report.contacts().points
+    return np.ascontiguousarray(points[:: max(1, -(-len(points) // limits.MOST_CONTACT_POINTS))])
 
 
 def strongest_forces(live: LiveScene) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:

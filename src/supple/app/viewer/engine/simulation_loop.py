@@ -208,7 +208,7 @@ class SimulationLoop:
         points = system.split(state.positions)
         grabs = [spring.drawn(points[spring.command.body]) for spring in setup.grabs.values()]
         pusher = setup.pusher
-        contacts = self._requested("contacts", lambda: contact_points(system, state.positions, state.time))
+        contacts = self._requested("contacts", lambda: contact_points(live))
         forces = self._requested("contacts", lambda: strongest_forces(live))
         quantity = self.view.tet_values or ""
         values = self._requested(

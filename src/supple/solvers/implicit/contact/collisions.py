@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.barrier.barrier_energy import add_barrier_gradient, barrier_energy, barrier_hessian
+from supple.contact.candidates import CandidateFinder
 from supple.contact.ccd import Limit, largest_step_in_pieces
 from supple.contact.features.contact_set import ContactSet, Found
 from supple.contact.features.contacts import Contacts, KnownWeights
 from supple.contact.features.vertex_contacts import REACH
 from supple.contact.mesh.contact_mesh import ContactMesh, intersects
-from supple.contact.search.finder import CandidateFinder
 from supple.numerics.geometry.embedded_points import vertex_couplings
 from supple.solvers.implicit.energies.potential import ContactPotential, HessianBlocks
 

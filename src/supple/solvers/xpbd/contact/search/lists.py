@@ -12,11 +12,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.search.patch_search import PatchSearch
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.memory import ContactMemory, ListMemory
 from supple.solvers.xpbd.contact.pairs import SHAPE, Pairs, describe_pairs, near_pairs
 from supple.solvers.xpbd.contact.search.overlaps import Overlaps
-from supple.solvers.xpbd.contact.search.patch_search import PatchSearch
 from supple.solvers.xpbd.contact.search.surface import RowSurface
 from supple.solvers.xpbd.contact.shapes import RowShapes
 
@@ -51,7 +51,7 @@ class Lists:
     def __init__(self, surface: RowSurface, shapes: RowShapes, gap: float) -> None:
         self._surface, self._shapes, self._gap = surface, shapes, gap
         self._edge = surface.edge_length
-        self._search = PatchSearch(surface)
+        self._search = PatchSearch(surface.parts, surface.patches)
         self._left = np.zeros(surface.count, dtype=np.bool_)
         self._collide, self._on_shapes = surface.simplices.collide.copy(), shapes.collide
         self._fixed = shapes.described()
@@ -190,20 +190,22 @@ class Lists:
         if nodes is None:
             wide.x, wide.v = x[:, :3].copy(), v.copy()
             wide.age, wide.until = 0.0, time
-            asked = np.ones(len(p.owner), dtype=np.bool_)
+            asked = None
             at = wide.x
         else:
             wide.v[nodes] = v[nodes]
             wide.x[nodes] = x[nodes, :3] - wide.age * v[nodes]
-            asked = _asked(nodes, p.node_start, p.nodes)
+            asked = _asked(nodes[self._surface.simplices.nodes], p.corners)
             at = wide.x + wide.age * wide.v
         way = (wide.until - wide.age) * wide.v
         found = self._search.find(at, way, self._gap + 2.0 * WIDE * self._edge, asked)
-        parts = (p.patch_of_point, p.patch_of_triangle), (p.patch_of_edge, p.patch_of_edge)
+        parts = (p.of_point, p.of_triangle), (p.of_edge, p.of_edge)
         kept = []
         for old, (one, other), new in zip((self._points, self._edges), parts, found, strict=True):
-            stays = ~(asked[one[old[:, 0]]] | asked[other[old[:, 1]]])
-            kept.append(np.concatenate([old[stays], new]))
+            kept.append(new)
+            if asked is not None:
+                stays = ~(asked[one[old[:, 0]]] | asked[other[old[:, 1]]])
+                kept[-1] = np.concatenate([old[stays], new])
         self._points, self._edges = kept
         self._on_walls = np.column_stack(self._walls(at, way, frames))
         self._describe()
@@ -315,12 +317,12 @@ def _deviating(x, begin, v, age, nodes, margin, left):
 
 
 @njit(cache=True)
-def _asked(left, start, nodes):
-    """(q,) the patches with a node that is in `left` (N,)."""
-    out = np.zeros(len(start) - 1, dtype=np.bool_)
+def _asked(left, corners):
+    """(q,) the patches with a corner that has left its place (s,)."""
+    out = np.zeros(len(corners.start) - 1, dtype=np.bool_)
     for q in range(len(out)):
-        for k in range(start[q], start[q + 1]):
-            out[q] = out[q] or left[nodes[k]]
+        for k in range(corners.start[q], corners.start[q + 1]):
+            out[q] = out[q] or left[corners.items[k]]
     return out
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.distances import point_triangle_square
+from supple.contact.search.distances import point_triangle_square
 from supple.contact.start.surfaces import winding_number
 from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle
 from supple.numerics.mat3 import dot, row, subtract

@@ -1,11 +1,8 @@
-"""The surfaces of a scene on the nodes of the solver, and their division into patches.
+"""The surfaces of a scene on the nodes of the solver.
 
 Nodes are the rows of the solver's arrays: the vertices, then the anchors of stitches, then the vertices of obstacles
 that have triangles. Whatever touches is a node, so that one kernel serves bodies and obstacles; what is held or follows
 a script has the inverse mass zero.
-
-A patch is a group of neighbouring triangles of one thing. Every point and every edge belongs to the first patch that
-has it. Searches compare patches, then what patches own.
 """
 
 from __future__ import annotations
@@ -18,41 +15,15 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
 from supple.contact.mesh.obstacles import ObstacleRange, with_obstacles
+from supple.contact.search.patches import Parts, Patches
 from supple.model.system import System
-from supple.numerics.adjacency import Adjacency, adjacency
-from supple.numerics.sparse.partition import bisected_groups
 from supple.scene.contact_pairs import pair_table
 from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 
-# Triangles of a patch. With 8 or 32, searches of `bears` take 10 to 20 % longer.
-PATCH = 16
 # Of the gap between surfaces: that from obstacles that are given by a formula, so that what stands on a table looks so.
 # A fifth of it is what rows may leave over.
 ON_SOLIDS = 0.1
-
-
-class Patches(NamedTuple):
-    """q patches: starts (q + 1,) and items of their triangles, edges and points, the owner (q,) of each, and nodes.
-
-    Attributes
-    ----------
-    node_start, nodes : all nodes of a patch's triangles
-    patch_of_edge, patch_of_point, patch_of_triangle : the patch of each part
-    """
-
-    owner: NDArray[np.int32]
-    triangle_start: NDArray[np.int32]
-    triangles: NDArray[np.int32]
-    edge_start: NDArray[np.int32]
-    edges: NDArray[np.int32]
-    point_start: NDArray[np.int32]
-    points: NDArray[np.int32]
-    node_start: NDArray[np.int32]
-    nodes: NDArray[np.int32]
-    patch_of_triangle: NDArray[np.int32]
-    patch_of_edge: NDArray[np.int32]
-    patch_of_point: NDArray[np.int32]
 
 
 class Simplices(NamedTuple):
@@ -63,7 +34,6 @@ class Simplices(NamedTuple):
     nodes : (s,) the node of each point; triangles : (f, 3), edges : (e, 2) nodes
     owner : (N,) the body or obstacle of each node, -1 for nodes that are on no surface
     collide : (p, p) which owners may touch; friction, gaps : (p, p), gaps that are kept [m]
-    excluded_triangles : of each point, excluded_edges : of each edge, what it never touches (see `StitchFilter`)
     rest : (N, 3) places at rest [m]
     first : (f, 6) whether a triangle is the first of those with its corner j, and with the side across from it
     """
@@ -75,8 +45,6 @@ class Simplices(NamedTuple):
     collide: NDArray[np.bool_]
     friction: NDArray[np.float64]
     gaps: NDArray[np.float64]
-    excluded_triangles: Adjacency
-    excluded_edges: Adjacency
     rest: NDArray[np.float64]
     first: NDArray[np.bool_]
 
@@ -87,6 +55,7 @@ class RowSurface:
 
     Attributes
     ----------
+    parts : the same arrays as a search takes them; patches : of them
     closed : (p,) which things have a closed surface
     count : number of nodes; first : the first node of obstacles
     anchors : (o, 3) of the obstacles' nodes at time 0 [m]; of_anchor : (o,) their obstacle
@@ -96,8 +65,9 @@ class RowSurface:
     """
 
     simplices: Simplices
-    closed: NDArray[np.bool_]
+    parts: Parts
     patches: Patches
+    closed: NDArray[np.bool_]
     count: int
     first: int
     anchors: NDArray[np.float64]
@@ -158,7 +128,6 @@ def row_surface(
         np.ascontiguousarray(mesh.collide),
         np.ascontiguousarray(pair_table(system.scene).friction),
         _gaps(system, gap),
-        *_excluded(mesh),
         rest,
         _is_first(mesh),
     )
@@ -166,8 +135,9 @@ def row_surface(
     closed[mesh.owner[mesh.edges[np.diff(mesh.edge_triangles.start) != 2, 0]]] = False
     return RowSurface(
         simplices,
+        Parts(nodes, simplices.triangles, simplices.edges, simplices.collide, *mesh.excluded),
+        mesh.patches,
         closed,
-        _patches(mesh, nodes, rest),
         count,
         n + anchors,
         np.concatenate([np.zeros((0, 3)), *(part.anchors for part in solid)]),
@@ -198,39 +168,3 @@ def _is_first(mesh: ContactMesh) -> NDArray[np.bool_]:
 
 def _numbers(ranges: tuple[ObstacleRange, ...]) -> NDArray[np.int64]:
     return np.concatenate([np.zeros(0, dtype=np.int64), *(np.full(len(part.vertices), part.index) for part in ranges)])
-
-
-def _excluded(mesh: ContactMesh) -> tuple[Adjacency, Adjacency]:
-    if mesh.stitched is not None:
-        return mesh.stitched.triangles_of_point, mesh.stitched.edges_of_edge
-    none = np.zeros(0, dtype=np.int32)
-    return (
-        Adjacency(np.zeros(len(mesh.points) + 1, dtype=np.int32), none),
-        Adjacency(np.zeros(len(mesh.edges) + 1, dtype=np.int32), none),
-    )
-
-
-def _patches(mesh: ContactMesh, nodes: NDArray[np.int32], rest: NDArray[np.float64]) -> Patches:
-    """Groups of near triangles of each thing at rest."""
-    own = mesh.owner[mesh.triangles[:, 0]]
-    centers = rest[nodes][mesh.triangles].mean(axis=1)
-    groups = bisected_groups(centers, own, max(1, -(-len(own) // PATCH)))
-    q = len(groups)
-    patch_of_triangle = np.empty(len(own), dtype=np.int32)
-    owner = np.empty(q, dtype=np.int32)
-    for number, group in enumerate(groups):
-        patch_of_triangle[group], owner[number] = number, own[group[0]]
-    patch_of_edge = _first(mesh.triangle_edges, patch_of_triangle, len(mesh.edges))
-    patch_of_point = _first(mesh.triangles, patch_of_triangle, len(nodes))
-    triangles = adjacency(patch_of_triangle, np.arange(len(own)), q)
-    edges = adjacency(patch_of_edge, np.arange(len(mesh.edges)), q)
-    points = adjacency(patch_of_point, np.arange(len(nodes)), q)
-    of_patch = adjacency(np.repeat(patch_of_triangle, 3), nodes[mesh.triangles].ravel(), q)
-    return Patches(owner, *triangles, *edges, *points, *of_patch, patch_of_triangle, patch_of_edge, patch_of_point)
-
-
-def _first(parts: NDArray[np.int32], patch: NDArray[np.int32], count: int) -> NDArray[np.int32]:
-    """(count,) the lowest patch of the triangles that have each part (f, 3)."""
-    out = np.full(count, len(patch), dtype=np.int32)
-    np.minimum.at(out, parts.ravel(), np.repeat(patch, 3))
-    return out

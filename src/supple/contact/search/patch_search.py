@@ -12,11 +12,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.distances import edge_edge_square, point_triangle_square
+from supple.contact.search.distances import edge_edge_square, point_triangle_square
+from supple.contact.search.patches import Parts, Patches
 from supple.numerics.adjacency import in_list
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.contact.search.surface import RowSurface
 
 # Points and edges of a patch of 16 triangles, at most.
 _SCRATCH = 96
@@ -36,12 +36,13 @@ def _boxes(x, way, nodes, out):
 
 
 @njit(cache=True)
-def _boxes_of_patches(start, items, boxes, out):
+def _boxes_of_patches(triangles, boxes, out):
     for q in range(len(out)):
         for j in range(3):
             low, high = np.inf, -np.inf
-            for k in range(start[q], start[q + 1]):
-                low, high = min(low, boxes[items[k], j]), max(high, boxes[items[k], 3 + j])
+            for k in range(triangles.start[q], triangles.start[q + 1]):
+                t = triangles.items[k]
+                low, high = min(low, boxes[t, j]), max(high, boxes[t, 3 + j])
             out[q, j], out[q, 3 + j] = low, high
 
 
@@ -89,18 +90,18 @@ def _edges_near(x, way, edges, e, f, reach):
 
 
 @njit
-def _reaching(start, items, q, boxes, other, o, reach, out):
+def _reaching(lists, q, boxes, other, o, reach, out):
     """The parts of patch q that reach into a box; returns their number."""
     count = 0
-    for k in range(start[q], start[q + 1]):
-        if _meet(boxes, items[k], other, o, reach):
-            out[count] = items[k]
+    for k in range(lists.start[q], lists.start[q + 1]):
+        if _meet(boxes, lists.items[k], other, o, reach):
+            out[count] = lists.items[k]
             count += 1
     return count
 
 
 @njit(cache=True)
-def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_points, out_edges):
+def search_patches(x, way, reach, asked, parts, patches, boxes, order, out_points, out_edges):
     """List pairs with a part in a patch that is asked (q,). Returns the numbers of both kinds, which may not fit.
 
     Parameters
@@ -110,7 +111,7 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_p
     out_points : (k, 2) points and triangles; out_edges : (l, 2) edges, the lower first
     """
     of_points, of_triangles, of_edges, of_patches, axis = boxes
-    s, p = simplices, patches
+    s, p = parts, patches
     one, other = np.empty(_SCRATCH, dtype=np.int32), np.empty(_SCRATCH, dtype=np.int32)
     points = edges = 0
     for first in range(len(order)):
@@ -125,10 +126,10 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_p
                 continue
             for turn in range(1 if a == b else 2):
                 u, w = (a, b) if turn == 0 else (b, a)
-                m = _reaching(p.point_start, p.points, u, of_points, of_patches, w, reach, one)
+                m = _reaching(p.points, u, of_points, of_patches, w, reach, one)
                 if m == 0:
                     continue
-                n = _reaching(p.triangle_start, p.triangles, w, of_triangles, of_patches, u, reach, other)
+                n = _reaching(p.triangles, w, of_triangles, of_patches, u, reach, other)
                 for i in range(m):
                     k = one[i]
                     v = s.nodes[k]
@@ -143,8 +144,8 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_p
                         if points < len(out_points):
                             out_points[points, 0], out_points[points, 1] = k, t
                         points += 1
-            m = _reaching(p.edge_start, p.edges, a, of_edges, of_patches, b, reach, one)
-            n = _reaching(p.edge_start, p.edges, b, of_edges, of_patches, a, reach, other) if m else 0
+            m = _reaching(p.edges, a, of_edges, of_patches, b, reach, one)
+            n = _reaching(p.edges, b, of_edges, of_patches, a, reach, other) if m else 0
             for i in range(m):
                 e = one[i]
                 c, d = s.edges[e, 0], s.edges[e, 1]
@@ -164,30 +165,42 @@ def search_patches(x, way, reach, asked, simplices, patches, boxes, order, out_p
 
 
 class PatchSearch:
-    """Searches a surface; keeps the memory of its results."""
+    """Searches surfaces; keeps the memory of its results."""
 
-    def __init__(self, surface: RowSurface) -> None:
-        s, p = surface.simplices, surface.patches
-        self._surface = surface
-        self._parts = s.nodes[:, None], s.triangles, s.edges
-        self._boxes = [np.empty((len(part), 6)) for part in (*self._parts, p.owner)]
+    def __init__(self, parts: Parts, patches: Patches) -> None:
+        self._parts, self._patches = parts, patches
+        self._simplices = parts.nodes[:, None], parts.triangles, parts.edges
+        self._boxes = [np.empty((len(rows), 6)) for rows in (*self._simplices, patches.owner)]
         self._room = [np.empty((1024, 2), dtype=np.int32) for _ in range(2)]
 
     def find(
-        self, x: NDArray[np.float64], way: NDArray[np.float64], reach: float, asked: NDArray[np.bool_]
+        self, x: NDArray[np.float64], way: NDArray[np.float64], reach: float, asked: NDArray[np.bool_] | None = None
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """(k, 2) points and triangles, (l, 2) edges; see the module."""
-        s, p = self._surface.simplices, self._surface.patches
-        for part, boxes in zip(self._parts, self._boxes, strict=False):
-            _boxes(x, way, part, boxes)
+        """(k, 2) points and triangles, (l, 2) edges, the lower first; see the module.
+
+        Parameters
+        ----------
+        x, way : (N, 3) [m]; reach : [m]; asked : (q,) patches of one side of every pair, None for all
+        """
+        p = self._patches
+        asked = np.ones(len(p.owner), dtype=np.bool_) if asked is None else asked
+        for rows, boxes in zip(self._simplices, self._boxes, strict=False):
+            _boxes(x, way, rows, boxes)
         of_patches = self._boxes[3]
-        _boxes_of_patches(p.triangle_start, p.triangles, self._boxes[1], of_patches)
+        _boxes_of_patches(p.triangles, self._boxes[1], of_patches)
         axis = int(np.argmax(of_patches[:, 3:].max(axis=0) - of_patches[:, :3].min(axis=0))) if len(of_patches) else 0
         order = np.argsort(of_patches[:, axis], kind="stable")
         boxes = (*self._boxes, axis)
         while True:
-            counts = search_patches(x, way, reach, asked, s, p, boxes, order, *self._room)
+            counts = search_patches(x, way, reach, asked, self._parts, p, boxes, order, *self._room)
             if all(count <= len(room) for count, room in zip(counts, self._room, strict=True)):
                 break
             self._room = [np.empty((count + count // 2 + 64, 2), dtype=np.int32) for count in counts]
         return self._room[0][: counts[0]].copy(), self._room[1][: counts[1]].copy()
+
+
+def pairs_nearer(
+    x: NDArray[np.float64], parts: Parts, patches: Patches, reach: float
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Pairs of points with triangles, and of edges, that are not farther apart than `reach` [m] at x (N, 3)."""
+    return PatchSearch(parts, patches).find(x, np.zeros_like(x), reach)
