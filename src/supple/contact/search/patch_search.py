@@ -24,7 +24,7 @@ _SCRATCH = 96
 
 @njit(cache=True)
 def _boxes(x, way, nodes, out):
-    """Write the box that each part (m, k) of nodes sweeps to out (m, 6)."""
+    """Write the box that each part (m, k) of nodes sweeps to out (6, m): the low corner, then the high one."""
     for e in range(len(nodes)):
         for j in range(3):
             low, high = np.inf, -np.inf
@@ -32,27 +32,35 @@ def _boxes(x, way, nodes, out):
                 a = x[nodes[e, k], j]
                 b = a + way[nodes[e, k], j]
                 low, high = min(low, min(a, b)), max(high, max(a, b))
-            out[e, j], out[e, 3 + j] = low, high
+            out[j, e], out[3 + j, e] = low, high
 
 
 @njit(cache=True)
-def _boxes_of_patches(triangles, boxes, out):
-    for q in range(len(out)):
+def _boxes_of_patches(start, boxes, out):
+    for q in range(len(start) - 1):
         for j in range(3):
-            low, high = np.inf, -np.inf
-            for k in range(triangles.start[q], triangles.start[q + 1]):
-                t = triangles.items[k]
-                low, high = min(low, boxes[t, j]), max(high, boxes[t, 3 + j])
-            out[q, j], out[q, 3 + j] = low, high
+            out[j, q] = boxes[j, start[q] : start[q + 1]].min()
+            out[3 + j, q] = boxes[3 + j, start[q] : start[q + 1]].max()
 
 
-@njit(inline="always")
-def _meet(a, i, b, j, reach):
-    return (
-        a[i, 0] - reach <= b[j, 3] and b[j, 0] - reach <= a[i, 3]
-        and a[i, 1] - reach <= b[j, 4] and b[j, 1] - reach <= a[i, 4]
-        and a[i, 2] - reach <= b[j, 5] and b[j, 2] - reach <= a[i, 5]
-    )  # fmt: skip
+@njit
+def _meeting(box, i, boxes, first, last, reach, hits, out):
+    """List which of the boxes from `first` to `last` come nearer to box i than `reach`; returns their number.
+
+    The first loop has no branch, so that it is compiled to vector instructions.
+    """
+    a, b, c = box[0, i] - reach, box[1, i] - reach, box[2, i] - reach
+    d, e, f = box[3, i] + reach, box[4, i] + reach, box[5, i] + reach
+    n = last - first
+    x, y, z = boxes[0, first:last], boxes[1, first:last], boxes[2, first:last]
+    u, v, w = boxes[3, first:last], boxes[4, first:last], boxes[5, first:last]
+    for j in range(n):
+        hits[j] = (x[j] <= d) & (y[j] <= e) & (z[j] <= f) & (u[j] >= a) & (v[j] >= b) & (w[j] >= c)
+    count = 0
+    for j in range(n):
+        out[count] = j
+        count += hits[j]
+    return count
 
 
 @njit(inline="always")
@@ -90,13 +98,14 @@ def _edges_near(x, way, edges, e, f, reach):
 
 
 @njit
-def _reaching(lists, q, boxes, other, o, reach, out):
-    """The parts of patch q that reach into a box; returns their number."""
-    count = 0
-    for k in range(lists.start[q], lists.start[q + 1]):
-        if _meet(boxes, lists.items[k], other, o, reach):
-            out[count] = lists.items[k]
-            count += 1
+def _reaching(box, i, boxes, first, last, reach, room):
+    """List the parts of a patch, `first` to `last`, that reach into a box, and their boxes; returns their number."""
+    hits, items, taken = room
+    count = _meeting(box, i, boxes, first, last, reach, hits, items)
+    for k in range(count):
+        items[k] += first
+        for j in range(6):
+            taken[j, k] = boxes[j, items[k]]
     return count
 
 
@@ -107,36 +116,38 @@ def search_patches(x, way, reach, asked, parts, patches, boxes, order, out_point
     Parameters
     ----------
     x, way : (N, >= 3) of the nodes [m]; reach : [m]
-    boxes : of points, triangles, edges and patches; order : (q,) patches by the low end of their box along `axis`
+    boxes : of points, triangles and edges in the order of their patches, and of patches
+    order : (q,) patches by the low end of their box along `axis`
     out_points : (k, 2) points and triangles; out_edges : (l, 2) edges, the lower first
     """
     of_points, of_triangles, of_edges, of_patches, axis = boxes
     s, p = parts, patches
-    one, other = np.empty(_SCRATCH, dtype=np.int32), np.empty(_SCRATCH, dtype=np.int32)
+    hits, near = np.empty(_SCRATCH, dtype=np.uint8), np.empty(_SCRATCH, dtype=np.int64)
+    one = np.empty(_SCRATCH, np.uint8), np.empty(_SCRATCH, np.int64), np.empty((6, _SCRATCH))
+    other = np.empty(_SCRATCH, np.uint8), np.empty(_SCRATCH, np.int64), np.empty((6, _SCRATCH))
     points = edges = 0
     for first in range(len(order)):
         a = order[first]
         for second in range(first, len(order)):
             b = order[second]
-            if of_patches[b, axis] - reach > of_patches[a, 3 + axis]:
+            if of_patches[axis, b] - reach > of_patches[3 + axis, a]:
                 break
             if not (asked[a] or asked[b]) or not s.collide[p.owner[a], p.owner[b]]:
                 continue
-            if not _meet(of_patches, a, of_patches, b, reach):
+            if _meeting(of_patches, a, of_patches, b, b + 1, reach, hits, near) == 0:
                 continue
             for turn in range(1 if a == b else 2):
                 u, w = (a, b) if turn == 0 else (b, a)
-                m = _reaching(p.points, u, of_points, of_patches, w, reach, one)
+                m = _reaching(of_patches, w, of_points, p.points.start[u], p.points.start[u + 1], reach, one)
                 if m == 0:
                     continue
-                n = _reaching(p.triangles, w, of_triangles, of_patches, u, reach, other)
+                start, stop = p.triangles.start[w], p.triangles.start[w + 1]
+                n = _reaching(of_patches, u, of_triangles, start, stop, reach, other)
                 for i in range(m):
-                    k = one[i]
+                    k = p.points.items[one[1][i]]
                     v = s.nodes[k]
-                    for j in range(n):
-                        t = other[j]
-                        if not _meet(of_points, k, of_triangles, t, reach):
-                            continue
+                    for j in range(_meeting(one[2], i, other[2], 0, n, reach, hits, near)):
+                        t = p.triangles.items[other[1][near[j]]]
                         if v in (s.triangles[t, 0], s.triangles[t, 1], s.triangles[t, 2]):
                             continue
                         if not _point_near(x, way, v, s.triangles, t, reach) or in_list(s.excluded_triangles, k, t):
@@ -144,15 +155,14 @@ def search_patches(x, way, reach, asked, parts, patches, boxes, order, out_point
                         if points < len(out_points):
                             out_points[points, 0], out_points[points, 1] = k, t
                         points += 1
-            m = _reaching(p.edges, a, of_edges, of_patches, b, reach, one)
-            n = _reaching(p.edges, b, of_edges, of_patches, a, reach, other) if m else 0
+            m = _reaching(of_patches, b, of_edges, p.edges.start[a], p.edges.start[a + 1], reach, one)
+            n = _reaching(of_patches, a, of_edges, p.edges.start[b], p.edges.start[b + 1], reach, other) if m else 0
             for i in range(m):
-                e = one[i]
+                e = p.edges.items[one[1][i]]
                 c, d = s.edges[e, 0], s.edges[e, 1]
-                for j in range(i + 1 if a == b else 0, n):
-                    f = other[j]
-                    if not _meet(of_edges, e, of_edges, f, reach):
-                        continue
+                start = i + 1 if a == b else 0
+                for j in range(_meeting(one[2], i, other[2], start, n, reach, hits, near)):
+                    f = p.edges.items[other[1][start + near[j]]]
                     g, h = s.edges[f, 0], s.edges[f, 1]
                     if c in (g, h) or d in (g, h):
                         continue
@@ -169,8 +179,10 @@ class PatchSearch:
 
     def __init__(self, parts: Parts, patches: Patches) -> None:
         self._parts, self._patches = parts, patches
-        self._simplices = parts.nodes[:, None], parts.triangles, parts.edges
-        self._boxes = [np.empty((len(rows), 6)) for rows in (*self._simplices, patches.owner)]
+        p = patches
+        points, triangles = parts.nodes[p.points.items, None], parts.triangles[p.triangles.items]
+        self._simplices = points, triangles, parts.edges[p.edges.items]
+        self._boxes = [np.empty((6, len(rows))) for rows in (*self._simplices, p.owner)]
         self._room = [np.empty((1024, 2), dtype=np.int32) for _ in range(2)]
 
     def find(
@@ -187,9 +199,9 @@ class PatchSearch:
         for rows, boxes in zip(self._simplices, self._boxes, strict=False):
             _boxes(x, way, rows, boxes)
         of_patches = self._boxes[3]
-        _boxes_of_patches(p.triangles, self._boxes[1], of_patches)
-        axis = int(np.argmax(of_patches[:, 3:].max(axis=0) - of_patches[:, :3].min(axis=0))) if len(of_patches) else 0
-        order = np.argsort(of_patches[:, axis], kind="stable")
+        _boxes_of_patches(p.triangles.start, self._boxes[1], of_patches)
+        axis = int(np.argmax(of_patches[3:].max(axis=1) - of_patches[:3].min(axis=1))) if len(p.owner) else 0
+        order = np.argsort(of_patches[axis], kind="stable")
         boxes = (*self._boxes, axis)
         while True:
             counts = search_patches(x, way, reach, asked, self._parts, p, boxes, order, *self._room)

@@ -105,7 +105,7 @@ class Watch:
         def checked(ws, damping, targets, end, h, last) -> None:
             substep(ws, damping, targets, end, h, last)
             asleep = np.zeros(len(ws.system.bodies), dtype=np.bool_)
-            found = ws.assessment.overlaps(np.ascontiguousarray(ws.points[:, :3] + ws.origins), end, asleep)
+            found = ws.assessment.surfaces.find(np.ascontiguousarray(ws.points[:, :3] + ws.origins), end, asleep)
             self.crossing.append(sum(each.pairs for each in found))
             edges = ws.points[ws.system.tets[:, 1:], :3] - ws.points[ws.system.tets[:, :1], :3]
             self.least.append(float((np.linalg.det(edges) / (6.0 * ws.system.rest_volumes)).min()))

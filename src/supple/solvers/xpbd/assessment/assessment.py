@@ -48,7 +48,7 @@ class Assessment:
         self.system = system
         self.softening = Softening(system)
         self.balance = EnergyBalance(system, edge_length)
-        self._surfaces = SurfaceCheck(system, settings, edge_length)
+        self.surfaces = SurfaceCheck(system, settings, edge_length)
         self._ledger = Ledger()
 
     def begin(self, moment: Moment, J: NDArray[np.float64], h: float, ledger: Ledger | None) -> NDArray[np.bool_]:
@@ -66,14 +66,10 @@ class Assessment:
             sound[part.tets] = part.name not in tangled
         return sound
 
-    def overlaps(self, world: NDArray[np.float64], time: float, asleep: NDArray[np.bool_]) -> list[Overlap]:
-        """What is through what at world positions (n, 3) [m] and a time [s]; see `SurfaceCheck.find`."""
-        return self._surfaces.find(world, time, asleep)
-
     def end(
         self,
         moment: Moment,
-        world: NDArray[np.float64],
+        overlaps: list[Overlap],
         J: NDArray[np.float64],
         h: float,
         accuracy: float,
@@ -86,7 +82,7 @@ class Assessment:
 
         Parameters
         ----------
-        world : (n, 3) positions in the world [m]; J : (m,) of all tets
+        overlaps : of surfaces and obstacles; J : (m,) of all tets
         h : length of the substeps [s]; accuracy : how much stiffness a body may lack
         held : the share of the substeps in which the motion of bodies was shortened
         asleep : (b,) bodies that did not move; works : of the frame, by name [J]
@@ -101,7 +97,7 @@ class Assessment:
         lacks = zip(self.softening.shares(h, measured).tolist(), self.softening.names, strict=True)
         findings = Findings(
             inverted=count_inverted(self.system, J, tangled),
-            overlaps=self._surfaces.find(world, moment.time, asleep),
+            overlaps=overlaps,
             held=held,
             gained=excess / (scale + excess) if excess > 0.0 else 0.0,
             gainer=self.system.bodies[gainer].name,

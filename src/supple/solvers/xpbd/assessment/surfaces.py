@@ -156,12 +156,24 @@ class SurfaceCheck:
         known, at, slept, found = self._last
         moved = self._obstacles_move and time != at
         if moved or not np.array_equal(slept, asleep) or not np.array_equal(known, x):
-            still = np.ones(len(self._names), dtype=np.bool_)
-            still[: len(asleep)] = asleep
-            collide = self._collide & ~(still[:, None] & still)
+            collide = self._awake(asleep)
             found = [*(self._crossings(x, time, collide) if self._may_cross else ()), *self.depths(x, time, collide)]
             self._last = (x.copy(), time, asleep.copy(), found)
         return found
+
+    def find_kept_apart(self, x: NDArray[np.float64], time: float, asleep: NDArray[np.bool_]) -> list[Overlap]:
+        """`find` after a frame in which the guarantee of contact held: surfaces are tested only if there are seams."""
+        if self._seams is not None:
+            return self.find(x, time, asleep)
+        found = self.depths(x, time, self._awake(asleep))
+        self._last = (x.copy(), time, asleep.copy(), found)
+        return found
+
+    def _awake(self, asleep: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(p, p) the pairs that must stay apart and of which one may have moved."""
+        still = np.ones(len(self._names), dtype=np.bool_)
+        still[: len(asleep)] = asleep
+        return self._collide & ~(still[:, None] & still)
 
     def _crossings(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_]) -> list[Overlap]:
         R, t = self._poses.at(time)

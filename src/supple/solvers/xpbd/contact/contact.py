@@ -101,7 +101,7 @@ class Contact:
         self._frames = self._shapes.frames(0.0, np.zeros(3)), self._shapes.frames(0.0, np.zeros(3))
         self._walls: Walls = no_walls()
         self._names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
-        self.counts = RowCounts()
+        self.counts, self._began_apart = RowCounts(), False
         self.forces = FrameForces(self._names, surface.points)
 
     def __bool__(self) -> bool:
@@ -112,6 +112,14 @@ class Contact:
     def rigid_points(self) -> int:
         """Number of points of rigid bodies' surfaces."""
         return len(self._surface.embedded[0]) if self else 0
+
+    @property
+    def kept_apart(self) -> bool:
+        """Whether nothing was through something where the frame began, and nothing was crushed since.
+
+        Then nothing crosses; see docs/theory/contact.md.
+        """
+        return self._began_apart and not self.counts.crushed
 
     @property
     def smallest_gap(self) -> float | None:
@@ -143,6 +151,7 @@ class Contact:
         still = np.ones(len(self._names), dtype=np.bool_)
         still[: len(asleep)] = asleep
         overlaps = find_overlaps(self._surface.simplices, self._surface.closed, self.nodes.x, crossing)
+        self._began_apart = not overlaps.crossing.any()
         self._lists.begin_frame(memory, self.nodes.begin, origin, self._h, still, overlaps)
 
     def guard(self, sound: NDArray[np.bool_]) -> None:

@@ -99,7 +99,13 @@ def damping_in(ws: XPBDWorkspace, h: float) -> Damping | None:
 
 def overlaps_of(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> list[Overlap]:
     """What is through what at the world positions of the workspace."""
-    return ws.assessment.overlaps(ws.world, time, sleep.asleep) if ws.contact else []
+    return ws.assessment.surfaces.find(ws.world, time, sleep.asleep) if ws.contact else []
+
+
+def overlaps_after(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> list[Overlap]:
+    """The same after the substeps of a frame."""
+    find = ws.assessment.surfaces.find_kept_apart if ws.contact.kept_apart else ws.assessment.surfaces.find
+    return find(ws.world, time, sleep.asleep)
 
 
 def disturbed_bodies(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> NDArray[np.bool_]:
@@ -107,5 +113,5 @@ def disturbed_bodies(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> NDAr
     if not sleep.asleep.any() or sleep.asleep.all():
         return np.zeros(len(sleep.islands), dtype=np.bool_)
     to_world(ws.points, ws.origins, ws.world)
-    crossing = np.array([overlap.numbers for overlap in overlaps_of(ws, time, sleep)], dtype=np.int64).reshape(-1, 2)
+    crossing = np.array([overlap.numbers for overlap in overlaps_after(ws, time, sleep)], dtype=np.int64).reshape(-1, 2)
     return ws.sleep.disturbed(sleep, np.concatenate([ws.contact.forces.pairs(), crossing]))

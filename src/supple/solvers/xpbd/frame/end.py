@@ -10,7 +10,7 @@ from supple.solvers.xpbd.assessment.findings import HELD_TOLERANCE, Findings
 from supple.solvers.xpbd.assessment.softening import enough
 from supple.solvers.xpbd.assessment.surfaces import Overlap, crossings
 from supple.solvers.xpbd.details import XPBDDetails
-from supple.solvers.xpbd.frame.advance import damping_in
+from supple.solvers.xpbd.frame.advance import damping_in, overlaps_after
 from supple.solvers.xpbd.integration import to_world
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.sleep import SleepMemory
@@ -53,7 +53,15 @@ def end_frame(
     measured = softening.after(softening.own(before.measured), delivered, h, sleep.asleep)
     shares = softening.by_body(h, measured)
     findings, ledger = ws.assessment.end(
-        ws.moment(time), ws.world, ws.contact.tets.now, h, accuracy, held, sleep.asleep, works, measured
+        ws.moment(time),
+        overlaps_after(ws, time, sleep),
+        ws.contact.tets.now,
+        h,
+        accuracy,
+        held,
+        sleep.asleep,
+        works,
+        measured,
     )
     joints = {"apart": ws.joints.apart(ws.world, time, accuracy), "stalled": ws.joints.stalled(accuracy)}
     findings = replace(findings, **joints)
