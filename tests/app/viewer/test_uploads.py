@@ -45,9 +45,10 @@ def read(tmp_path, monkeypatch):
     """The work of the child in this process: the tets of the bytes of a file."""
     monkeypatch.chdir(tmp_path)
 
-    def mesh(suffix, content, triangles=20_000):
+    def mesh(suffix, content, triangles=20_000, tets=2000):
         (tmp_path / f"mesh{suffix}").write_bytes(content)
-        job = {"file": f"mesh{suffix}", "size": 1.0, "triangles": triangles, "seconds": 30.0, "memory": None}
+        job = {"file": f"mesh{suffix}", "size": 1.0, "triangles": triangles, "tets": tets}
+        job |= {"seconds": 30.0, "memory": None}
         worker._mesh(job)
         with np.load(worker.MESH) as made:
             return sp.TetMesh(made["vertices"], made["tets"])
@@ -58,6 +59,14 @@ def read(tmp_path, monkeypatch):
 @pytest.mark.parametrize("suffix", limits.UPLOAD_FORMATS)
 def test_every_format_is_read(read, ball, suffix):
     assert read(suffix, ball[suffix]).volume == pytest.approx(np.pi / 6.0, rel=0.15)
+
+
+def test_a_surface_gets_as_many_tets_as_there_is_time_for(read, tmp_path):
+    sphere_surface(radius=1.0, edge_length=0.2).save(tmp_path / "fine.stl")
+    fine = (tmp_path / "fine.stl").read_bytes()
+    few, many = (len(read(".stl", fine, tets=tets).tets) for tets in (600, 2000))
+    assert few < 800
+    assert many > 1500
 
 
 def open_box(text=b"0 0 0"):

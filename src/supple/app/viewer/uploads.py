@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.upload_worker import ANSWER, JOB, MESH
 from supple.errors import MeshError, MeshingError
+from supple.mesh.meshing.child_process import DEFAULT_TETS
 
 # Time between two checks of the child [s].
 _POLL = 0.1
@@ -34,12 +35,14 @@ class Upload:
     ----------
     name : given by the visitor, only for display; suffix : one of `limits.UPLOAD_FORMATS`
     content : its bytes; size : largest extent of the new body [m]
+    tets : about how many it gets at most, where its surface allows so few
     """
 
     name: str
     suffix: str
     content: bytes
     size: float
+    tets: int = DEFAULT_TETS
 
 
 def mesh_of_upload(
@@ -64,6 +67,7 @@ def mesh_of_upload(
         job = {
             "file": stored,
             "size": upload.size,
+            "tets": upload.tets,
             "triangles": limits.MOST_UPLOADED_TRIANGLES,
             "seconds": limits.LONGEST_UPLOAD,
             "memory": limits.UPLOAD_MEMORY,

@@ -36,13 +36,17 @@ def coarser(mesh: TetMesh, tets: int) -> TetMesh | None:
     # A tet of the lattice has a twelfth of the volume of its cell; those at the surface are smaller.
     edge = MEAN_EDGE * (12.0 * volume / tets) ** (1.0 / 3.0)
     edge = min(edge, 0.4 * float((high - low).max()))
+    too_fine = 0.0  # the longest edge that gave too many tets
     for _ in range(_MOST_TRIES):
+        if edge <= too_fine:
+            return None
         try:
             made = _as_large(stuff("coarser", inside, (low, high), edge), volume)
         except MeshError:  # no lattice point is inside
             edge *= _STEP
             continue
         if len(made.tets) > tets:
+            too_fine = edge
             edge *= max((len(made.tets) / tets) ** (1.0 / 3.0), 1.0 / _STEP)
         elif _same_shape(mesh, made, edge):
             return made

@@ -67,9 +67,9 @@ def refuse_too_many(tets: float, memory: int | None) -> None:
         )
 
 
-def automatic_tets(surface: SurfaceMesh) -> int | None:
+def automatic_tets(surface: SurfaceMesh, most: int = DEFAULT_TETS) -> int | None:
     """The number of tets to ask for where nobody has given a size: None, the coarsest mesh, where it has no more."""
-    return DEFAULT_TETS if TETS_OF_TRIANGLE * len(surface.triangles) > DEFAULT_TETS else None
+    return most if TETS_OF_TRIANGLE * len(surface.triangles) > most else None
 
 
 def fill_with_count(

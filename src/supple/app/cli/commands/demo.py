@@ -62,7 +62,7 @@ def demo(
         Show the scene in a browser while it runs, until Ctrl-C, so that it can be dragged and tuned. Nothing is
         recorded.
     full
-        With --live: simulate the meshes as they are, also where that is slower than time.
+        With --live: simulate with the meshes and the solver as they are, also where that is slower than time.
     port
         With --live: port to serve at; without it, 8080 or the next free one.
     open_
@@ -109,7 +109,7 @@ def demo(
         from supple.app.viewer.protocol.live_source import LiveSource
 
         scene, used = chosen.scene(), chosen.solver(solver)
-        serve_page(LiveSource(chosen.name, scene, used, chosen.dt, real_time=not full), port, open_)
+        serve_page(LiveSource(chosen.name, scene, used, chosen.dt, {}, not full, solver is not None), port, open_)
         return ExitCode.OK
 
     from supple.app.cli.session import Products, run_session

@@ -42,8 +42,8 @@ def view(
     solver
         Kind of solver, instead of the file's, with its default parameters.
     full
-        Simulate the meshes as they are. Without this, a scene that would be slower than time gets meshes of fewer tets
-        on the page, with the same skins.
+        Simulate with the meshes and the solver as they are. Without this, a scene that would be slower than time gets
+        meshes of fewer tets on the page, with the same skins, or another solver unless --solver is given.
     port
         Port to serve at; without it, 8080 or the next free one.
     open_
@@ -68,7 +68,7 @@ def view(
     with reading():
         run = load_run(found, ConfinedMeshStore)
     used = run.solver if solver is None else solver_of_kind(solver)
-    live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions, real_time=not full)
+    live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions, not full, solver is not None)
     serve_page(live, port, open_)
 
 

@@ -6,11 +6,15 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from supple.app.viewer.controls.controller import Controller, notify
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import AddMesh
+from supple.app.viewer.protocol.snapshots import Snapshot
 from supple.app.viewer.uploads import Upload, mesh_of_upload
 from supple.errors import CommandError, SuppleError
+from supple.mesh.meshing.child_process import DEFAULT_TETS
 
 _HINT = f"A closed surface, at most {limits.LARGEST_UPLOAD // 2**20} MiB and {limits.MOST_UPLOADED_TRIANGLES} triangles"
 # Characters that are not allowed in names of bodies, see `supple.kinds.checks.check_name`.
@@ -48,10 +52,13 @@ class UploadControls:
             self._refuse(event.client, f"{name}: another file is being meshed; try again when it is done")
             return
         try:
-            upload = checked_upload(name, file.content, self._size())
+            upload = checked_upload(name, file.content, self._size(), tets_in_time(self._controller.snapshot))
             self._show_message(_progress(0.0))
             vertices, tets = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
-            self._controller.send(event.client, lambda: AddMesh(vertices, tets, youngs, body_name(name)))
+            added = self._controller.send(event.client, lambda: AddMesh(vertices, tets, youngs, body_name(name)))
+            if added and upload.tets < DEFAULT_TETS:
+                why = "a scene of more would be slower than time"
+                notify(event.client, "Added", f"{name}: {len(tets):,} tets; {why}", "blue")
         except SuppleError as error:
             self._refuse(event.client, str(error))
         except OSError as error:
@@ -69,7 +76,20 @@ class UploadControls:
             self._message.content, self._message.visible = text, bool(text)
 
 
-def checked_upload(name: str, content: bytes, size: float) -> Upload:
+_FEWEST = 300  # tets of a file: fewer lose its shape
+_SHARE = 0.9  # of the time of a frame that a step may take
+
+
+def tets_in_time(snapshot: Snapshot) -> int:
+    """How many more tets the scene may have to keep up with time, after what a step takes; 300 to 2,000."""
+    scene, step = snapshot.description, 1e-3 * snapshot.timing.step_ms
+    if step <= 0.0 or not scene.n_tets:
+        return DEFAULT_TETS
+    left = _SHARE * float(scene.values.get("dt", 1.0 / 60.0)) / snapshot.speed - step
+    return int(np.clip(left / step * scene.n_tets, _FEWEST, DEFAULT_TETS))
+
+
+def checked_upload(name: str, content: bytes, size: float, tets: int = DEFAULT_TETS) -> Upload:
     """A file from a browser, of a format and a size that are accepted; raises `CommandError` otherwise."""
     suffix = "." + name.rpartition(".")[2].lower()
     if suffix not in limits.UPLOAD_FORMATS:
@@ -77,7 +97,7 @@ def checked_upload(name: str, content: bytes, size: float) -> Upload:
     if not 0 < len(content) <= limits.LARGEST_UPLOAD:
         found = f"{len(content) / 2**20:.3g} MiB" if content else "empty"
         raise CommandError(f"{name}: it is {found}; the limit is {limits.LARGEST_UPLOAD // 2**20} MiB")
-    return Upload(name, suffix, content, size)
+    return Upload(name, suffix, content, size, tets)
 
 
 def _progress(seconds: float) -> str:

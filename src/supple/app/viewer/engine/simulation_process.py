@@ -7,6 +7,8 @@ import logging
 import os
 import signal
 import threading
+import time
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
@@ -63,19 +65,28 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
 
 
 def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
-    """The live scene, or one with lighter meshes where it is slower than time and may have them; and one line."""
+    """The live scene, or where it is slower than time one that is faster; and one line about it."""
     from supple.app.viewer.engine.scene.lightening import lightened
     from supple.app.viewer.engine.scene.live_scene import LiveScene
 
-    source, line = lightened(live) if live.source.real_time else (None, "")
-    if source is None:
+    if not live.source.real_time:
         return live, ""
-    try:
-        lighter = LiveScene(source)
-        lighter.warm_up()
-    except SuppleError:  # its surfaces are others, and may intersect at the start
-        return live, ""
-    return lighter, line
+    for source, line in lightened(live, min(_seconds(live.warm_up) for _ in range(2))):
+        try:
+            lighter = LiveScene(source)
+            lighter.warm_up()
+        except SuppleError:  # its surfaces are others, and may intersect at the start; or the solver lacks something
+            continue
+        if lighter.report.status.can_go_on:
+            return lighter, line
+    return live, ""
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    """How long a call takes; of a process that shares its core, only its own part [s]."""
+    began, own = time.perf_counter(), time.process_time()
+    call()
+    return min(time.perf_counter() - began, time.process_time() - own)
 
 
 def _read(commands: Connection, inbox: CommandQueue) -> None:

@@ -21,7 +21,8 @@ class LiveSource:
     title : of the page
     dt : [s]
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
-    real_time : whether bodies may get lighter meshes where the page would be slower than time
+    real_time : whether bodies may get lighter meshes, or the scene another solver, where it would be slower than time
+    solver_given : whether it stays with its solver
     """
 
     title: str
@@ -30,3 +31,4 @@ class LiveSource:
     dt: float
     initial_positions: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     real_time: bool = False
+    solver_given: bool = False

@@ -2,6 +2,7 @@
 
 import html
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from supple.app.viewer.controls.upload_controls import body_name, printable_name
 from supple.app.viewer.controls.view.overlay import plain
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import AddMesh
+from supple.app.viewer.protocol.snapshots import Timing
 from supple.errors import MeshError
 
 PART = 512 * 1024  # of viser's client
@@ -63,6 +65,7 @@ def give(visitor, live, content, index=0, **changes):
 
 
 def test_an_upload_becomes_a_command(live, fake, visitor, meshed, heard, until):
+    live.controller.snapshot = replace(live.controller.snapshot, timing=Timing())
     visitor.set(live.panel.bodies.size.text, "0.75")
     visitor.set(live.panel.bodies.youngs.handle, 6.0)
     content = bytes(range(256)) * 5000  # three parts
@@ -78,6 +81,18 @@ def test_an_upload_becomes_a_command(live, fake, visitor, meshed, heard, until):
     assert len(command.tets) == 6
     assert heard == []
     until(lambda: not live.panel.upload._busy.locked())
+
+
+def test_a_slow_scene_gets_a_file_with_fewer_tets(live, fake, visitor, meshed, heard, until):
+    snapshot = live.controller.snapshot
+    of_a_tet = 0.01 / snapshot.description.n_tets  # 10 ms in all, of 15 ms that a step may take
+    allowed = 0.9 * (1.0 / 60.0) / snapshot.speed
+    live.controller.snapshot = replace(snapshot, timing=replace(snapshot.timing, step_ms=10.0))
+    announce(visitor, live, b"abc")
+    give(visitor, live, b"abc")
+    until(lambda: heard)
+    assert meshed[0].tets == np.clip(int((allowed - 0.01) / of_a_tet), 300, 2000)
+    assert heard == ["ball.stl: 6 tets; a scene of more would be slower than time"]
 
 
 def test_an_error_in_a_file_is_displayed_and_the_page_continues(live, fake, visitor, meshed, heard, until, monkeypatch):

@@ -1,13 +1,15 @@
-"""Meshes of fewer tets for scenes that would be slower than time on a page."""
+"""Fewer tets, or another solver, for scenes that would be slower than time on a page."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import fields, replace
 
 import numpy as np
 
+from supple.app.viewer.engine.scene.costs import allowed, in_substeps
 from supple.app.viewer.engine.scene.live_scene import LiveScene
-from supple.app.viewer.engine.scene.solvers import kind_of
+from supple.app.viewer.engine.scene.solvers import SOLVERS, kind_of
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.materials.elastic_tets.regions import Regions
 from supple.mesh.meshing.coarser import coarser
@@ -17,32 +19,37 @@ from supple.mesh.topology import without_unused
 from supple.scene.body import Body
 from supple.scene.scene import Scene
 
-# What a frame of XPBD takes on one core [s]: at all and for each body, and in each substep for each tet, of one body
-# and of many that touch each other. Measured on an AMD EPYC; see notes/measured_trials.md.
-_FRAME, _BODY, _TET_ALONE, _TET_IN_PILE = 1e-3, 5e-4, 1.3e-7, 3e-7
-_SHARE = 0.9  # of the time of a frame that the solver may take
 _FEWEST = 60  # tets of a body: fewer do not bend
 _LEAST_GAIN = 0.8  # what is not lighter than this is not worth another shape
+# So many substeps for the stiffness of one body take longer than the two to five iterations of `Implicit`.
+_STIFF = 100
 
 
-def lightened(live: LiveScene) -> tuple[LiveSource | None, str]:
-    """The source with lighter meshes, and one line about them; None where the scene keeps up with time, or none helps.
+def lightened(live: LiveScene, measured: float = 0.0) -> Iterator[tuple[LiveSource, str]]:
+    """Sources that keep up with time, or nearly, and one line about each, the best one first.
+
+    There is none where the scene keeps up with time, or nothing helps. One stiff body gets the solver `Implicit`.
 
     Bodies that something refers to, such as a pin or a stitch, keep their meshes, and so do bodies with several
     materials, with quadratic tets or with a deformed start. Skins stay; a body without one is drawn with its surface.
 
     Parameters
     ----------
-    live : after a step, which tells the number of substeps
+    live : after a step, which tells the number of substeps; measured : what a step takes [s], where that is known
     """
-    source, scene = live.source, live.source.scene
+    source, scene, substeps = live.source, live.source.scene, live.report.iterations
     tets, bodies = len(live.system.tets), len(scene.bodies)
-    in_step = live.report.iterations * tets * (_TET_ALONE if bodies == 1 else _TET_IN_PILE)
-    allowed = max(_SHARE * source.dt - _FRAME - _BODY * bodies, 0.1 * source.dt)
-    if kind_of(source.solver) != "xpbd" or in_step <= allowed:
-        return None, ""
+    taken, may_take = max(in_substeps(live.system, substeps), measured), allowed(live.system, source.dt)
+    if kind_of(source.solver) != "xpbd" or taken <= may_take:
+        return
+    if bodies == 1 and substeps > _STIFF and not source.solver_given:
+        line = (
+            f"the page simulates with Implicit: XPBD takes {substeps} substeps a frame for so stiff a body, and more "
+            "time; supple view --full keeps the solver"
+        )
+        yield replace(source, solver=SOLVERS["implicit"]()), line
     # The number of substeps falls with the length of edges: with the third root of the number of tets.
-    share = (allowed / in_step) ** 0.75
+    share = (may_take / taken) ** 0.75
     made: dict[int, TetMesh | None] = {}
     changed = []
     for body in scene.bodies:
@@ -56,12 +63,12 @@ def lightened(live: LiveScene) -> tuple[LiveSource | None, str]:
         changed.append(body)
     fewer = sum(len(body.mesh.tets) for body in changed)
     if fewer > _LEAST_GAIN * tets:
-        return None, ""
+        return
     line = (
         f"the page simulates {fewer:,} tets instead of {tets:,}, with the same skins, to keep up with time; "
         "supple view --full keeps the meshes"
     )
-    return replace(source, scene=replace(scene, bodies=changed)), line
+    yield replace(source, scene=replace(scene, bodies=changed)), line
 
 
 def _is_free(body: Body, source: LiveSource) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.app.viewer.engine.scene.costs import without_long_repetitions
 from supple.app.viewer.engine.scene.grab_spring import GrabSpring, grabbed, make_spring, workspace_for
 from supple.app.viewer.engine.scene.new_bodies import moved_apart
 from supple.app.viewer.engine.scene.pusher import Pusher
@@ -106,6 +107,7 @@ class LiveScene:
         self.workspace: Any = None
         self._anchors: Anchors = {}
         self._start: Start | None = None
+        self._usual: tuple[int, int] | None = None  # a revision, and the iterations of its first step
         self.adopt(Setup(source.scene, source.solver, source.dt), initial_state(source.scene, self.starts), anchors={})
         self._keep_start()
 
@@ -231,11 +233,20 @@ class LiveScene:
         spring.begin_step(self.system, self.state, self.setup.dt, anchors)
 
     def _stepped(self) -> tuple[State, StepReport]:
-        state, report = self.setup.solver.step(self.system, self.state, self.setup.dt, self.workspace)
+        state, report = self._frame_solver().step(self.system, self.state, self.setup.dt, self.workspace)
+        if self._usual is None or self._usual[0] != self.revision:
+            self._usual = self.revision, report.iterations
         finite = np.isfinite(state.positions).all() and np.isfinite(state.velocities).all()
         if report.status.can_go_on and not finite:
             report = StepReport(Status.NOT_FINITE, report.iterations, "a position or velocity is not finite")
         return state, report
+
+    def _frame_solver(self) -> Solver:
+        """The solver of the next frame; the first frame of a setup tells what is usual."""
+        setup = self.setup
+        if not self.source.real_time or self._usual is None or self._usual[0] != self.revision:
+            return setup.solver
+        return without_long_repetitions(setup.solver, self.system, setup.dt, self._usual[1])
 
     def reset(self) -> None:
         """Return to the start, with the present bodies, parameters and solver.

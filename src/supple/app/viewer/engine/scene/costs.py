@@ -1,0 +1,36 @@
+"""What a frame of XPBD takes on one core: for choices that keep a page as fast as time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from supple.model.system import System
+from supple.solvers.solver import Solver
+from supple.solvers.xpbd.solver import XPBD
+
+# At all and for each body, and in each substep for each tet, of one body and of many that touch each other [s].
+# Measured on an AMD EPYC; see notes/measured_trials.md.
+_FRAME, _BODY, _TET_ALONE, _TET_IN_PILE = 1e-3, 5e-4, 1.3e-7, 3e-7
+_SHARE = 0.9  # of the time of a frame that the solver may take
+
+
+def in_substeps(system: System, substeps: int) -> float:
+    """The time of the substeps of a frame without contact of a body with itself, about [s]."""
+    return substeps * len(system.tets) * (_TET_ALONE if len(system.bodies) == 1 else _TET_IN_PILE)
+
+
+def allowed(system: System, dt: float) -> float:
+    """The time that the substeps of a frame of `dt` [s] may take [s]."""
+    return max(_SHARE * dt - _FRAME - _BODY * len(system.bodies), 0.1 * dt)
+
+
+def without_long_repetitions(solver: Solver, system: System, dt: float, usual: int) -> Solver:
+    """XPBD that simulates a frame with at most twice the usual number of substeps, or what fits into a frame.
+
+    A body that is pressed against itself may ask for sixteen times as many: each frame then takes half a second, and
+    differs little. Its status says what is left over. Scenes with rigid bodies need more at times.
+    """
+    if not isinstance(solver, XPBD) or solver.substeps != "auto" or any(part.rigid for part in system.bodies):
+        return solver
+    most = max(2 * usual, int(dt / (_TET_IN_PILE * max(1, len(system.tets)))))
+    return replace(solver, max_substeps=most) if most < solver.max_substeps else solver
