@@ -70,7 +70,7 @@ def test_vertices_of_boxes_sheets_and_half_spaces():
     assert np.allclose(np.abs(local), [0.1, 0.2, 0.3], atol=1e-15)
     assert np.unique(np.round(local, 9), axis=0).shape == (8, 3)
     assert plane_offsets(box.anchors - [1, 2, 3], box.triangles).min() == pytest.approx(0.1)
-    axis = plane.anchors[1] - plane.anchors[0]
+    axis = np.cross(*(plane.anchors[1:] - plane.anchors[0]))
     assert np.allclose(plane.anchors[0], [0, -5, 0])
     assert np.allclose(axis / np.linalg.norm(axis), np.array([1, 2, 2]) / 3)
     assert len(plane.triangles) == 0
@@ -78,8 +78,8 @@ def test_vertices_of_boxes_sheets_and_half_spaces():
     assert np.array_equal(triangles.triangles, SHEET.triangles)
     # They follow the bodies' vertices, and are pinned.
     n = 8
-    assert len(system.rest_positions) == n + 8 + 2 + 4
-    assert np.array_equal(system.pinned_vertices, np.arange(n, n + 14))
+    assert len(system.rest_positions) == n + 8 + 3 + 4
+    assert np.array_equal(system.pinned_vertices, np.arange(n, n + 15))
     assert (system.masses > 0.0).all()
 
 

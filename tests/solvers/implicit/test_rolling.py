@@ -79,7 +79,7 @@ def test_a_prism_rolls_down_a_slope_as_a_polygon_that_does_not_bounce(sides, dt)
     rotations = [frame.poses["prism"].rotation for frame in frames_of(sp.Scene([body], obstacles=[plane]), dt, end)]
     turned = -np.unwrap([np.arctan2(R[1, 0], R[0, 0]) for R in rotations])[-1] - slope
     exact = turned_without_bounces(sides, spin_inertia(body), slope, end)
-    assert turned == pytest.approx(exact, rel=0.005 if dt < 0.002 else 0.02)
+    assert turned == pytest.approx(exact, rel=0.005 if dt < 0.002 else 0.03)
     cylinder = 0.5 * G * np.sin(slope) / (1.0 + spin_inertia(body)) * end**2 / RADIUS
     assert 1.0 - exact / cylinder == pytest.approx({24: 0.21, 48: 0.084}[sides], abs=0.005)
 

@@ -58,10 +58,12 @@ _PARALLEL_FROM = 300
 
 @njit(cache=True)
 def barrier_energy(contacts, dhat, stiffness):
-    """E [J]; stiffness : kappa [Pa]."""
+    """E [J], infinite where a point is on a plane or behind it; stiffness : kappa [Pa]."""
     _, _, _, _, distances, weights = contacts
     total = 0.0
     for k in range(len(distances)):
+        if distances[k] <= 0.0:
+            return np.inf
         total += weights[k] * barrier_value(distances[k], dhat)
     return stiffness * total
 

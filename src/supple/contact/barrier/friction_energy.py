@@ -206,7 +206,7 @@ def lagged_slips(
     forces : (k,) normal forces [N]; start : (s, 3) where the step began [m]
     owner : (s,) of the points; coefficients : (p, p) of friction between owners
     """
-    first, second = sides(contacts)
+    first, second = sides(contacts.kinds, contacts.points)
     mu = coefficients[owner[first], owner[second]]
     rough = np.flatnonzero(mu * forces > 0.0)
     c, points = contacts.coefficients[rough], contacts.points[rough]
@@ -220,6 +220,6 @@ def lagged_slips(
     )
 
 
-def sides(contacts: Contacts) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """A point (k,) on the first side of each contact, and one on the second."""
-    return contacts.points[:, 0], np.where(contacts.kinds == EDGE_EDGE, contacts.points[:, 2], contacts.points[:, 1])
+def sides(kinds: NDArray[np.int8], points: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """A point (k,) on the first side of each contact, and one on the second; of kinds (k,) and points (k, 4)."""
+    return points[:, 0], np.where(kinds == EDGE_EDGE, points[:, 2], points[:, 1])

@@ -11,12 +11,13 @@ A second-order expansion of the least distance over the free parameters gives
 with s00, s01, s11 = 0, -E', -E' d for a mode with a parameter and E' / d, 0, 0 for one without. The vectors of
 different modes are perpendicular, so that each mode is a matrix of two rows whose eigenvalues are known. Where
 D_k . c = 0, they are the eigenvalues of H; the projected Hessian leaves the negative ones of each mode out. It is
-positive semi-definite, and larger than H by a positive semi-definite matrix.
+positive semi-definite, and larger than H by a positive semi-definite matrix. The points of a plane are never free, and
+the rest of its matrix is positive semi-definite as it is.
 """
 
 import math
 
-from supple.contact.features.pair_geometry import point_count, tangent_modes
+from supple.contact.features.pair_geometry import VERTEX_PLANE, point_count, tangent_modes
 from supple.runtime.kernel_cache import njit
 
 
@@ -59,6 +60,7 @@ def write_pair_hessian(kind, c, r, d, points, slopes, project, out, first):
     slope, curvature = slopes[0], max(0.0, slopes[1]) if project else slopes[1]
     cc = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3]
     p, D, w, q, F, v = tangent_modes(kind, n, points[0], points[1], points[2], points[3])
+    project = project and kind != VERTEX_PLANE
     s00, s01, s11 = mode_matrix(slope, d, cc, w, project)
     t00, t01, t11 = mode_matrix(slope, d, cc, v, project)
     count = point_count(kind)

@@ -9,7 +9,7 @@ goes over the face, or too far away from the outline to count, the plane loses t
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ class Contacts(NamedTuple):
     ----------
     kinds : (k,) int8, see `supple.contact.features.pair_geometry`
     points : (k, 4) int32, -1 where a kind has fewer
-    coefficients : (k, 4), positive on the first side and negative on the second, sum 0
+    coefficients : (k, 4), positive on the first side and negative on the second, but on planes of any sign; sum 0
     vectors : (k, 3) from the second side's closest point to the first side's [m]; distances : (k,) their lengths
     weights : (k,) areas [m^2]
     """
@@ -40,6 +40,11 @@ class Contacts(NamedTuple):
         """The chosen ones (k,)."""
         kinds, points, coefficients = self.kinds[chosen], self.points[chosen], self.coefficients[chosen]
         return Contacts(kinds, points, coefficients, self.vectors[chosen], self.distances[chosen], self.weights[chosen])
+
+    def joined(self, more: Contacts) -> Contacts:
+        """These contacts, then others."""
+        arrays: list[Any] = [np.concatenate(both) for both in zip(self, more, strict=True)]
+        return Contacts(*arrays)
 
 
 # A weight grows by at least this share of the largest one.

@@ -10,6 +10,7 @@ triangle; R_k = sum_i D_ki x_i is the derivative of r by parameter k, and r . R_
 | vertex and edge | p, a, b | 1, t - 1, -t | t |
 | vertex and triangle | p, a, b, c | 1, u + v - 1, -u, -v | u, v |
 | edge and edge | a, b, c, d | 1 - s, s, t - 1, -t | s, t |
+| vertex and plane | as vertex and triangle, with any u, v | | u, v |
 """
 
 import math
@@ -17,7 +18,7 @@ import math
 from supple.numerics.mat3 import cross, dot, jacobi_rotation, subtract
 from supple.runtime.kernel_cache import njit
 
-VERTEX_VERTEX, VERTEX_EDGE, VERTEX_TRIANGLE, EDGE_EDGE = 0, 1, 2, 3
+VERTEX_VERTEX, VERTEX_EDGE, VERTEX_TRIANGLE, EDGE_EDGE, VERTEX_PLANE = 0, 1, 2, 3, 4
 
 _NONE = (0.0, 0.0, 0.0, 0.0)
 
@@ -71,7 +72,7 @@ def tangent_modes(kind, n, a, b, c, d):
         q = (R[0] / length, R[1] / length, R[2] / length)
         D = (0.0, 1.0 / length, -1.0 / length, 0.0)
         return q, D, 2.0 / (length * length), cross(n, q), _NONE, 0.0
-    if kind == VERTEX_TRIANGLE:
+    if kind in (VERTEX_TRIANGLE, VERTEX_PLANE):
         # D_u = (0, 1, -1, 0) and D_v = (0, 1, 0, -1)
         return _perpendicular_modes(subtract(b, c), subtract(b, d), (0.0, 1.0, -1.0, 0.0), (0.0, 1.0, 0.0, -1.0))
     return _perpendicular_modes(subtract(b, a), subtract(c, d), (-1.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, -1.0))

@@ -122,7 +122,7 @@ def _write_contact(x, v, code, plane, triangles, edges, kinds, points, coefficie
         kinds[k] = VERTEX_TRIANGLE
         t = code
         a, b, c = row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
-        u = _foot(p, a, b, c) if plane else closest_on_triangle(p, a, b, c)
+        u = foot_on_plane(p, a, b, c) if plane else closest_on_triangle(p, a, b, c)
         for i in range(3):
             points[k, i + 1], coefficients[k, i + 1] = triangles[t, i], -u[i]
     elif code < len(triangles) + len(edges):
@@ -137,7 +137,7 @@ def _write_contact(x, v, code, plane, triangles, edges, kinds, points, coefficie
 
 
 @njit
-def _foot(p, a, b, c):
+def foot_on_plane(p, a, b, c):
     """Barycentric coordinates of the point of a triangle's plane that is closest to p."""
     g, h, r = subtract(b, a), subtract(c, a), subtract(p, a)
     n = cross(g, h)

@@ -2,7 +2,7 @@
 
 The implicit solver has one array of positions: the bodies' vertices, and after them the vertices of the obstacles. An
 obstacle's vertices follow their script as pins do, so that a body is pushed out of the way, or a report names what
-blocks it. A half-space has two vertices: a point of its plane, and the tip of its normal.
+blocks it. A half-space has three vertices a, b, c on its plane, whose normal is that of (b - a) x (c - a).
 """
 
 from __future__ import annotations
@@ -127,4 +127,6 @@ def _surface(obstacle: Obstacle, size: float) -> tuple[NDArray[np.float64], NDAr
     if obstacle.plane is None:
         return obstacle.triangles()
     point, normal = obstacle.plane
-    return np.stack([point, point + size * normal]), np.zeros((0, 3), dtype=np.int64)
+    along = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
+    along *= size / np.linalg.norm(along)
+    return np.stack([point, point + along, point + np.cross(normal, along)]), np.zeros((0, 3), dtype=np.int64)

@@ -66,7 +66,7 @@ def start_surfaces(system: System, positions: NDArray[np.float64], time: float) 
     for part in with_obstacles(system)[1]:
         thing, corners = bodies + part.index, part.targets(time)
         if part.is_plane:
-            normal = corners[1] - corners[0]
+            normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
             planes.append((thing, corners[0], normal / np.linalg.norm(normal)))
             continue
         if part.obstacle.is_room:

@@ -3,14 +3,14 @@
 import ipctk
 import numpy as np
 import pytest
-from tests.derivatives import assert_derivatives, assert_slope_two, dense_couplings, differences, gradient_of
+from tests.derivatives import assert_derivatives, dense_couplings, gradient_of
 
 import supple as sp
 from supple.contact.barrier.barrier_energy import barrier_slopes, barrier_value
 from supple.contact.mesh.obstacles import obstacle_positions
 from supple.model.system import build_system, initial_state
 from supple.numerics.svd3 import rotation_variant_svd
-from supple.solvers.implicit.contact.half_spaces import PlaneBarrier, plane_friction
+from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.model import contact_model
 from supple.solvers.implicit.energies.potential import HessianBlocks
 
@@ -88,7 +88,7 @@ def dense_hessian(potential, x, project=False):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_barrier_has_slope_two(kind, seed, size):
     model, x = near_pair(kind, seed, size)
-    barrier = model.barriers(1e4).triangles
+    barrier = Barrier(model.collisions, 1e4)
     assert barrier.value(x) > 0.0
     # Contacts keep their weights while a minimum is searched; that of nearly parallel edges depends on their angle.
     model.collisions.keep_weights(x)
@@ -99,7 +99,7 @@ def test_the_barrier_has_slope_two(kind, seed, size):
 @pytest.mark.parametrize("kind", PAIRS)
 def test_the_barriers_projected_hessian_has_no_negative_eigenvalue(kind):
     model, x = near_pair(kind, 4, 1.0)
-    barrier = model.barriers(1e4).triangles
+    barrier = Barrier(model.collisions, 1e4)
     full, projected = dense_hessian(barrier, x), dense_hessian(barrier, x, True)
     assert np.abs(full - full.T).max() < 1e-9 * np.abs(full).max()
     values = np.linalg.eigvalsh(projected)
@@ -142,7 +142,7 @@ def test_friction_has_slope_two(kind, size, speed):
     across = np.linalg.svd((lagged[:4].mean(axis=0) - lagged[4:8].mean(axis=0))[None])[2][1]
     start[:4] -= speed * SLOW * size * H * across
     start += 1e-2 * SLOW * size * H * rng.normal(size=start.shape)
-    (friction,) = model.frictions(model.barriers(1e4), lagged, start, (0.0, H))
+    (friction,) = model.frictions(1e4, lagged, start, H)
     check_majorizer(friction, lagged, lagged - start, 2.0 * SLOW * size * H)
     d = unit(rng.normal(size=lagged.shape))
     friction.renew(lagged, np.zeros_like(lagged))
@@ -165,24 +165,18 @@ def on_plane(seed, size, friction=0.3, motion=None):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_barrier_of_planes_has_slope_two(seed, size):
     model, x = on_plane(seed, size)
-    barrier = PlaneBarrier(model.planes, 1e4)
+    barrier = Barrier(model.collisions, 1e4)
     assert barrier.value(x) > 0.0
-    d = np.random.default_rng(seed + 100).normal(size=x.shape)
-    # Also by the two points of the plane, which tilt it.
-    assert_slope_two(
-        np.vdot(gradient_of(barrier, x), d), lambda t: differences(barrier, x, d, t)[0], 0.01 * GAP * size, 0.15
-    )
-    d[4:] = d[4]  # the Hessian knows planes that shift
-    rows = slice(0, 12)  # and is asked for the forces on the body
-    exact = (dense_hessian(barrier, x) @ d.ravel())[rows]
-    assert_slope_two(exact, lambda t: differences(barrier, x, d, t)[1].ravel()[rows], 0.01 * GAP * size, 0.15)
+    # Also by the three points of the plane, which tilt it.
+    d = unit(np.random.default_rng(seed + 100).normal(size=x.shape))
+    assert_derivatives(barrier, dense_hessian(barrier, x) @ d.ravel(), x, d, 0.02 * GAP * size, 0.15)
     body = dense_hessian(barrier, x, True)[:12, :12]
     assert np.linalg.eigvalsh(body).min() > -1e-12 * np.abs(body).max()
 
 
 def test_the_barrier_of_planes_pushes_plane_and_body_apart_with_the_same_force():
     model, x = on_plane(7, 1.0)
-    gradient = gradient_of(PlaneBarrier(model.planes, 1e4), x)
+    gradient = gradient_of(Barrier(model.collisions, 1e4), x)
     assert np.linalg.norm(gradient[:4].sum(axis=0)) > 1.0
     assert np.abs(gradient.sum(axis=0)).max() < 1e-9 * np.abs(gradient).max()
     moments = np.cross(x, gradient).sum(axis=0)
@@ -198,14 +192,9 @@ def test_friction_with_planes_has_slope_two(size, speed):
     across = np.cross(normal, rng.normal(size=3))
     start = lagged - speed * SLOW * size * H * across / np.linalg.norm(across)
     start[4:] = lagged[4:]
-    barrier = PlaneBarrier(model.planes, 1e4)
-    friction = plane_friction(barrier, lagged, start, (0.0, H), model.coefficients[:1, 1:], SLOW * size * H)
-    assert friction is not None
+    (friction,) = model.frictions(1e4, lagged, start, H)
     d = rng.normal(size=lagged.shape)
-    d[5:] = 0.0  # of the plane, it is the point that friction knows
-    slips = lagged - start
-    slips[5:] = 0.0
-    check_majorizer(friction, lagged, slips, 2.0 * SLOW * size * H)
+    check_majorizer(friction, lagged, lagged - start, 2.0 * SLOW * size * H)
     friction.renew(lagged, np.zeros_like(lagged))
     d = unit(d)
     assert_derivatives(friction, dense_hessian(friction, lagged) @ d.ravel(), lagged, d, 0.02 * SLOW * size * H, 0.15)
@@ -231,12 +220,12 @@ def test_planes_have_the_friction_that_triangles_have():
     normal = np.asarray(model.obstacles[0].obstacle.normal)  # pyright: ignore[reportAttributeAccessIssue]
     across = np.cross(normal, [0.3, 0.2, -0.8])
     across /= np.linalg.norm(across)
-    barrier = PlaneBarrier(model.planes, 1e4)
+    barrier = Barrier(model.collisions, 1e4)
     reach = SLOW * H
     for share in (0.0, 0.2, 0.99, 1.01, 5.0):
         start = lagged - share * reach * across
-        friction = plane_friction(barrier, lagged, start, (0.0, H), model.coefficients[:1, 1:], reach)
-        assert friction is not None
+        start[4:] = lagged[4:]
+        (friction,) = model.frictions(1e4, lagged, start, H)
         pressing = friction.slips.forces.sum()
         expected = pressing * ipctk.smooth_friction_f0(share * reach, reach)
         assert friction.value(lagged) == pytest.approx(expected, rel=1e-9)

@@ -7,6 +7,7 @@ import supple as sp
 from supple.contact.barrier.barrier_energy import barrier_hessian, barrier_slopes
 from supple.contact.features.pair_geometry import EDGE_EDGE
 from supple.model.system import build_system, initial_state
+from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.model import contact_model
 
 DHAT = 1e-4
@@ -38,8 +39,7 @@ def force_on(model, x, rows):
     """(3,) with the weights of where things are."""
     model.collisions.forget_weights()
     gradient = np.zeros_like(x)
-    for term in model.barriers(KAPPA).terms:
-        term.add_gradient(x, gradient)
+    Barrier(model.collisions, KAPPA).add_gradient(x, gradient)
     return -gradient[rows].sum(axis=0)
 
 
@@ -136,7 +136,7 @@ def test_the_energy_along_a_ridge_is_constant():
         moved = x.copy()
         moved[rows, 2] += z
         model.collisions.forget_weights()
-        energies.append(model.barriers(KAPPA).triangles.value(moved))
+        energies.append(Barrier(model.collisions, KAPPA).value(moved))
     assert min(energies) > 0.5 * max(energies)
 
 
@@ -231,7 +231,7 @@ def test_with_kept_weights_the_energy_is_the_integral_of_the_force(seed):
     model, x = model_of([body], [bumpy(seed)])
     rng = np.random.default_rng(seed)
     x[:4] += (*rng.uniform(-5e-4, 5e-4, 1), 0.0, -9e-4)
-    barrier = model.barriers(KAPPA).triangles
+    barrier = Barrier(model.collisions, KAPPA)
     start = x.copy()
     # Just above the highest place on the way.
     count, width = 2000, 1.8e-3
@@ -264,14 +264,14 @@ def test_with_kept_weights_the_energy_is_the_integral_of_the_force(seed):
 def test_weights_do_not_change_while_they_are_kept():
     model, x, rows = boxes(cube(2), cube(2))
     model.collisions.keep_weights(x)
-    before = model.barriers(KAPPA).triangles.value(x)
+    before = Barrier(model.collisions, KAPPA).value(x)
     moved = x.copy()
     moved[rows] += (1e-6, 0, 1e-6)
-    assert model.barriers(KAPPA).triangles.value(moved) == pytest.approx(before, rel=1e-3)
+    assert Barrier(model.collisions, KAPPA).value(moved) == pytest.approx(before, rel=1e-3)
     moved[rows] += (5e-5, 0, 5e-5)
-    kept = model.barriers(KAPPA).triangles.value(moved.copy())
+    kept = Barrier(model.collisions, KAPPA).value(moved.copy())
     model.collisions.forget_weights()
-    fresh = model.barriers(KAPPA).triangles.value(moved.copy())
+    fresh = Barrier(model.collisions, KAPPA).value(moved.copy())
     assert fresh < 0.8 * kept  # no vertex of an outline is left
 
 
@@ -282,7 +282,7 @@ def test_known_vertices_cross_an_outline_without_a_jump_or_a_force_along_the_fac
     vertices = bent.vertices.copy()
     vertices[:, 1] -= 1e-3 * vertices[:, 0] ** 2 + 2e-3 * vertices[:, 2] ** 2
     model, x, rows = boxes(sp.TetMesh(vertices, bent.tets), cube(3))
-    barrier = model.barriers(KAPPA).triangles
+    barrier = Barrier(model.collisions, KAPPA)
 
     def at(shift):
         moved = x.copy()

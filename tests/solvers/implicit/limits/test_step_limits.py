@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.contact.mesh.obstacles import obstacle_positions
 from supple.model.system import build_system, initial_state
 from supple.solvers.implicit.contact.model import contact_model
 from supple.solvers.implicit.inversion_guard import InversionGuard
@@ -23,7 +24,7 @@ def limits() -> tuple[StepLimits, np.ndarray]:
     ]
     scene = sp.Scene(bodies, [sp.HalfSpace(name="floor")])
     contact = contact_model(build_system(scene), sp.IPCContact(), np.full(12, 1e5))
-    x = np.concatenate([initial_state(scene).positions, [[0, 0, 0], [0, 1, 0]]])
+    x = np.concatenate([initial_state(scene).positions, obstacle_positions(contact.obstacles, 0.0)])
     return StepLimits(InversionGuard.at(contact.system, x), contact, Clock()), x
 
 

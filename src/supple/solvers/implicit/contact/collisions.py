@@ -1,4 +1,4 @@
-"""Contacts of surfaces at a point of the search for a minimum, and how far a step may go before anything touches."""
+"""Contacts at a point of the search for a minimum, and how far a step may go before anything touches."""
 
 from __future__ import annotations
 
@@ -12,22 +12,29 @@ from supple.contact.candidates import CandidateFinder
 from supple.contact.ccd import Limit, largest_step_in_pieces
 from supple.contact.features.contact_set import ContactSet, Found
 from supple.contact.features.contacts import Contacts, KnownWeights
+from supple.contact.features.half_spaces import HalfSpaces
 from supple.contact.features.vertex_contacts import REACH
 from supple.contact.mesh.contact_mesh import ContactMesh, intersects
+from supple.contact.mesh.obstacles import ObstacleRange
 from supple.numerics.geometry.embedded_points import vertex_couplings
 from supple.solvers.implicit.energies.potential import ContactPotential, HessianBlocks
 
 
 class Collisions:
-    """Contacts between the triangles of a mesh; those at the latest positions are kept.
+    """Contacts between the triangles of a mesh, and with half-spaces; those at the latest positions are kept.
 
     Parameters
     ----------
     dhat : [m] contacts are pairs that are nearer than this.
+
+    Attributes
+    ----------
+    half_spaces : has the points that contacts name, and their owners
     """
 
-    def __init__(self, mesh: ContactMesh, dhat: float) -> None:
+    def __init__(self, mesh: ContactMesh, obstacles: tuple[ObstacleRange, ...], dhat: float) -> None:
         self.mesh = mesh
+        self.half_spaces = HalfSpaces(mesh, obstacles)
         self.dhat = dhat
         self._finder = CandidateFinder(mesh, REACH * dhat)
         self._set = ContactSet(mesh, dhat)
@@ -37,9 +44,9 @@ class Collisions:
         self._known = KnownWeights.none()
 
     def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The mesh's points (s, 3) at x (n, 3), which must not change afterwards."""
+        """The points, those of half-spaces last, at x (n, 3), which must not change afterwards."""
         if x is not self._x:
-            self._x, self._points, self._found = x, self.mesh.points.positions(x), None
+            self._x, self._points, self._found = x, self.half_spaces.points.positions(x), None
         return self._points
 
     def at(self, x: NDArray[np.float64]) -> Contacts:
@@ -47,7 +54,7 @@ class Collisions:
         return self._at(x).contacts
 
     def smallest_distance(self, x: NDArray[np.float64]) -> float:
-        """Between surfaces [m]; infinite where nothing is near."""
+        """Between surfaces [m]; infinite where nothing is near, and not positive behind a half-space."""
         return self._at(x).least
 
     def forget_weights(self) -> None:
@@ -62,26 +69,42 @@ class Collisions:
             self._known, self._found = known, None
 
     def _at(self, x: NDArray[np.float64]) -> Found:
-        points = self.points(x)
+        points, s = self.points(x), len(self.mesh.points)
         if self._found is None:
-            candidates = self._finder.at(points)
-            self._found = self._set.of(points, candidates.vertex_triangle, candidates.edge_edge, self._known)
+            candidates = self._finder.at(points[:s])
+            found = self._set.of(points[:s], candidates.vertex_triangle, candidates.edge_edge, self._known)
+            on_planes, least = self.half_spaces.contacts(points, self.dhat)
+            if len(on_planes.kinds):
+                found = found._replace(contacts=found.contacts.joined(on_planes))
+            self._found = found._replace(least=min(found.least, least))
         return self._found
 
-    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> Limit:
-        """How far along `direction` (n, 3), at most 1, nothing touches, and the pair that allows no more."""
-        return largest_step_in_pieces(self._finder, self.points(x), self.mesh.points.positions(direction))
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:
+        """How far along `direction` (n, 3), at most 1, nothing touches, and points of the pair that allows no more."""
+        points, way, s = self.points(x), self.half_spaces.points.positions(direction), len(self.mesh.points)
+        step, row = self.half_spaces.largest_step(points, way)
+        pair = [] if row < 0 else self.half_spaces.tets[row, [3, 0]].tolist()
+        if step > 0.0:
+            limit = largest_step_in_pieces(self._finder, points[:s], step * way[:s])
+            step *= limit.step
+            pair = self._points_of(limit) if limit.kind else pair
+        return step, pair
+
+    def _points_of(self, limit: Limit) -> list[int]:
+        mesh, (i, j) = self.mesh, limit.pair
+        edges = limit.kind == "edge-edge"
+        return [int(mesh.edges[i, 0]), int(mesh.edges[j, 0])] if edges else [i, int(mesh.triangles[j, 0])]
 
     def intersect(self, x: NDArray[np.float64]) -> bool:
         """Whether any two triangles that may not cross do so at x."""
-        return intersects(self.mesh, self.points(x))
+        return intersects(self.mesh, self.points(x)[: len(self.mesh.points)])
 
 
-# The barrier between triangles of bodies and obstacles: an energy that grows without bound as surfaces come together.
+# The barrier between bodies and obstacles: an energy that grows without bound as surfaces come together.
 #
 # E = sum_k a_k kappa dhat b(d_k^2 / dhat^2),  b(s) = -(s - 1)^2 ln s  for s < 1, else 0
 #
-# over the contacts k of `supple.contact.features.contact_set` with areas a_k: kappa is a pressure, so that neither the
+# over the contacts k of `supple.contact.features` with areas a_k: kappa is a pressure, so that neither the
 # fineness of the mesh nor the unit of length changes what it means.
 
 
@@ -101,13 +124,13 @@ class Barrier(ContactPotential):
         if len(contacts.kinds):
             forces = np.zeros_like(self.collisions.points(x))
             add_barrier_gradient(contacts, self.collisions.dhat, self.stiffness, forces)
-            self.collisions.mesh.points.add_forces(forces, out)
+            self.collisions.half_spaces.points.add_forces(forces, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         contacts, points = self.collisions.at(x), self.collisions.points(x)
         if len(contacts.kinds):
             between = barrier_hessian(points, contacts, self.collisions.dhat, self.stiffness, project)
-            out.couplings.append(vertex_couplings(self.collisions.mesh.points, between))
+            out.couplings.append(vertex_couplings(self.collisions.half_spaces.points, between))
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool

@@ -8,20 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.barrier.barrier_energy import barrier_forces
-from supple.contact.barrier.friction_energy import slip_forces
+from supple.contact.barrier.friction_energy import sides, slip_forces
 from supple.contact.features.contacts import Contacts
-from supple.contact.features.pair_geometry import VERTEX_VERTEX
+from supple.contact.features.pair_geometry import EDGE_EDGE
 from supple.model.state import ContactPoints
+from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
-from supple.solvers.implicit.contact.model import Barriers, ContactModel
+from supple.solvers.implicit.contact.model import ContactModel
 
 
 def contact_points(
     model: ContactModel,
-    barriers: Barriers,
+    barrier: Barrier,
     frictions: Sequence[Friction],
     x: NDArray[np.float64],
-    between: Contacts,
+    contacts: Contacts,
     weight: float,
 ) -> ContactPoints:
     """All contacts at x (n, 3), obstacles' vertices included.
@@ -31,22 +32,14 @@ def contact_points(
 
     Parameters
     ----------
-    between : of triangles
+    contacts : at x
     weight : of the contact energies in the objective; forces are divided by it
     """
-    mesh, planes = model.mesh, model.planes
-    # The points of the planes follow those of the mesh.
-    place = planes.points.positions(x)
-    rows, heights, up, _ = planes.near(x)
-    near = np.full((len(rows), 4), -1, dtype=np.int32)
-    near[:, :2] = planes.pairs[rows, :2]
-    points = np.concatenate([between.points, near])
-    kinds = np.concatenate([between.kinds, np.full(len(rows), VERTEX_VERTEX, dtype=np.int8)])
-    coefficients = np.concatenate([between.coefficients, np.tile([1.0, -1.0, 0.0, 0.0], (len(rows), 1))])
-    normals = np.concatenate([between.vectors / between.distances[:, None], up])
-    distances = np.concatenate([between.distances, heights])
-    sizes = barrier_forces(between, model.scales.dhat, barriers.triangles.stiffness), barriers.planes.forces(x)
-    forces = np.concatenate(sizes)[:, None] * normals
+    mesh, collisions = model.mesh, model.collisions
+    place = collisions.half_spaces.points.positions(x)
+    kinds, points, coefficients, vectors, distances, _ = contacts
+    normals = vectors / distances[:, None]
+    forces = barrier_forces(contacts, collisions.dhat, barrier.stiffness)[:, None] * normals
     friction = np.zeros_like(forces)
     for term in frictions:
         slips, pulls = term.slips, slip_forces(term.points.positions(x), term.slips, term.reach)
@@ -61,14 +54,10 @@ def contact_points(
         distances = np.concatenate([distances, np.einsum("kj,kj->k", between_sides, slips.normals[left])])
         forces = np.concatenate([forces, np.zeros_like(pulls[left])])
         friction = np.concatenate([friction, pulls[left]])
-    # Coefficients are positive on the first side. Points that a kind does not have have the coefficient 0.
-    middles = np.einsum("ki,kij->kj", np.maximum(coefficients, 0.0), place[points]) - 0.5 * distances[:, None] * normals
-    anchors = [2 * [mesh.body_count + index] for index in planes.ranges]
-    owner = np.concatenate([mesh.owner, np.array(anchors, dtype=np.int32).reshape(-1)])
-    first, second = (
-        owner[np.take_along_axis(points, np.argmax(sign * coefficients, axis=1)[:, None], 1)[:, 0]]
-        for sign in (1.0, -1.0)
-    )
+    # Points that a kind does not have have the coefficient 0.
+    on_first = np.where((np.arange(4) == 0) | ((np.arange(4) == 1) & (kinds == EDGE_EDGE)[:, None]), coefficients, 0.0)
+    middles = np.einsum("ki,kij->kj", on_first, place[points]) - 0.5 * distances[:, None] * normals
+    first, second = (collisions.half_spaces.owner[side] for side in sides(kinds, points))
     contact, slot = np.nonzero(coefficients)
     point = points[contact, slot]
     of_bodies = np.append(mesh.rows, -1)[np.minimum(point, len(mesh.rows))]

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.state import ContactPoints, Status
+from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
-from supple.solvers.implicit.contact.model import Barriers, ContactModel
+from supple.solvers.implicit.contact.model import ContactModel
 from supple.solvers.implicit.contact.points import contact_points, forces_on_owners
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.newton.minimize import Outcome
@@ -41,7 +42,7 @@ class ContactStep:
     ----------
     stiffness : of the barrier now [Pa], the integrator's weight included
     stiffness_increases : their number; nearest : the smallest distance before the latest one [m]
-    friction_updates : their number; normal_gradient : (n, 3) of the barriers at the latest one [N]
+    friction_updates : their number; normal_gradient : (n, 3) of the barrier at the latest one [N]
     """
 
     model: ContactModel | None
@@ -52,7 +53,7 @@ class ContactStep:
     stiffness_increases: int = 0
     nearest: float = 0.0
     friction_updates: int = 0
-    barriers: Barriers | None = None
+    barrier: Barrier | None = None
     frictions: list[Friction] | None = None
     normal_gradient: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
 
@@ -60,17 +61,17 @@ class ContactStep:
         self.stiffness = self.model.scales.stiffness * self.weight if self.model is not None else 0.0
 
     def with_contact(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
-        """The objective with barriers, and with friction whose normal forces are those at x (n, 3)."""
+        """The objective with the barrier, and with friction whose normal forces are those at x (n, 3)."""
         if self.model is None:
             return objective
-        if self.barriers is None:
+        if self.barrier is None:
             # Weights stay during the step: with those of every minimum in turn, the minima can alternate.
             self.model.collisions.forget_weights()
-        self.barriers = self.model.barriers(self.stiffness)
-        self.frictions = self.model.frictions(self.barriers, x, self.start, self.times)
+        self.barrier = Barrier(self.model.collisions, self.stiffness)
+        self.frictions = self.model.frictions(self.stiffness, x, self.start, self.times[1] - self.times[0])
         if self.model.coefficients.any():
-            self.normal_gradient = Objective(self.barriers.terms).gradient(x)
-        return Objective([*objective.terms, *self.barriers.terms, *self.frictions], objective.clock)
+            self.normal_gradient = Objective([self.barrier]).gradient(x)
+        return Objective([*objective.terms, self.barrier, *self.frictions], objective.clock)
 
     def needs_update(self, x: NDArray[np.float64]) -> bool:
         """Whether to continue from x (n, 3) with a stiffer barrier or with friction of the normal forces there."""
@@ -92,12 +93,12 @@ class ContactStep:
 
     def friction_is_outdated(self, x: NDArray[np.float64]) -> bool:
         """Whether friction has to be updated with the normal forces at x (n, 3)."""
-        if self.model is None or self.barriers is None or not self.model.coefficients.any():
+        if self.model is None or self.barrier is None or not self.model.coefficients.any():
             return False
         wanted = self.model.friction_iterations
         if self.friction_updates + 1 >= (_MOST_UPDATES if wanted is None else wanted):
             return False
-        now = Objective(self.barriers.terms).gradient(x)
+        now = Objective([self.barrier]).gradient(x)
         change = float(np.linalg.norm(now - self.normal_gradient))
         return wanted is not None or change > _FORCE_CHANGE * float(np.linalg.norm(now))
 
@@ -121,10 +122,10 @@ class ContactStep:
         -------
         details, nearest, contacts : the latter two are `min_distance` and `contacts` of `StepReport`.
         """
-        model, barriers = self.model, self.barriers
-        if model is None or barriers is None:
+        model, barrier = self.model, self.barrier
+        if model is None or barrier is None:
             return details, None, None
-        normal, tangential = (Objective(terms).gradient(x) for terms in (barriers.terms, self.frictions or ()))
+        normal, tangential = (Objective(terms).gradient(x) for terms in ([barrier], self.frictions or ()))
         details = replace(
             details,
             contacts=model.count(x),
@@ -135,5 +136,5 @@ class ContactStep:
         )
         nearest = model.smallest_distance(x)
         nearest = nearest if np.isfinite(nearest) else None
-        between, frictions = model.collisions.at(x), tuple(self.frictions or ())
-        return details, nearest, lambda: contact_points(model, barriers, frictions, x, between, self.weight)
+        contacts, frictions = model.collisions.at(x), tuple(self.frictions or ())
+        return details, nearest, lambda: contact_points(model, barrier, frictions, x, contacts, self.weight)

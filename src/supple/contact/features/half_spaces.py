@@ -1,0 +1,100 @@
+"""Contacts of points with half-spaces: one for each point near a plane, which stands for all of its area.
+
+A plane is three of a solver's vertices, see `supple.contact.mesh.obstacles`. It touches as a triangle without an
+outline: the closest point to x is its foot, a combination of the three with weights of any size.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.features.contacts import Contacts
+from supple.contact.features.pair_geometry import VERTEX_PLANE
+from supple.contact.features.vertex_contacts import foot_on_plane
+from supple.contact.mesh.contact_mesh import ContactMesh
+from supple.contact.mesh.obstacles import ObstacleRange
+from supple.numerics.geometry.closest_points import area_normal
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.numerics.mat3 import dot, row, subtract
+from supple.numerics.noninverting_step import noninverting_step
+from supple.runtime.kernel_cache import njit
+
+# A step keeps at least this share of every distance; the bound for triangles is conservative in the same way.
+_KEEP = 0.1
+
+
+class HalfSpaces:
+    """All pairs of a surface point and a half-space that may touch.
+
+    Attributes
+    ----------
+    points : the surface's s points, then three of each plane; owner : (s + 3 h,) of each
+    tets : (k, 4) the three points of a plane and the point before it, of positive volume
+    areas : (k,) of the points [m^2]
+    """
+
+    def __init__(self, mesh: ContactMesh, obstacles: tuple[ObstacleRange, ...]) -> None:
+        """Every surface point of a body with every half-space that the body may touch."""
+        planes = [part for part in obstacles if part.is_plane]
+        anchors = np.concatenate([np.zeros(0, dtype=np.int32), *(part.vertices for part in planes)])
+        self.points = EmbeddedPoints.joined([mesh.points, EmbeddedPoints.at_vertices(anchors)])
+        owners = np.array([mesh.body_count + part.index for part in planes], dtype=np.int32)
+        self.owner = np.concatenate([mesh.owner, np.repeat(owners, 3)])
+        tets = [np.zeros((0, 4), dtype=np.int32)]
+        for k, owner in enumerate(owners):
+            near = np.flatnonzero(mesh.collide[mesh.owner, owner])
+            corners = len(mesh.points) + 3 * k + np.arange(3)
+            tets.append(np.column_stack([np.tile(corners, (len(near), 1)), near]).astype(np.int32))
+        self.tets = np.ascontiguousarray(np.concatenate(tets))
+        self.areas = mesh.areas[self.tets[:, 3]]
+        self._all = np.ones(len(self.tets), dtype=np.bool_)
+
+    def contacts(self, x: NDArray[np.float64], reach: float) -> tuple[Contacts, float]:
+        """The pairs nearer than `reach` [m] at points x (s + 3 h, 3), and the least of all distances, or infinity.
+
+        Distances are below zero behind a plane.
+        """
+        *arrays, least = _near(x, self.tets, self.areas, reach)
+        return Contacts(*arrays), least
+
+    def largest_step(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, int]:
+        """The largest step along `way` (s + 3 h, 3), at most 1, that keeps a tenth of every distance.
+
+        Returns
+        -------
+        step, row : of the pair that allows no more, -1 where there is none; 0 where a point is not before its plane
+        """
+        return noninverting_step(x, way, self.tets, self._all, _KEEP) if len(self.tets) else (1.0, -1)
+
+
+@njit(cache=True)
+def _near(x, tets, areas, reach):
+    """The fields of `Contacts` of the pairs nearer than `reach`, and the least of all distances."""
+    heights = np.empty(len(tets))
+    least, count = np.inf, 0
+    for k in range(len(tets)):
+        a = row(x, tets[k, 0])
+        n = area_normal(a, row(x, tets[k, 1]), row(x, tets[k, 2]))
+        heights[k] = dot(subtract(row(x, tets[k, 3]), a), n) / math.sqrt(dot(n, n))
+        least = min(least, heights[k])
+        count += heights[k] < reach
+    kinds, points = np.full(count, VERTEX_PLANE, dtype=np.int8), np.empty((count, 4), dtype=np.int32)
+    coefficients, vectors = np.empty((count, 4)), np.empty((count, 3))
+    distances, weights = np.empty(count), np.empty(count)
+    m = 0
+    for k in range(len(tets)):
+        if not heights[k] < reach:
+            continue
+        p, a, b, c = row(x, tets[k, 3]), row(x, tets[k, 0]), row(x, tets[k, 1]), row(x, tets[k, 2])
+        n, u = area_normal(a, b, c), foot_on_plane(p, a, b, c)
+        length = math.sqrt(dot(n, n))
+        points[m, 0], coefficients[m, 0] = tets[k, 3], 1.0
+        for i in range(3):
+            points[m, i + 1], coefficients[m, i + 1] = tets[k, i], -u[i]
+            vectors[m, i] = heights[k] * n[i] / length
+        distances[m], weights[m] = heights[k], areas[k]
+        m += 1
+    return kinds, points, coefficients, vectors, distances, weights, least
