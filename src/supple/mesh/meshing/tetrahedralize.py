@@ -168,11 +168,12 @@ def tetrahedralize_reported(
     if repair and not report.ok:
         try:
             fixed, repaired = repair_surface(surface, time_limit=time_limit, memory_limit=limits.memory)
-        except MeshingError as failure:
+        except MeshingError:
             # fTetWild needs no repair, and meshes much that MeshFix cannot repair: components that cut each other.
             if mesher == "tetgen" or not others_can:
                 raise
-            logger.info("%s; meshing the surface without repair", failure)  # a warning of what is not clean follows
+            # A warning of what is not clean follows.
+            logger.info("MeshFix cannot repair it without losing parts; meshing the surface without repair")
         else:
             surface, report = _facing_outward(fixed)
     fine = surface
