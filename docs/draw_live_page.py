@@ -13,7 +13,7 @@ from playwright.sync_api import sync_playwright
 
 import supple as sp
 from supple.app.viewer.app import opened_page
-from supple.app.viewer.protocol.commands import Grab, Pause, Play, ReleaseGrab, Reset, SetParameter, Step
+from supple.app.viewer.protocol.commands import Grab, Pause, Play, ReleaseGrab, Reset, SetParameter, SetSpeed, Step
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.mesh.primitives.surfaces import torus_surface
 
@@ -35,7 +35,7 @@ def scene() -> LiveSource:
     stitch = sp.SoftVertexTriangleStitch("high", "low", max_distance=0.03, youngs=5e4, poisson=0.45)
     floor = sp.HalfSpace(friction=0.6, name="floor")
     made = sp.Scene([bear, ball, low, high], obstacles=[floor], stitches=[stitch])
-    return LiveSource("pictures", made, sp.XPBD(substeps=12), 1 / 60)
+    return LiveSource("pictures", made, sp.XPBD(accuracy=0.1), 1 / 60)
 
 
 def save(tab, name: str) -> None:
@@ -73,10 +73,11 @@ def draw_live(tab, page) -> None:
     target = tuple(float(x) for x in bear[ear] + np.array([-0.1, 0.5, 0.0]))
     controller.simulation.send(Grab(1, "bear", (ear,), (1.0,), target, stiffness=0.05))
     settle(3.0)
+    controller.simulation.send(SetSpeed(0.05))  # how fast it is here says nothing about the reader's computer
+    settle(2.0)
     save(tab, "live.png")
-    controller.simulation.send(ReleaseGrab(1))
-    controller.simulation.send(Pause())
-    settle(1.0)
+    for command in (ReleaseGrab(1), Pause(), SetSpeed(1.0)):
+        controller.simulation.send(command)
     for command in (Reset(), SetParameter("youngs", 1.5e4), Step(15)):
         controller.simulation.send(command)
     settle(2.0)
@@ -95,6 +96,8 @@ def draw_live(tab, page) -> None:
     tab.get_by_role("tab", name="Solver").click()
     controller.simulation.send(Play())
     settle(4.0)
+    controller.simulation.send(Pause())
+    settle(1.0)
     tab.get_by_text("Spin [rad/s]").scroll_into_view_if_needed()
     save(tab, "live_solver.png")
 

@@ -67,9 +67,12 @@ class Camera:
 
 def test_a_camera_under_the_floor_is_raised_above_it():
     view, floor = View(np.zeros(3), np.ones(3), np.array([0.0, 1.0, 0.0])), np.array([5.0, -0.2, 5.0])
-    below, above = Camera((3.0, -2.0, 1.0)), Camera((3.0, 2.0, 1.0))
-    for camera in (below, above):
-        stay_above(camera, floor, view)
+    below, above, first = Camera((3.0, -2.0, 1.0)), Camera((3.0, 2.0, 1.0)), Camera((3.0, -2.0, 1.0))
+    assert [stay_above(camera, floor, view) for camera in (below, above)] == [True, True]
+    # The camera with which a browser begins is left alone until that of the scene arrives.
+    assert not stay_above(first, floor, view, was_above=False)
+    assert stay_above(above, floor, view, was_above=False)
+    assert first.position == (3.0, -2.0, 1.0)
     np.testing.assert_allclose(below.position, [3.0, -0.2 + 0.03 * view.radius, 1.0])
     assert below.look_at == (0.0, 0.5, 0.0)
     assert above.position == (3.0, 2.0, 1.0)

@@ -96,13 +96,21 @@ def follow(client: Any, way: NDArray[np.float64]) -> None:
     _move(client, center + way, eye - center)
 
 
-def stay_above(client: Any, floor: NDArray[np.float64], view: View) -> None:
-    """Raise the camera of one visitor where it is below a floor, of which `floor` (3,) is a point [m]."""
+def stay_above(client: Any, floor: NDArray[np.float64], view: View, *, was_above: bool = True) -> bool:
+    """Raise the camera of one visitor where it is below a floor, of which `floor` (3,) is a point [m].
+
+    Not as long as it never was above: browsers begin with a camera of their own, and are sent the one of the scene.
+
+    Returns
+    -------
+    Whether it was above.
+    """
     camera = client.camera
     missing = _LOWEST * view.radius - float((np.asarray(camera.position) - floor) @ view.up)
-    if missing > 0.0:
+    if was_above and missing > 0.0:
         center = np.asarray(camera.look_at)
         _move(client, center, np.asarray(camera.position) + missing * view.up - center)
+    return was_above or missing <= 0.0
 
 
 _LOWEST = 0.03  # height of a camera over a floor, as a share of the radius of the scene

@@ -236,13 +236,16 @@ class ViewControls:
         """In a narrow picture, the camera is farther away than in the one that all get at first."""
         if client.camera.aspect < 1.0:
             look_from(client, PRESETS[0], self._stage.model.view)
-        client.camera.on_update(lambda _: self._stay_above(client))
+        was_above = False
 
-    def _stay_above(self, client: Any) -> None:
-        """A camera under the floor would see nothing."""
-        floor = floor_shadow(self._stage.model, 1)
-        if floor is not None:
-            stay_above(client, floor.disc[0], self._stage.model.view)
+        def keep_above(_: Any) -> None:
+            """A camera under the floor would see nothing."""
+            nonlocal was_above
+            floor = floor_shadow(self._stage.model, 1)
+            if floor is not None:
+                was_above = stay_above(client, floor.disc[0], self._stage.model.view, was_above=was_above)
+
+        client.camera.on_update(keep_above)
 
     def _look(self, event: Any) -> None:
         if event.client is not None:
