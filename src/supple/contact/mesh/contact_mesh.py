@@ -89,6 +89,33 @@ def contact_mesh(
     start : (n, 3) where everything is at the start [m]
     touching : how near stitched parts are at the start that do not collide, see `stitch_filter` [m]
     """
+    points, corners, owner = joined_surfaces(system, obstacles)
+    used = np.unique(corners)
+    number = np.full(len(points), -1, dtype=np.int32)
+    number[used] = np.arange(len(used), dtype=np.int32)
+    surface = points.taken(used)
+    # Obstacles are vertices here; the last entry is for nodes without one.
+    of_vertex = np.append(system.stitching.points_of_nodes(points), -1)
+    of_vertex = np.where(of_vertex >= 0, number[of_vertex], -1).astype(np.int32)
+    return mesh_of_triangles(
+        surface,
+        number[corners],
+        owner[used],
+        surface.positions(system.rest_positions),
+        body_count=len(system.bodies),
+        names=tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles),
+        collide=collide,
+        stitches=(of_vertex[system.stitching.nodes()], surface.positions(start)),
+        welded=_welded_points(system, of_vertex),
+        touching=touching,
+        rows=np.where(used < len(system.points), used, -1).astype(np.int32),
+    )
+
+
+def joined_surfaces(
+    system: System, obstacles: tuple[ObstacleRange, ...]
+) -> tuple[EmbeddedPoints, NDArray[np.int32], NDArray[np.int32]]:
+    """Points (s,) of a system, then the vertices of obstacles, triangles (f, 3) of such points, and owners (s,)."""
     bodies = len(system.bodies)
     points, triangles = [system.points], [system.triangles]
     owner = [np.repeat(np.arange(bodies), [part.points.stop - part.points.start for part in system.bodies])]
@@ -97,27 +124,8 @@ def contact_mesh(
             triangles.append(part.triangles + sum(map(len, points)))
             points.append(EmbeddedPoints.at_vertices(part.vertices))
             owner.append(np.full(len(part.vertices), bodies + part.index))
-    corners = np.concatenate(triangles)
-    used = np.unique(corners)
-    number = np.full(sum(map(len, points)), -1, dtype=np.int32)
-    number[used] = np.arange(len(used), dtype=np.int32)
-    surface = EmbeddedPoints.joined(points).taken(used)
-    # Obstacles are vertices here; the last entry is for nodes without one.
-    of_vertex = np.append(system.stitching.points_of_nodes(EmbeddedPoints.joined(points)), -1)
-    of_vertex = np.where(of_vertex >= 0, number[of_vertex], -1).astype(np.int32)
-    return mesh_of_triangles(
-        surface,
-        number[corners],
-        np.concatenate(owner)[used].astype(np.int32),
-        surface.positions(system.rest_positions),
-        body_count=bodies,
-        names=tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles),
-        collide=collide,
-        stitches=(of_vertex[system.stitching.nodes()], surface.positions(start)),
-        welded=_welded_points(system, of_vertex),
-        touching=touching,
-        rows=np.where(used < len(system.points), used, -1).astype(np.int32),
-    )
+    corners = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
+    return EmbeddedPoints.joined(points), corners, np.concatenate(owner).astype(np.int32)
 
 
 def _welded_points(system: System, of_vertex: NDArray[np.int32]) -> WeldedPoints | None:

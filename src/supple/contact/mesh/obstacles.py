@@ -122,6 +122,17 @@ def obstacle_positions(ranges: tuple[ObstacleRange, ...], time: float) -> NDArra
     return np.concatenate([part.targets(time) for part in ranges]) if ranges else np.zeros((0, 3))
 
 
+def placed_with_obstacles(
+    system: System, ranges: tuple[ObstacleRange, ...], positions: NDArray[np.float64], time: float
+) -> NDArray[np.float64]:
+    """(n, 3) of a system with obstacles at a time [s], of positions whose first rows are the bodies' vertices [m]."""
+    x, own = np.zeros((len(system.rest_positions), 3)), system.bodies[-1].vertices.stop
+    x[:own] = positions[:own]
+    for part in ranges:
+        x[part.vertices] = part.targets(time)
+    return x
+
+
 def _surface(obstacle: Obstacle, size: float) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
     """Vertices (k, 3) at time 0 and triangles (t, 3)."""
     if obstacle.plane is None:

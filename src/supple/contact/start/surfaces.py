@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacles import with_obstacles
+from supple.contact.mesh.contact_mesh import joined_surfaces
+from supple.contact.mesh.obstacles import placed_with_obstacles, with_obstacles
 from supple.mesh.topology import connected_components
 from supple.model.system import System
 from supple.numerics.mat3 import cross, dot, row, subtract
@@ -57,14 +58,12 @@ class StartSurfaces:
 
 def start_surfaces(system: System, positions: NDArray[np.float64], time: float) -> StartSurfaces:
     """Collect the surfaces of a system at positions (n, 3) [m] and a time [s]. Rows beyond the bodies' are not used."""
-    bodies = len(system.bodies)
-    n = system.bodies[-1].vertices.stop
+    bodies, (extended, ranges) = len(system.bodies), with_obstacles(system)
     count = bodies + len(system.obstacles)
-    points, triangles = [system.points.positions(np.asarray(positions, dtype=np.float64)[:n])], [system.triangles]
-    owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
+    x = placed_with_obstacles(extended, ranges, np.asarray(positions, dtype=np.float64), time)
     planes, rooms, solid = [], [], np.ones(count, dtype=np.bool_)
-    for part in with_obstacles(system)[1]:
-        thing, corners = bodies + part.index, part.targets(time)
+    for part in ranges:
+        thing, corners = bodies + part.index, x[part.vertices]
         if part.is_plane:
             normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
             planes.append((thing, corners[0], normal / np.linalg.norm(normal)))
@@ -72,17 +71,11 @@ def start_surfaces(system: System, positions: NDArray[np.float64], time: float) 
         if part.obstacle.is_room:
             rooms.append(thing)
             solid[thing] = False
-        local = part.triangles
-        solid[thing] &= _is_closed(local)
-        triangles.append(local + sum(map(len, points)))
-        points.append(corners)
-        owner.append(np.full(len(local), thing))
-    all_triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
-    all_owners = np.concatenate(owner).astype(np.int32)
-    first_row = np.searchsorted(all_owners, np.arange(count))
-    all_points = np.ascontiguousarray(np.concatenate(points))
-    pieces = _pieces(all_triangles, all_owners, len(all_points))
-    return StartSurfaces(all_points, all_triangles, all_owners, first_row, pieces, tuple(planes), tuple(rooms), solid)
+        solid[thing] &= _is_closed(part.triangles)
+    points, triangles, owner = joined_surfaces(extended, ranges)
+    owner = owner[triangles[:, 0]]
+    first_row, pieces = np.searchsorted(owner, np.arange(count)), _pieces(triangles, owner, len(points))
+    return StartSurfaces(points.positions(x), triangles, owner, first_row, pieces, tuple(planes), tuple(rooms), solid)
 
 
 def _is_closed(triangles: NDArray[np.integer]) -> bool:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.mesh.obstacles import ObstaclePoses
+from supple.contact.mesh.contact_mesh import joined_surfaces
+from supple.contact.mesh.obstacles import ObstaclePoses, placed_with_obstacles, with_obstacles
 from supple.model.system import System
 from supple.numerics.adjacency import Adjacency, adjacency
 from supple.numerics.geometry.box_tree import boxes_of_labels, boxes_of_triangles, near_boxes, overlap
@@ -120,26 +121,15 @@ class SurfaceCheck:
         self._poses = ObstaclePoses(system.obstacles)
         self._names = [f"body {part.name!r}" for part in system.bodies] + [o.label for o in system.obstacles]
         self._collide = colliding_pairs(system, settings, joined=True)
-        bodies, n = len(system.bodies), len(system.points)
-        triangles, points, self._owners = [system.triangles], [], []
-        owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
-        self._formulas = []
-        for k, obstacle in enumerate(system.obstacles):
-            mesh = obstacle.contact_mesh
-            if mesh is None:
-                self._formulas.append(k)
-                continue
-            triangles.append(mesh.triangles.astype(np.int32) + n + sum(map(len, points)))
-            points.append(mesh.vertices)
-            self._owners += [k] * len(mesh.vertices)
-            owner.append(np.full(len(mesh.triangles), bodies + k))
-        self._triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
-        self._owner = np.concatenate(owner).astype(np.int32)
+        self._extended, ranges = with_obstacles(system)
+        self._formulas = [k for k, obstacle in enumerate(system.obstacles) if obstacle.contact_mesh is None]
+        self._solid = tuple(part for part in ranges if part.index not in self._formulas)
+        self._points, self._triangles, owner = joined_surfaces(self._extended, self._solid)
+        self._owner = owner[self._triangles[:, 0]]
         joins = len(system.stitching) or len(system.welding)
         self._seams = Seams(system, self._owner[: len(system.triangles)]) if joins else None
         pairs = self._collide[np.ix_(owned := np.unique(self._owner), owned)]
         self._may_cross = bool(pairs.any())
-        self._fixed = np.concatenate(points) if points else np.zeros((0, 3))
         # The arguments and the result of the last search: the end of a frame is the beginning of the next one.
         self._last: tuple[NDArray[np.float64], float, NDArray[np.bool_], list[Overlap]]
         self._last = (np.zeros((0, 3)), -np.inf, np.zeros(0, dtype=np.bool_), [])
@@ -176,11 +166,7 @@ class SurfaceCheck:
         return self._collide & ~(still[:, None] & still)
 
     def _crossings(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_]) -> list[Overlap]:
-        R, t = self._poses.at(time)
-        rows = np.array(self._owners, dtype=np.int64)
-        points = np.concatenate(
-            [self.system.points.positions(x), np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]]
-        )
+        points = self._points.positions(placed_with_obstacles(self._extended, self._solid, x, time))
         chosen = collide.diagonal()[self._owner]
         own = boxes_of_triangles(points, self._triangles)
         boxes = boxes_of_labels(own, self._owner, len(self._names))
