@@ -67,16 +67,6 @@ def between(a, b, t):
 
 
 @njit
-def square_from_box(q, a, b, c):
-    """The squared distance of a point from the box of a triangle."""
-    square = 0.0
-    for j in range(3):
-        low, high = min(a[j], b[j], c[j]), max(a[j], b[j], c[j])
-        square += max(0.0, low - q[j], q[j] - high) ** 2
-    return square
-
-
-@njit
 def closest_on_segments(a, b, c, d):
     """s and t in [0, 1]: (1 - s) a + s b and (1 - t) c + t d are closest to each other.
 
