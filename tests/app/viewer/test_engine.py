@@ -217,12 +217,12 @@ def test_a_program_without_the_guard_ends_with_one_line(tmp_path):
     script.write_text(
         textwrap.dedent("""
         import supple as sp
-        from supple.app.viewer.app import Address, serve
+        from supple.app.viewer.app import serve
         from supple.app.viewer.protocol.live_source import LiveSource
 
         body = sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
         source = LiveSource("cube", sp.Scene([body]), sp.XPBD(substeps=2), 0.01)
-        serve(source, Address(port=0), open_browser=False)
+        serve(source, 0, open_browser=False)
         """)
     )
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=TIMEOUT)
