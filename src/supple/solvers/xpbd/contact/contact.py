@@ -17,6 +17,7 @@ from supple.solvers.xpbd.contact import tets as volumes
 from supple.solvers.xpbd.contact.admit import Marks
 from supple.solvers.xpbd.contact.cuts import Cuts, keep_spin, share_motion
 from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows, loaded_rows
+from supple.solvers.xpbd.contact.joined import solve_joined
 from supple.solvers.xpbd.contact.memory import ContactMemory
 from supple.solvers.xpbd.contact.nodes import Nodes
 from supple.solvers.xpbd.contact.response_rates import response_rates
@@ -29,6 +30,7 @@ from supple.solvers.xpbd.contact.shapes import RowShapes, Walls
 from supple.solvers.xpbd.contact.solve import keep_impulses, push_kept, solve
 from supple.solvers.xpbd.contact.tets import Tets
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
+from supple.solvers.xpbd.rigid.joint_rows import JointRows, solve_joints
 
 # Of the mean edge: the gap between surfaces; of the gap: how far nodes may go beyond what was expected when rows
 # were found.
@@ -39,6 +41,8 @@ RECOVERED = 0.05
 RESIDUAL, MOST_SWEEPS = 0.02, 4
 # The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps.
 RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 60
+# For each joint, where that is more: what pulls at a chain has to go along it.
+SWEEPS_PER_JOINT = 10
 
 
 @dataclass
@@ -224,20 +228,50 @@ class Contact:
         """Solve the rows with at most so many sweeps; returns what the last one changed, in gaps."""
         if not rows:
             return 0.0
-        tolerance, rigid, nodes = RESIDUAL * self.gap, self._rigid, self.nodes
-        if len(rigid):
-            fall = math.hypot(*self._gravity) * self._h**2
-            tolerance = min(tolerance, RIGID_RESIDUAL * fall) if fall > 0.0 else tolerance
-        most = most or (MOST_RIGID_SWEEPS if len(rigid) else MOST_SWEEPS)
-        n = len(nodes.impulses)
-        x, v = nodes.x[:n, :3].copy(), nodes.v[rigid.control]
-        _, residual = solve(nodes.x, nodes.bodies, nodes.begin, self._rows, rows, tolerance, most)
+        nodes, most = self.nodes, most or (MOST_RIGID_SWEEPS if len(self._rigid) else MOST_SWEEPS)
+        x = nodes.x[: len(nodes.impulses), :3].copy()
+        _, residual = solve(nodes.x, nodes.bodies, nodes.begin, self._rows, rows, self._tolerance(), most)
+        self._take_over(x, np.zeros((len(self._rigid), 6)))
+        return residual / self.gap
+
+    def solve_joined(self, rows: int, joints: JointRows, enough: float) -> tuple[NDArray[np.float64], float]:
+        """Solve the rows of contacts and of joints; the joints' impulses (r,) [kg m], and by how much joints were off.
+
+        The latter as a share of their size; contacts are left alone if that is `enough`.
+        """
+        nodes, impulses = self.nodes, np.zeros(len(joints.total))
+        x = nodes.x[: len(nodes.impulses), :3].copy()
+        most, off = max(MOST_RIGID_SWEEPS, SWEEPS_PER_JOINT * len(np.unique(joints.bodies))), 0.0
+        if rows:
+            contacts = nodes.x, nodes.bodies, nodes.begin, self._rows, rows
+            off = solve_joined(*contacts, joints, impulses, enough, self._tolerance(), most)
+        else:
+            solve_joints(joints, impulses, nodes.bodies.twists, most)
+        twists = np.zeros((len(self._rigid) + 1, 6))
+        np.add.at(twists, joints.bodies, impulses[:, None, None] * joints.answers)
+        self._take_over(x, twists[:-1])
+        return impulses, off
+
+    def _tolerance(self) -> float:
+        """What the last sweep over the rows may change [m]."""
+        fall = math.hypot(*self._gravity) * self._h**2
+        tolerance = RESIDUAL * self.gap
+        return min(tolerance, RIGID_RESIDUAL * fall) if len(self._rigid) and fall > 0.0 else tolerance
+
+    def _take_over(self, x: NDArray[np.float64], of_joints: NDArray[np.float64]) -> None:
+        """Give velocities what moved vertices from x (n, 3), and bodies.
+
+        of_joints : (b, 6) the part of their twists that is not one of contacts
+        """
+        nodes, control = self.nodes, self._rigid.control
+        n, v = len(x), nodes.v[control]
         changes = (nodes.x[:n, :3] - x) / self._h
         nodes.v[:n] += changes
         nodes.impulses += changes
+        arms = nodes.bodies.arms[control]
+        of_joints = of_joints[:, None, :3] + np.cross(of_joints[:, None, 3:], arms)
         nodes.move_bodies(self._h)
-        nodes.impulses[rigid.control] += nodes.v[rigid.control] - v
-        return residual / self.gap
+        nodes.impulses[control] += nodes.v[control] - v - of_joints / self._h
 
     def keep(self, rows: int) -> None:
         """Note the forces, and keep the impulses with which the next substep begins."""

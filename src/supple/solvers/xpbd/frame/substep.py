@@ -14,10 +14,9 @@ from supple.solvers.xpbd.frame.volumes import hold_volumes, restore
 from supple.solvers.xpbd.integration import first_lost, hold, predict
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
-# How often joints and contacts are solved in turn in a substep with contact, at most, and below which correction of
-# a joint, as a share of its size, they are not solved again. What a heavy body and a joint push at from both sides
-# takes as many as the ratio of the masses.
-JOINT_PASSES, JOINT_EXACT = 100, 1e-5
+# The rows of joints are linear in small turns of bodies. With contacts they are found anew at the places of before, at
+# most so many times, until none is off by more than this share of its joint's size.
+MOST_LINEARIZATIONS, JOINT_EXACT = 20, 1e-5
 
 
 def substep(
@@ -52,12 +51,11 @@ def substep(
     ws.loads.pull_to_targets(at)  # 6
     ws.loads.pull_springs(at)
     ws.actuators.project_between(at)
-    move_rigid(ws, end, h)
+    move_rigid(ws, h)
     if first_lost(x, v) >= 0:
         return
     rows = contact.detect()  # 7: (C4)
-    contact.solve(rows)
-    hold_joints(ws, rows, end, h)
+    solve(ws, rows, end, h)
     low = hold_volumes(ws, rows, h)  # (X7)
     contact.keep(rows)
     contact.admit(rows, low)  # 8: (C7)
@@ -82,22 +80,22 @@ def push(ws: XPBDWorkspace, damping: Damping | None, h: float) -> None:
         ws.velocities[welded] -= internal
 
 
-def move_rigid(ws: XPBDWorkspace, end: float, h: float) -> None:
-    """Move rigid bodies as all impulses of a substep, and their joints, determine."""
+def move_rigid(ws: XPBDWorkspace, h: float) -> None:
+    """Move rigid bodies as all impulses of a substep determine."""
     ws.rigid.gather(ws.points, ws.velocities, h)
     ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
-    if len(ws.joints):
-        ws.joints.project(ws.points, ws.previous, ws.velocities, ws.origins, end, h)
-        ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
 
 
-def hold_joints(ws: XPBDWorkspace, rows: int, end: float, h: float) -> None:
-    """Solve joints and contacts in turn, where contacts have moved what joints hold."""
-    contact = ws.contact
-    for _ in range(JOINT_PASSES if len(ws.joints) and rows else 0):
-        moved = ws.joints.project_again(ws.points, ws.previous, ws.velocities, ws.origins, end, h)
-        ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
-        contact.nodes.follow()
+def solve(ws: XPBDWorkspace, rows: int, end: float, h: float) -> None:
+    """Solve the rows of contacts and joints together."""
+    contact, joints = ws.contact, ws.joints
+    if not len(joints):
         contact.solve(rows)
-        if moved <= JOINT_EXACT:
+        return
+    joints.begin_substep(ws.previous, ws.origins, end, h)
+    for k in range(MOST_LINEARIZATIONS if rows else 1):
+        of_joints = joints.rows(ws.points, ws.previous, ws.origins, end, h, contact.nodes.bodies.J)
+        impulses, off = contact.solve_joined(rows, of_joints, JOINT_EXACT if k else 0.0)
+        joints.note(of_joints, impulses, ws.points[:, :3] + ws.origins, h)
+        if off <= JOINT_EXACT:
             return

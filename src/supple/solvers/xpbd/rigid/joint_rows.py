@@ -10,7 +10,7 @@ from supple.runtime.kernel_cache import njit
 Floats = NDArray[np.float64]
 
 # The largest correction, as a share of the joint's size, after which sweeps end.
-_EXACT = 1e-9
+EXACT = 1e-9
 
 
 class JointRows(NamedTuple):
@@ -35,37 +35,39 @@ class JointRows(NamedTuple):
     sizes: Floats
 
 
-@njit(cache=True)
-def solve_joint_rows(rows, impulses, twists, most):
-    """Solve the rows, in place: impulses (r,) [kg m] and twists (b, 6), displacement and rotation of bodies.
+@njit
+def sweep_joints(rows, impulses, twists, turn):
+    """Sweep once over the rows, in place: impulses (r,) [kg m] and twists (b, 6), displacement and rotation of bodies.
 
-    Returns the largest correction of the first sweep, as a share of the joint's size.
+    Returns the largest correction, as a share of the joint's size.
     """
-    count, first = len(rows.total), 0.0
-    for sweep in range(most):
-        largest = 0.0
-        for k in range(count):
-            r = k if sweep % 2 == 0 else count - 1 - k
-            if rows.total[r] == 0.0:
-                continue
-            g = rows.missing[r] + rows.compliance[r] * impulses[r]
-            for side in range(2):
-                b = rows.bodies[r, side]
-                if b >= 0:
-                    for i in range(6):
-                        g += rows.actions[r, side, i] * twists[b, i]
-            p = impulses[r] - g / (rows.total[r] + rows.compliance[r])
-            p = min(max(p, rows.low[r]), rows.high[r])
-            change = p - impulses[r]
-            impulses[r] = p
-            largest = max(largest, abs(change) * rows.total[r] / rows.sizes[r])
-            for side in range(2):
-                b = rows.bodies[r, side]
-                if b >= 0:
-                    for i in range(6):
-                        twists[b, i] += rows.answers[r, side, i] * change
-        if sweep == 0:
-            first = largest
-        if largest <= _EXACT:
+    count, largest = len(rows.total), 0.0
+    for k in range(count):
+        r = k if turn % 2 == 0 else count - 1 - k
+        if rows.total[r] == 0.0:
+            continue
+        g = rows.missing[r] + rows.compliance[r] * impulses[r]
+        for side in range(2):
+            b = rows.bodies[r, side]
+            if b >= 0:
+                for i in range(6):
+                    g += rows.actions[r, side, i] * twists[b, i]
+        p = impulses[r] - g / (rows.total[r] + rows.compliance[r])
+        p = min(max(p, rows.low[r]), rows.high[r])
+        change = p - impulses[r]
+        impulses[r] = p
+        largest = max(largest, abs(change) * rows.total[r] / rows.sizes[r])
+        for side in range(2):
+            b = rows.bodies[r, side]
+            if b >= 0:
+                for i in range(6):
+                    twists[b, i] += rows.answers[r, side, i] * change
+    return largest
+
+
+@njit(cache=True)
+def solve_joints(rows, impulses, twists, most):
+    """Sweep over the rows of joints alone, at most so many times."""
+    for turn in range(most):
+        if sweep_joints(rows, impulses, twists, turn) <= EXACT:
             break
-    return first

@@ -4,7 +4,8 @@ A row is a number g of the control points (see `supple.model.joints.geometry`) w
 [kg m] has on a body the force sum G_k and the moment sum r_k x G_k about the center, with the arms r_k of the
 beginning of the substep, and moves the body by its inverse mass and inertia. A condition has g = g0. Limits, friction
 and motors are laws p = -h^2 clip(lambda + k (g - g0), low, high) (see `supple.model.joints.laws`); where k is that of
-a condition, it is infinite here. `joint_rows` solves these equations; multipliers begin at zero in each substep.
+a condition, it is infinite here. Sweeps solve these equations, together with those of contacts; multipliers begin at
+zero in each substep.
 
 Where the two sides of a joint are apart, its forces have a moment. It is taken away from both bodies alike, so that
 two free bodies keep their angular momentum.
@@ -29,13 +30,11 @@ from supple.model.joints.laws import Laws, laws_of, wrapped
 from supple.model.state import State
 from supple.model.system import System
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
-from supple.solvers.xpbd.rigid.joint_rows import JointRows, solve_joint_rows
+from supple.solvers.xpbd.rigid.joint_rows import JointRows
 from supple.solvers.xpbd.sweeps.ordering import Layout
 
 Floats = NDArray[np.float64]
 
-# Sweeps over all rows, at most this many, or as many for each joint: what pulls at a chain has to go along it.
-_MOST_SWEEPS, _SWEEPS_PER_JOINT = 60, 10
 # Of the largest inverse mass of the joint's rows: rows that move less say nothing of their own.
 _IDLE = 1e-5
 # Of the joint's size: what motors may lack in a frame, which contact leaves over in substeps.
@@ -88,58 +87,34 @@ class JointProjection:
             self._free[:-1, 0] = ~(asleep[self._rigid.numbers] | self._rigid.held)
             self._total[:], self._motors[:], self._lacking[:], self._substeps = 0.0, 0.0, 0.0, 0
 
-    def project(
-        self, points: Floats, previous: Floats, velocities: Floats, origins: Floats, end: float, h: float
-    ) -> None:
-        """Move the bodies, in place, and change their velocities (n, 3).
-
-        Parameters
-        ----------
-        previous : (n, 3) at the beginning of the substep [m]; end : of the substep [s]; h : its length [s]
-        """
+    def begin_substep(self, previous: Floats, origins: Floats, end: float, h: float) -> None:
+        """Find the laws of the substep of h [s] that ends at `end` [s]; previous : (n, 3) places at its beginning."""
         begun = self._functions(previous + origins, end - h)
         self._laws, self._multipliers = laws_of(self.geometry, np.ones(len(self)), begun, (end - h, end), moving=True)
         self._begun, self._impulses = begun[self._laws.function], np.zeros(len(self._laws.k))
         self._substeps += 1
-        self.project_again(points, previous, velocities, origins, end, h)
 
-    def project_again(
-        self, points: Floats, previous: Floats, velocities: Floats, origins: Floats, end: float, h: float
-    ) -> float:
-        """`project` for positions that have changed since.
+    def rows(
+        self, points: Floats, previous: Floats, origins: Floats, end: float, h: float, inertia: Floats
+    ) -> JointRows:
+        """The rows at positions that may have changed since those before.
 
         Laws take back what they have pushed too much: only their impulse in total has ends. Otherwise a push of a
-        contact that sweeps reduce later would leave energy. Returns the largest correction, as a share of the joint's
-        size.
+        contact that sweeps reduce later would leave energy.
+
+        inertia : (b, 3, 3) inverse tensors of the bodies at `previous`
         """
-        rows, first = self._rows(points[:, :3] + origins, previous + origins, end, h)
+        rows, first = self._rows(points[:, :3] + origins, previous + origins, end, h, inertia)
         rows.missing[first:] += rows.compliance[first:] * self._impulses
         rows.low[first:] -= self._impulses
         rows.high[first:] -= self._impulses
-        impulses, largest = self._solve(rows, first, points, previous, velocities, origins, h)
-        self._impulses += impulses[first:]
-        return largest
+        return rows
 
-    def _solve(
-        self,
-        rows: JointRows,
-        first_law: int,
-        points: Floats,
-        previous: Floats,
-        velocities: Floats,
-        origins: Floats,
-        h: float,
-    ) -> tuple[Floats, float]:
-        """Solve the rows and move the bodies; impulses (r,) [kg m], and the largest correction."""
-        impulses, twists = np.zeros(len(rows.total)), np.zeros((len(self._rigid), 6))
-        largest = solve_joint_rows(rows, impulses, twists, max(_MOST_SWEEPS, _SWEEPS_PER_JOINT * len(self)))
-        self._note(rows, impulses / h**2, first_law, points[:, :3] + origins)
-        control = self._rigid.control
-        arms = previous[control] - previous[control].mean(axis=1, keepdims=True)
-        moved = twists[:, None, :3] + np.cross(twists[:, None, 3:], arms)
-        points[control, :3] += moved
-        velocities[control] += moved / h
-        return impulses, largest
+    def note(self, rows: JointRows, impulses: Floats, x: Floats, h: float) -> None:
+        """Note the impulses (r,) of rows that have been solved [kg m]; x (n, 3) are positions in the world."""
+        first = len(impulses) - len(self._impulses)
+        self._impulses += impulses[first:]
+        self._note(rows, impulses / h**2, first, x)
 
     def end_substep(self, points: Floats, origins: Floats, end: float, h: float) -> float:
         """Follow the angles of hinges over all turns; returns the work of the laws in the substep of h [J]."""
@@ -215,7 +190,7 @@ class JointProjection:
         found = values(g.functions, np.stack([_at(g, column, x, poses) for column in g.arguments], axis=1))
         return np.where(self._angles, self._g + wrapped(found - self._g), found)
 
-    def _rows(self, x: Floats, x_prev: Floats, time: float, h: float) -> tuple[JointRows, int]:
+    def _rows(self, x: Floats, x_prev: Floats, time: float, h: float, inertia: Floats) -> tuple[JointRows, int]:
         """All rows, conditions first; and the first row of the laws."""
         laws, multipliers = self._laws, self._multipliers
         g, poses = self.geometry, self.geometry.poses(time)
@@ -247,30 +222,23 @@ class JointProjection:
             sizes.append(g.units[laws.function])
         G, j = np.concatenate(gradients), np.concatenate(joint)
         forces = np.stack([G[:, :4].sum(axis=1), G[:, 4:].sum(axis=1)], axis=1)
-        turns = np.cross(arms[j], G)
+        turns = cross_rows(arms[j], G)
         moments = np.stack([turns[:, :4].sum(axis=1), turns[:, 4:].sum(axis=1)], axis=1)
         bodies = self._bodies[j]
         free = self._free[bodies, 0]
         both = free.all(axis=1)
-        excess = (np.cross(centers[j], forces) + moments).sum(axis=1)
+        excess = (cross_rows(centers[j], forces) + moments).sum(axis=1)
         moments[both] -= 0.5 * excess[both, None]
         actions = np.concatenate([forces, moments], axis=2)
         w = np.where(free, 1.0 / self._rigid.masses[bodies], 0.0)
-        answers = np.concatenate([w[:, :, None] * forces, self._turned(arms[j], bodies, free, moments)], axis=2)
+        turned = np.where(free[..., None], np.einsum("rbij,rbj->rbi", inertia[bodies], moments), 0.0)
+        answers = np.concatenate([w[:, :, None] * forces, turned], axis=2)
         total = np.einsum("rbi,rbi->r", actions, answers)
         largest = np.zeros(len(self))
         np.maximum.at(largest, j, total)
         total[total <= _IDLE * largest[j]] = 0.0
         parts = (np.concatenate(each) for each in (missing, compliance, low, high, sizes))
         return JointRows(np.where(free, bodies, -1), actions, answers, total, *parts), count
-
-    def _turned(self, arms: Floats, bodies: NDArray[np.int64], free: NDArray[np.bool_], moments: Floats) -> Floats:
-        """(r, 2, 3) the rotations by moments (r, 2, 3), of corners at arms (r, 8, 3) with equal masses."""
-        r = arms.reshape(-1, 2, 4, 3)
-        second = np.einsum("rbki,rbkj->rbij", r, r)
-        inertia = np.trace(second, axis1=2, axis2=3)[:, :, None, None] * np.eye(3) - second
-        share = np.where(free, 4.0 / self._rigid.masses[bodies], 0.0)
-        return share[:, :, None] * np.linalg.solve(inertia, moments[..., None])[..., 0]
 
     def _note(self, rows: JointRows, forces: Floats, first_law: int, x: Floats) -> None:
         """Add the forces (r,) of a substep to those of the frame, about the joints' points."""
@@ -280,7 +248,7 @@ class JointProjection:
         np.add.at(actions, joint, forces[:, None] * rows.actions[:, 0])
         places = _at(g, g.centers, x, g.poses(0.0))
         arms = places - x[g.corners[:, :4]].mean(axis=1)
-        actions[:, 3:] -= np.cross(arms, actions[:, :3])
+        actions[:, 3:] -= cross_rows(arms, actions[:, :3])
         self._total += actions
         np.add.at(self._motors, joint[first_law:][laws.is_motor], forces[first_law:][laws.is_motor])
 
@@ -289,3 +257,10 @@ def _at(geometry: JointGeometry, vectors: Vectors, x: Floats, poses: tuple[Float
     """(f, 3) points, directions or differences at world positions x (n, 3)."""
     corners = x[geometry.corners[vectors.joint]]
     return np.einsum("fk,fki->fi", vectors.coefficients, corners) + vectors.offsets(poses)
+
+
+def cross_rows(a: Floats, b: Floats) -> Floats:
+    """a x b along the last axis; for few rows many times faster than `numpy.cross`."""
+    x, y, z = (a[..., i] for i in range(3))
+    u, v, w = (b[..., i] for i in range(3))
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
