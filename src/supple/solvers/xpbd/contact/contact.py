@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.model.system import System
+from supple.numerics.cross_rows import cross_rows
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact import admit as guarantee
@@ -231,7 +232,7 @@ class Contact:
         nodes, most = self.nodes, most or (MOST_RIGID_SWEEPS if len(self._rigid) else MOST_SWEEPS)
         x = nodes.x[: len(nodes.impulses), :3].copy()
         _, residual = solve(nodes.x, nodes.bodies, nodes.begin, self._rows, rows, self._tolerance(), most)
-        self._take_over(x, np.zeros((len(self._rigid), 6)))
+        self._take_over(x)
         return residual / self.gap
 
     def solve_joined(self, rows: int, joints: JointRows, enough: float) -> tuple[NDArray[np.float64], float]:
@@ -249,7 +250,9 @@ class Contact:
             solve_joints(joints, impulses, nodes.bodies.twists, most)
         twists = np.zeros((len(self._rigid) + 1, 6))
         np.add.at(twists, joints.bodies, impulses[:, None, None] * joints.answers)
-        self._take_over(x, twists[:-1])
+        of_joints = twists[:-1, None]
+        arms = nodes.bodies.arms[self._rigid.control]
+        self._take_over(x, (of_joints[..., :3] + cross_rows(of_joints[..., 3:], arms)) / self._h)
         return impulses, off
 
     def _tolerance(self) -> float:
@@ -258,20 +261,20 @@ class Contact:
         tolerance = RESIDUAL * self.gap
         return min(tolerance, RIGID_RESIDUAL * fall) if len(self._rigid) and fall > 0.0 else tolerance
 
-    def _take_over(self, x: NDArray[np.float64], of_joints: NDArray[np.float64]) -> None:
+    def _take_over(self, x: NDArray[np.float64], of_joints: NDArray[np.float64] | None = None) -> None:
         """Give velocities what moved vertices from x (n, 3), and bodies.
 
-        of_joints : (b, 6) the part of their twists that is not one of contacts
+        of_joints : (b, 4, 3) the part of the control points' changes that is not one of contacts [m/s]
         """
-        nodes, control = self.nodes, self._rigid.control
-        n, v = len(x), nodes.v[control]
+        nodes, n = self.nodes, len(x)
         changes = (nodes.x[:n, :3] - x) / self._h
         nodes.v[:n] += changes
         nodes.impulses += changes
-        arms = nodes.bodies.arms[control]
-        of_joints = of_joints[:, None, :3] + np.cross(of_joints[:, None, 3:], arms)
-        nodes.move_bodies(self._h)
-        nodes.impulses[control] += nodes.v[control] - v - of_joints / self._h
+        if len(self._rigid):
+            control = self._rigid.control
+            v = nodes.v[control]
+            nodes.move_bodies(self._h)
+            nodes.impulses[control] += nodes.v[control] - v - (0.0 if of_joints is None else of_joints)
 
     def keep(self, rows: int) -> None:
         """Note the forces, and keep the impulses with which the next substep begins."""

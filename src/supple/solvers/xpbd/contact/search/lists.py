@@ -26,8 +26,9 @@ SKIN = 0.01
 # before a substep rather than after it, and from which a node is searched together with those that must be.
 WIDE, NEAR = 0.13, 0.05
 SOON, TOGETHER = 0.7, 0.5
-# Of the mean edge: how far the fastest node goes while the wide list is valid; the number of substeps of the near list.
-WAY, STEPS = 0.35, 6
+# Of the mean edge: how far the fastest node goes while the wide list is valid, and at most where that has fewer pairs
+# than the surfaces have points, so that a search costs more than the list. The number of substeps of the near list.
+WAY, LONGEST, STEPS = 0.35, 1.0, 6
 
 
 class _Expected:
@@ -256,10 +257,11 @@ class Lists:
         self._deviations = self._deviations[0], 0.0
 
     def _time(self, v: NDArray[np.float64], h: float) -> float:
-        """For how long to search ahead: while the fastest node, seen from its body, goes `WAY` edges."""
-        s = self._surface.simplices
+        """For how long to search ahead: while the fastest node, seen from its body, goes `WAY` edges or more."""
+        s, pairs = self._surface.simplices, len(self._points) + len(self._edges)
+        way = min(LONGEST, WAY * max(1.0, len(s.nodes) / max(1, pairs))) * self._edge
         fastest = math.sqrt(_fastest(v, s.nodes, s.owner, len(s.collide)))
-        return max(h, WAY * self._edge / max(fastest, WAY * self._edge / (200.0 * h)))
+        return max(h, way / max(fastest, way / (200.0 * h)))
 
 
 def _room_for(k: int) -> Pairs:
