@@ -9,6 +9,8 @@ import pytest
 
 import supple as sp
 from supple.mesh.surface import SurfaceMesh
+from supple.results.export.video import Film
+from supple.results.export.video_worker import placed
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
 from supple.results.recording.scene import RecordedObstacle
@@ -16,7 +18,7 @@ from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.camera import direction_of, fitted
 from supple.results.view.floor_shadow import FloorShadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame, view_of
-from supple.results.view.surfaces import body_surface, obstacle_surfaces, split_at_creases, vertex_normals
+from supple.results.view.surfaces import body_surface, obstacle_surfaces, split_at_creases, surfaces_of, vertex_normals
 from supple.simulate import simulate
 
 
@@ -35,6 +37,9 @@ def test_bodies_are_drawn_by_their_skin_or_boundary(recording, model):
         volume = SurfaceMesh(slab.at(moment_of_frame(model, frame)), slab.triangles).volume
         assert volume == pytest.approx(0.3 * stretch)
     assert cube.color != slab.color
+    shown, same, *_ = surfaces_of(model, skins=False)
+    assert [len(s.triangles) for s in (cube, slab, shown, same)] == [8, 48, 48, 48]
+    assert SurfaceMesh(shown.at(first), shown.triangles).volume == pytest.approx(1.0)
 
 
 def test_obstacles_are_closed_and_face_outward(model):
@@ -76,6 +81,18 @@ def test_the_camera_sees_every_body_in_every_frame(recording, preset, slopes):
     np.testing.assert_allclose(seen.max(axis=0), -seen.min(axis=0), atol=0.01)  # in the middle
     assert np.abs(seen).max() > 0.75  # and it fills the picture
     assert eye[1] > view.center[1]
+
+
+@pytest.mark.parametrize(
+    ("camera", "share", "expected"),
+    [("fit", 0.0, (3, 4, 1)), ("fit", 0.7, (3, 4, 1)), ("orbit", 0.25, (1, 4, -1)), ("orbit", 0.5, (-1, 4, 1))],
+)
+def test_a_camera_between_places_is_there(recording, camera, share, expected):
+    """An orbit turns about the vertical line through the target."""
+    film = Film(camera=camera, eye=(3, 4, 1), target=np.array([1, 2, 1]))
+    center, away, distance = placed(film, view_of(recording), np.zeros((1, 3)), share)
+    np.testing.assert_allclose(center, [1, 2, 1])
+    np.testing.assert_allclose(center + distance * away, expected, atol=1e-12)
 
 
 def test_a_bowl_is_seen_whole_and_a_hall_is_not():

@@ -83,6 +83,7 @@ def checkpoints(_: Any, tokens: Sequence[Token]) -> Checkpoints:
 
 Steps = Annotated[int | None, Parameter(converter=steps)]
 Pixels = Annotated[tuple[int, int] | None, Parameter(converter=pixels, n_tokens=1, accepts_keys=False)]
+Vector = Annotated[tuple[float, float, float] | None, Parameter(negative="")]
 Seconds = Annotated[float | None, Parameter(converter=seconds)]
 CheckpointEvery = Annotated[Checkpoints, Parameter(converter=checkpoints, n_tokens=1, accepts_keys=False)]
 Overwrite = Annotated[bool, Parameter(negative="")]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import Pixels
+from supple.app.cli.arguments import Pixels, Vector
 
 
 @Parameter(name="*")
@@ -23,6 +23,11 @@ class PictureOptions:
         Parameter(help="fit (the whole motion, without it), follow (the bodies) or orbit (a film turns around them)."),
     ] = None
     view: Annotated[str | None, Parameter(help="From where: corner (without it), front, side, top or back.")] = None
+    eye: Annotated[Vector, Parameter(help="Place of the camera in metres, as 0.5 0.3 -1; needs --target.")] = None
+    target: Annotated[Vector, Parameter(help="What the camera at --eye looks at; orbit turns around it.")] = None
+    surface: Annotated[
+        str | None, Parameter(help="Of bodies: skin (without it), or tets, which is the surface that is simulated.")
+    ] = None
     color: Annotated[
         str | None, Parameter(help="body (without it), or a field with a legend: J, von_mises or energy.")
     ] = None

@@ -9,7 +9,10 @@ from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from supple.errors import OutputError
+import numpy as np
+
+from supple.errors import OutputError, SceneError
+from supple.kinds.checks import finite_vector
 from supple.results.recording.reader import Recording
 from supple.results.view.camera import PRESETS
 from supple.results.view.fields import FIELDS
@@ -17,9 +20,12 @@ from supple.results.view.options import COLOR_BY_BODY
 from supple.runtime.replacing import whole_file
 
 CAMERAS = ("fit", "follow", "orbit")
+DRAWN = ("skin", "tets")  # of SURFACES
 COLORS = {field.key: field for field in FIELDS.values()}
 # Of the sides [pixels]: encoders of H.264 take no more than the largest, and no odd ones.
 _LEAST, _MOST = 64, 4096
+
+Place = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,9 @@ class Film:
     slow : slow motion: how much longer the film is than the simulation, as a ratio
     camera : "fit" shows the whole motion, "follow" moves with the bodies, "orbit" turns once around them
     view : from where: "corner", "front", "side", "top" or "back"
+    eye : (3,) place of the camera [m], with `target` and instead of `view`; None: where it sees what `camera` says
+    target : (3,) place that the camera looks at [m], around which "orbit" turns
+    surface : of bodies: "skin", or "tets", the surface that is simulated, also where a body has a skin
     color : "body", or a field of the tets: "J", "von_mises" or "energy"
     shadows : whether bodies and obstacles cast soft shadows
     dark : whether the background is dark
@@ -48,13 +57,17 @@ class Film:
     slow: float = 1.0
     camera: str = "fit"
     view: str = "corner"
+    eye: Place | None = None
+    target: Place | None = None
+    surface: str = "skin"
     color: str = COLOR_BY_BODY
     shadows: bool = True
     dark: bool = False
     time: float | None = None
 
     def __post_init__(self) -> None:
-        for key, names in (("camera", CAMERAS), ("view", PRESETS), ("color", (COLOR_BY_BODY, *COLORS))):
+        choices = {"camera": CAMERAS, "view": PRESETS, "surface": DRAWN, "color": (COLOR_BY_BODY, *COLORS)}
+        for key, names in choices.items():
             if getattr(self, key) not in names:
                 raise OutputError(f"export: {key} is {getattr(self, key)!r}; give one of {', '.join(names)}")
         object.__setattr__(self, "size", tuple(self.size))
@@ -68,6 +81,23 @@ class Film:
                 raise OutputError(f"export: {key} is {value!r}; give a number above zero, at most {most:g}")
         if self.time is not None and not isinstance(self.time, (int, float)):
             raise OutputError(f"export: time is {self.time!r}; give seconds")
+        if self.eye is not None or self.target is not None:
+            self._require_places()
+
+    def _require_places(self) -> None:
+        if self.eye is None or self.target is None:
+            missing = "eye" if self.eye is None else "target"
+            raise OutputError(f"export: {missing} is missing; give eye and target together")
+        try:
+            eye, target = finite_vector(self.eye, "export: eye"), finite_vector(self.target, "export: target")
+        except SceneError as error:
+            raise OutputError(str(error)) from None
+        if not np.linalg.norm(eye - target) > 0.0:
+            raise OutputError("export: eye and target are the same place; move one, so that the camera has a direction")
+        if self.camera == "follow" or self.view != "corner":
+            raise OutputError("export: eye and target place the camera; leave out view, and camera follow")
+        object.__setattr__(self, "eye", tuple(eye.tolist()))
+        object.__setattr__(self, "target", tuple(target.tolist()))
 
 
 _NEEDED = {"png": ("pyvista", "PIL"), "gif": ("pyvista", "PIL"), "mp4": ("pyvista", "PIL", "imageio_ffmpeg")}

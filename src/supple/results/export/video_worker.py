@@ -16,8 +16,8 @@ from supple.errors import SuppleError
 from supple.results.export.legend import legend
 from supple.results.export.video import COLORS, Film
 from supple.results.recording.reader import Recording, read_recording
-from supple.results.view.bounds import box_corners
-from supple.results.view.camera import direction_of, fitted
+from supple.results.view.bounds import View, box_corners
+from supple.results.view.camera import direction_of, fitted, upright
 from supple.results.view.fields import Limits, Range, color_map, nodal_values
 from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
@@ -51,7 +51,7 @@ class Studio:
         self._meshes: list[tuple[Any, SoftSurface | RigidSurface]] = []
         ends = self._ends(moments)
         self._legend = None if self._field is None or ends is None else legend(self._field, ends, film.size, shown)
-        for flat in surfaces_of(model):
+        for flat in surfaces_of(model, skins=film.surface == "skin"):
             if flat.is_floor:
                 continue
             surface = flat.creased(model)
@@ -125,24 +125,42 @@ class Studio:
         return np.round(image * (1.0 - opaque) + colors * opaque).astype(np.uint8)
 
     def _aim(self, points: NDArray[np.float64], share: float) -> None:
-        """Place the camera so that the whole motion, or the bodies at points (k, 3), fill the picture."""
-        view, film, u = self._view, self._film, self._view.up
-        away = direction_of(film.view, view)
-        if film.camera == "orbit":
-            angle = 2.0 * np.pi * share
-            away = np.cos(angle) * away + np.sin(angle) * np.cross(u, away) + (1 - np.cos(angle)) * (u @ away) * u
-        seen = view.outline
-        if film.camera == "follow":
-            seen = box_corners(points.min(axis=0), points.max(axis=0))
-        slope = float(np.tan(np.radians(0.5 * _ANGLE)))
-        slopes = (slope * film.size[0] / film.size[1], slope)
-        center, distance = fitted(seen, away, u, slopes, centered=film.camera == "fit")
+        center, away, distance = placed(self._film, self._view, points, share)
         # The largest until now, so that the picture does not breathe.
-        self._distance = max(self._distance, distance, view.radius * 1e-3)
+        self._distance = max(self._distance, distance)
         camera = self._plotter.camera
         camera.position, camera.focal_point = tuple(center + self._distance * away), tuple(center)
-        camera.up, camera.view_angle = tuple(u), _ANGLE
+        camera.up, camera.view_angle = tuple(upright(self._view.up, away)), _ANGLE
         self._plotter.reset_camera_clipping_range()
+
+
+_Vector = NDArray[np.float64]
+
+
+def placed(film: Film, view: View, points: _Vector, share: float) -> tuple[_Vector, _Vector, float]:
+    """Where the camera is, at a share of the film's length: as given, or so that the whole motion fills the picture.
+
+    Returns
+    -------
+    The point (3,) at which it looks [m], the unit vector (3,) to the camera, and its distance [m]. Of a camera that
+    follows, the bodies at points (k, 3) fill the picture.
+    """
+    u, target = view.up, np.array(film.target)
+    away = direction_of(film.view, view) if film.eye is None else np.array(film.eye) - target
+    distance = float(np.linalg.norm(away))
+    away = away / distance
+    if film.camera == "orbit":
+        angle = 2.0 * np.pi * share
+        away = np.cos(angle) * away + np.sin(angle) * np.cross(u, away) + (1 - np.cos(angle)) * (u @ away) * u
+    if film.eye is not None:
+        return target, away, distance
+    seen = view.outline
+    if film.camera == "follow":
+        seen = box_corners(points.min(axis=0), points.max(axis=0))
+    slope = float(np.tan(np.radians(0.5 * _ANGLE)))
+    slopes = (slope * film.size[0] / film.size[1], slope)
+    center, distance = fitted(seen, away, u, slopes, centered=film.camera == "fit")
+    return center, away, max(distance, view.radius * 1e-3)
 
 
 def _share(color: Color) -> list[float]:

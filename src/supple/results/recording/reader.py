@@ -101,7 +101,8 @@ class Recording(RecordedContents, Showable, Sequence[RecordedFrame]):
         to : "glb", "obj", "vtu", "vtkhdf", "usd", "gif", "mp4", "png", "csv" or "html".
         output : file, with a suffix of the format, or folder; beside the recording, under its name, where it is not
             given. What is there is replaced.
-        film : how a film or picture is drawn: `size`, `rate`, `slow`, `camera`, `view`, `color`, `shadows`, `time`.
+        film : how a film or picture is drawn: `size`, `rate`, `slow`, `camera`, `view`, `eye`, `target`, `surface`,
+            `color`, `shadows`, `dark`, `time`.
 
         Raises
         ------

@@ -33,6 +33,11 @@ def direction_of(preset: str, view: View) -> NDArray[np.float64]:
     return direction / np.linalg.norm(direction)
 
 
+def upright(up: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The upward direction (3,) of a picture: `up`, or another one where the camera, at `away` (3,), looks along it."""
+    return up if np.linalg.norm(np.cross(up, away)) >= 1e-6 else np.eye(3)[int(np.argmin(np.abs(away)))]
+
+
 def fitted(
     points: NDArray[np.float64],
     away: NDArray[np.float64],
@@ -122,8 +127,7 @@ def _fit(
     camera = client.camera
     half = float(np.tan(0.5 * np.clip(camera.fov, 0.02, 3.0)))
     upwards = np.asarray(camera.up_direction, dtype=np.float64) if up is None else up
-    if np.linalg.norm(np.cross(upwards, away)) < 1e-6:
-        upwards = np.eye(3)[int(np.argmin(np.abs(away)))]
+    upwards = upright(upwards, away)
     slopes = (half * max(camera.aspect, 0.05), half)
     center, distance = fitted(points, away, upwards, slopes, centered=up is not None)
     _move(client, center, distance * away, up)

@@ -126,14 +126,14 @@ class RigidSurface(Surface):
         return replace(self, vertices=self.vertices[rows], triangles=triangles)
 
 
-def surfaces_of(model: Model) -> list[SoftSurface | RigidSurface]:
+def surfaces_of(model: Model, *, skins: bool = True) -> list[SoftSurface | RigidSurface]:
     """Those of all bodies, then those of all obstacles."""
-    return [*(body_surface(model, body) for body in model.bodies), *obstacle_surfaces(model)]
+    return [*(body_surface(model, body, skins=skins) for body in model.bodies), *obstacle_surfaces(model)]
 
 
-def body_surface(model: Model, body: ModelBody) -> SoftSurface | RigidSurface:
-    """The skin of a body, or its boundary where it has none."""
-    if body.skin is None:
+def body_surface(model: Model, body: ModelBody, *, skins: bool = True) -> SoftSurface | RigidSurface:
+    """The skin of a body; its boundary where it has none, or, if it is soft, without `skins`."""
+    if body.skin is None or not (skins or body.rigid):
         return boundary_surface(body)
     if not body.rigid:
         rows = np.arange(len(body.skin.corners))

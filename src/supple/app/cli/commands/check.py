@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import Seconds, Steps, recording_at
+from supple.app.cli.arguments import Seconds, Steps, Vector, recording_at
 from supple.app.cli.console import ExitCode
 
 if TYPE_CHECKING:
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 Names = Annotated[list[str] | None, Parameter(negative="", consume_multiple=False)]
 Flag = Annotated[bool, Parameter(negative="")]
-Vector = Annotated[tuple[float, float, float] | None, Parameter(negative="")]
 _SETTINGS = (
     "every", "only", "skip", "max_volume_change", "max_orthogonality_error", "max_energy_gain", "max_momentum_change",
 )  # fmt: skip
