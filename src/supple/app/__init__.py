@@ -1,4 +1,4 @@
-"""What people use: the shell, the viewer, studies, runs, learning, demos."""
+"""What users call: the shell, the viewer, studies, runs, learning, demos."""
 
 import lazy_loader
 

@@ -243,7 +243,7 @@ class Problems:
         self.first: dict[Status, str] = {}
 
     def note(self, status: Status, message: str) -> None:
-        """Take notice of a frame."""
+        """Record a frame."""
         self.frames += 1
         if status is not Status.CONVERGED and status.can_go_on:
             self.bad += 1

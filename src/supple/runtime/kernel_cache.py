@@ -205,7 +205,7 @@ class KernelCache(_Cache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         path = kernel_folder.kernel_folder() / self._entry(sig, data.codegen.magic_tuple())
-        # A kernel that is not kept is compiled again next time: a full disk is no reason to end a run.
+        # A kernel that is not kept is compiled again next time: a full disk does not end a run.
         with suppress(OSError):
             if not data.library.has_dynamic_globals:  # addresses of this process
                 kernel_folder.write(path, dumps(data._reduce()))

@@ -1,4 +1,4 @@
-"""Who is told of kernels as they are loaded and compiled. Importing this does not import Numba."""
+"""Functions that are called as kernels are loaded and compiled. Importing this does not import Numba."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def resume(
     ----------
     folder : of a run that `RunFolder` or `supple run` has kept
     scene, solver : those of the run, where its scene did not come from a scene file
-    steps : number of frames of the whole run from now on; None: as before
+    steps : new number of frames of the whole run; None: the number that was given to the run
     control : see `simulate`; the inputs of the scene have the values of the checkpoint
     sinks : in addition to the folder; they receive the frames from the checkpoint on
 

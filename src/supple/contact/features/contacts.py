@@ -1,6 +1,6 @@
 """Contacts of one state: pairs of parts of surfaces that repel each other, and the area that each stands for.
 
-A weight depends on directions, and its derivatives are no forces. While the minimum of an energy is searched, contacts
+A weight depends on directions, and its derivatives are not forces. While the minimum of an energy is searched, contacts
 keep the weights with which the search first met them: the energy is then a function of the positions. Weights may grow
 where the search goes on, so that nothing comes near without a force; they cannot grow without end. A vertex that counts
 with the plane of a triangle beside an outline keeps the triangle, too: another one would have another plane. Where it

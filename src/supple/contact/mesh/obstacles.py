@@ -34,7 +34,7 @@ class ObstaclePoses:
         """Rotations and translations at `time` [s]; read only."""
         if not self.moving.any():
             time = 0.0
-        key = (time, *(given.ramp for given in self._inputs))  # where an input was set anew, its poses are others
+        key = (time, *(given.ramp for given in self._inputs))  # where an input was set again, its poses differ
         if key not in self._recent:
             if len(self._recent) >= 4:
                 self._recent.pop(next(iter(self._recent)))

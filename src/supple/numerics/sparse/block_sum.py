@@ -1,6 +1,6 @@
 """The sum of element matrices and of couplings that change from solve to solve.
 
-Contacts couple vertices that no element couples, and other ones every time. The joint pattern is made anew where a
+Contacts couple vertices that no element couples, and other ones every time. The joint pattern is made again where a
 coupling has no block in it. Assembly gathers, as that of the elements alone: each block is written by one thread, its
 element entries first, then its couplings in their order. Any number of threads gives the same bits.
 """

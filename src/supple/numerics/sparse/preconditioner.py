@@ -104,7 +104,7 @@ class TwoLevel:
     coarse: NDArray[np.float64]
 
     def update(self, data: NDArray[np.float64], coarse: bool = True) -> None:
-        """Take over a new matrix; with `coarse=False` the coarse level stays as it was."""
+        """Use a new matrix; with `coarse=False` the coarse level does not change."""
         self.order.take(data)
         _invert_diagonal(self.order.diagonal_source, data, self.diagonal, self.inverse_diagonal)
         if coarse:

@@ -1,4 +1,4 @@
-"""Loads, cavities and cables, computed anew from a frame: their forces on vertices, volumes and lengths."""
+"""Loads, cavities and cables, computed again from a frame: their forces on vertices, volumes and lengths."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ class Studio:
 
     def _aim(self, points: NDArray[np.float64], share: float) -> None:
         center, away, distance = placed(self._film, self._view, points, share)
-        # The largest until now, so that the picture does not breathe.
+        # The largest so far, so that the size of the picture does not vary.
         self._distance = max(self._distance, distance)
         camera = self._plotter.camera
         camera.position, camera.focal_point = tuple(center + self._distance * away), tuple(center)

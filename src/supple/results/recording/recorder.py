@@ -220,7 +220,7 @@ class Recorder:
             rewrite(file.path, fresh, file.layout, capacity)
             larger = RecordingFile(fresh, file.layout, capacity, file.written)
             larger.write_count()
-            logger.debug("%s: room for %d frames now", file.path, capacity)
+            logger.debug("%s: room for %d frames", file.path, capacity)
             return larger.moved(file.path)
         finally:
             fresh.unlink(missing_ok=True)

@@ -59,7 +59,7 @@ def concave_contact(signed_distance: Callable[..., Any]) -> Callable[..., Any]:
 def _compiled(contact: Any, signed_distance: Any) -> Callable[..., Any]:
     """The function under a name of its own.
 
-    Cached kernels contain what they call, under its name and a number that begins anew in every process. Kernels that
+    Cached kernels contain what they call, under its name and a number that starts again in every process. Kernels that
     different processes have compiled would confuse two functions of the same name.
     """
     distance = signed_distance.py_func

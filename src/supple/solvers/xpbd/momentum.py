@@ -33,7 +33,7 @@ _SUMS = 21
 class MomentumRestore:
     """The components of a system, and which of them are free. Bodies joined by stitches are one component.
 
-    Rigid bodies are no members: `RigidBodies.advance` keeps their momenta.
+    Rigid bodies are not members: `RigidBodies.advance` keeps their momenta.
     """
 
     def __init__(self, system: System) -> None:

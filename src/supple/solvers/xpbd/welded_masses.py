@@ -1,6 +1,6 @@
 """Rigid bodies with the masses of what is welded to them, and with the points that something is stitched to.
 
-A welded vertex has no motion of its own, so that its mass belongs to its rigid body: mass, center and inertia of the
+A welded vertex moves with its rigid body, so that its mass belongs to that body: mass, center and inertia of the
 body are those of both. The solver works with control points of these bodies, which are affine combinations of those of
 the scene's bodies; states are converted at both ends of a frame.
 

@@ -27,7 +27,7 @@ def resume(
     folder
         The run folder: what was given to `supple run` or `supple demo` as --output.
     steps
-        Number of frames of the whole run from now on; without it, as before.
+        New number of frames of the whole run; without it, the number that was given to the run.
     quiet
         Print neither progress nor summary.
     """

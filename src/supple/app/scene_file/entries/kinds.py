@@ -89,7 +89,7 @@ def model_of(kind: type[Kind], tagged: bool) -> type[KindModel]:
 
 
 def entry_of(kinds: Sequence[type[Kind]]) -> Any:
-    """The type of an entry that is of one of several kinds: told apart by their key `kind`, or of one alone."""
+    """The type of an entry that is of one of several kinds: distinguished by their key `kind`, or of one alone."""
     if len(kinds) == 1:
         return model_of(kinds[0], False)
     return Annotated[Union[tuple(model_of(kind, True) for kind in kinds)], Field(discriminator="kind")]  # noqa: UP007

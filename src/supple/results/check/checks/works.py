@@ -1,4 +1,4 @@
-"""The works of pins, loads, actuators and contact, computed anew from positions and recorded values and forces.
+"""The works of pins, loads, actuators and contact, computed again from positions and recorded values and forces.
 
 Between two frames a force f moves its vertex by d. The trapezoid (f + f') d / 2 is of second order in the time between
 frames; half of |f' d - f d| is how far it may be off, while a force changes in one direction. What the frames leave

@@ -1,4 +1,4 @@
-"""Energy from nowhere in a frame: what the bodies gained, less the work that was done on them.
+"""Energy without a source in a frame: what the bodies gained, less the work that was done on them.
 
 Kinetic, elastic and potential energy, and that of stitches, of all vertices; `Works` has the works of loads, actuators,
 motors and pins. Contact does work where obstacles move: what it adds is theirs, as far as it exceeds what it takes. The

@@ -56,7 +56,7 @@ class DeliveredWork:
         self._begun = False
 
     def begin(self, extended: NDArray[np.float64]) -> None:
-        """Take notice of the positions (n + a, 4) before a sweep."""
+        """Record the positions (n + a, 4) before a sweep."""
         if self._sets:
             self._before = extended.copy()
             self._begun = True

@@ -1,15 +1,15 @@
 """The guarantee of a substep: what was apart at x_n stays apart, and J stays positive, whatever the forces were.
 
-Nodes go straight from x_n to x. A pair is good if the plane across n that moves with it still parts both sides at x,
-by a share of the distance or, below a floor, all of it, or if one that turns with the pair parts them all the time.
-Only a pair that is not good gets a plane that stands still, where both sides would meet, and motions are shortened so
-that each node ends on its side of it. A tet that loses too much gets the share for which any independent shorter
-motions keep J. Motions only become shorter, so that pairs with a plane and tets that were cut stay good; each is
+Nodes go straight from x_n to x. A pair is good if the plane across n that moves with it still separates both sides at
+x, by a share of the distance or, below a floor, by all of it. It is also good if a plane that turns with the pair
+separates the sides all the time. Only a pair that is not good gets a fixed plane, where both sides would meet. Motions
+are shortened so that each node ends on its side of it. A tet that loses too much volume gets the share for which any
+independent shorter motions keep J. Motions only become shorter, so that pairs with a plane and tets that were cut stay good; each is
 treated at most once, and the loop ends.
 
-Nodes of inverse mass zero go where they are told. What they push before them is carried: its place at x_n is moved
-along n to its side, from where its motion is shortened. Where that turns a tet over, or takes a node through something
-else, nothing is left that could be cut, and `admit` says so.
+Nodes of inverse mass zero are kinematic: their motion is prescribed and is not shortened. Nodes that they push are
+carried: their places at x_n are moved along n to their side, and their motion is shortened from there. Where that
+inverts a tet, or takes a node through another surface, no motion is left to shorten, and `admit` reports it.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def _apart(x, rows, e, n):
 
 @njit
 def _keeps_apart(base, points, rows, e, n, remains, bends):
-    """Whether a plane parts the sides of a pair all the time while nodes go straight from `base` to `points`.
+    """Whether a plane separates the sides of a pair all the time while nodes go straight from `base` to `points`.
 
     First one with the normal n of the beginning; then one that turns from it to that of the end. For nodes p and q of
     the two sides, (1 - s) n + s n' times p - q is a quadratic in s, with the coefficients a, 2 b, c of Bernstein; it is
@@ -145,7 +145,7 @@ def _plane(base, points, rows, e, n, margin):
     """Where the plane of a pair stands along n: where both sides would arrive at the same time."""
     top, floor = np.inf, -np.inf
     down = up = 0.0
-    lowest, highest = np.inf, -np.inf  # of nodes that go where they are told
+    lowest, highest = np.inf, -np.inf  # of kinematic nodes
     end_top, end_floor = np.inf, -np.inf
     for i in range(4):
         v = rows.nodes[e, i]
@@ -225,7 +225,7 @@ def admit(base, points, movers, rows, count, tets, low, moved, keep, nearest, ma
                 sign = 1.0 if i == 0 or (i == 1 and rows.kinds[e] != POINT) else -1.0
                 begin, end = sign * (along(base, v, n) - where), sign * (along(points, v, n) - where)
                 if begin < margin:
-                    # What goes where it is told pushes this node before it.
+                    # A kinematic node pushes this node.
                     back, ahead = sign * (margin - begin), sign * max(0.0, margin - end)
                     changed = _carry(base, points, v, back, ahead, n, movers, marks, changed, rounds)
                 elif end < margin:
@@ -269,9 +269,9 @@ def count_crossing(base, points, rows, count, nearest):
 def widen(points, movers, loose, rows, count, most, marks):
     """Widen gaps of pushing pairs that are too narrow by at most `most` [m]; put nodes back onto walls.
 
-    So what begins behind a surface leaves it slowly.
+    So a node that begins behind a surface leaves it slowly.
 
-    No velocity follows. Bodies are shifted by their inverse masses `loose` (b,). Returns how many nodes of
+    Velocities do not change. Bodies are shifted by their inverse masses `loose` (b,). Returns how many nodes of
     `marks.changed` moved.
     """
     moved = 0

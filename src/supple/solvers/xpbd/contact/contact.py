@@ -120,7 +120,7 @@ class Contact:
 
     @property
     def kept_apart(self) -> bool:
-        """Whether nothing was through something where the frame began, and nothing was crushed since.
+        """Whether no surfaces crossed where the frame began, and nothing was crushed since.
 
         Then nothing crosses; see docs/theory/contact.md.
         """

@@ -1,4 +1,4 @@
-"""What cuts take from motions, and how velocities take it over; see `admit`."""
+"""What cuts take from motions, and how velocities change with it; see `admit`."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def share_motion(points, movers, rows, begin, velocities, cuts, count):
     """Give back what the cuts took: the velocities of the four nodes go over to those of their common rigid motion.
 
     By the share that was cut. In the metric of the masses, the rigid motion is the projection of the motion, so that
-    the kinetic energy does not rise; both momenta, about the places x_n, remain. Nodes that go where they are told
-    give their own velocity to the others.
+    the kinetic energy does not rise; both momenta, about the places x_n, remain. Kinematic nodes give their own
+    velocity to the others.
     """
     for e in range(count):
         part = 1.0 - cuts.shares[e]
@@ -41,13 +41,13 @@ def share_motion(points, movers, rows, begin, velocities, cuts, count):
                 _stop_approach(points, movers.bodies, rows, cuts.rows[e], velocities, part)
             continue
         total = cx = cy = cz = px = py = pz = 0.0
-        told = 0
+        kinematic = 0
         for i in range(4):
             v = cuts.nodes[e, i]
-            told += points[v, 3] == 0.0
+            kinematic += points[v, 3] == 0.0
         for i in range(4):
             v = cuts.nodes[e, i]
-            if told:
+            if kinematic:
                 m = 1.0 if points[v, 3] == 0.0 else 0.0
             else:
                 m = 1.0 / points[v, 3]
@@ -57,7 +57,7 @@ def share_motion(points, movers, rows, begin, velocities, cuts, count):
         cx, cy, cz = cx / total, cy / total, cz / total
         mean = (px / total, py / total, pz / total)
         spin = (0.0, 0.0, 0.0)
-        if not told:
+        if not kinematic:
             spin = _spin(points, begin, velocities, cuts.nodes, e, (cx, cy, cz))
         for i in range(4):
             v = cuts.nodes[e, i]

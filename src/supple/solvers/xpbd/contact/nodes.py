@@ -70,10 +70,10 @@ class Nodes:
         return np.column_stack([self.begin, self.x[:, 3]]) if self._poses.moving.any() else self.x
 
     def carried(self) -> NDArray[np.float64]:
-        """(N, 3) x_n, with what goes where it is told at its end."""
+        """(N, 3) x_n, with kinematic nodes at the end of their motion."""
         base = self.begin.copy()
-        told = self.x[:, 3] == 0.0
-        base[told] = self.x[told, :3]
+        kinematic = self.x[:, 3] == 0.0
+        base[kinematic] = self.x[kinematic, :3]
         return base
 
     def follow(self) -> None:

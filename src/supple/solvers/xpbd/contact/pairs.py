@@ -32,7 +32,7 @@ class Pairs(NamedTuple):
         are the same with other obstacles
     pushes : (k,) whether the pair pushes; pairs of one body that are near each other at rest are only kept apart
     deep : (k,) whether the sides were through each other when the frame began; then they are not kept on their sides,
-        but pushed out along the normals of then
+        but pushed out along the normals at that time
     friction : (k,) its coefficient; gaps : (k,) the distance that is kept [m]
     normals : (k, 3) as of the latest look; impulses : (k, 3) with which the next substep begins [kg m]
     """

@@ -1,7 +1,7 @@
 """Simple shapes: planes and the walls of rooms, whose free side is convex.
 
-A point keeps its side where both ends of its way are on it, so that shapes need no truncation: what a substep leaves
-beyond a wall is put back onto it, which is a projection onto a convex set that contains the beginning of the way.
+A point keeps its side where both ends of its way are on it, so that shapes need no truncation. A point that a substep
+leaves beyond a wall is put back onto it. This is a projection onto a convex set that contains the beginning of the way.
 """
 
 from __future__ import annotations

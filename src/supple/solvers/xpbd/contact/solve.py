@@ -129,7 +129,7 @@ def solve(points, bodies, begin, rows, count, tolerance, most):
 
 @njit(cache=True)
 def push_kept(points, bodies, velocities, near, pairs, walls, gap, h):
-    """Begin a substep with the impulses that are kept, along the normals of now; those that no longer hold are zero."""
+    """Begin a substep with the kept impulses, along the normals at x_n; impulses of pairs that do not push are zero."""
     shape = len(near) - len(walls.gaps)
     for m in range(len(near)):
         k = near[m]
@@ -149,7 +149,7 @@ def push_kept(points, bodies, velocities, near, pairs, walls, gap, h):
         for j in range(3):
             pairs.impulses[k, j] = push * n[j] + t[j]
             pairs.normals[k, j] = n[j]
-    # Velocities change only now; the places are those of x_n throughout.
+    # Velocities change only here; the places are those of x_n throughout.
     for k in near:
         if not is_loaded(pairs.impulses, k):
             continue

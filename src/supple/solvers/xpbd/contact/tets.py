@@ -80,7 +80,7 @@ def measure(points, tets, guard, share):
         J = tets.scales[t] * determinant(points, tets.nodes, t)
         tets.now[t] = J
         asked = guarded_J(tets.J[t])
-        # What is nearly flat must not be left to `admit`, which would stop it.
+        # A tet that is nearly flat must not be left to `admit`, which would stop it.
         bound = max(share * asked, min(asked, FLATTEST)) if guard else least_J(tets.J[t], share)
         if not bound <= J:
             tets.low[count] = t
@@ -183,7 +183,7 @@ def _part(base, points, i, share):
 @njit
 def share_of_tet(base, points, tets, t, keep):
     """The largest share of the motions from `base` that a tet can make, to 1/256; 1 where it can make all."""
-    # A little more than what is asked for, so that round-off does not ask again.
+    # A little more than the required volume, so that round-off does not require a second cut.
     J = tets.J[t]
     bound = min((1.0 - 5e-7) * J, (1.0 + 1e-9) * max(keep * J, FLATTEST)) / tets.scales[t]
     if _least_corner(base, points, tets, t, 1.0) >= bound:

@@ -36,7 +36,7 @@ class Probe:
         stage.prepare_bodies(self._add_handlers)
 
     def refresh(self) -> None:
-        """Update the label; it goes where no field is drawn, or the tet is gone."""
+        """Update the label; remove it where no field is drawn, or the tet was removed."""
         stage, tet = self._stage, self._tet
         value = None if tet is None else stage.value_at(tet)
         if tet is None or value is None or stage.field is None:

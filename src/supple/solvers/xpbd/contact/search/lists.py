@@ -1,8 +1,8 @@
-"""Lists of the pairs that may touch, valid while nodes go on as they go.
+"""Lists of the pairs that may touch, valid while nodes keep their velocities.
 
 The wide list holds what may come near for a while, if every node goes straight on with its velocity; only relative
-motion counts, so what flies or turns together stays in it. Where a node has left its expected place by its margin, its
-pairs are searched anew. Of the wide list, the near list holds what may come near within the next few substeps.
+motion counts, so things that fly or turn together stay in it. Where a node has left its expected place by its margin,
+its pairs are searched again. Of the wide list, the near list holds what may come near within the next few substeps.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ class Lists:
     def cover(
         self, begin: NDArray[np.float64], end: NDArray[np.float64], h: float, frames: NDArray[np.float64]
     ) -> bool:
-        """Whether the lists held for the motion of a substep; otherwise they are made anew for this very motion."""
+        """Whether the lists held for the motion of a substep; otherwise they are made again for this motion."""
         wide, tight = self.wide, self.tight
         wide.age += h
         tight.age += h

@@ -1,8 +1,8 @@
-"""Things that are through each other when a frame begins: the pairs that part them, and what is not kept apart.
+"""Things that are through each other when a frame begins: the pairs that push them out, and what is not kept apart.
 
-No pair of surfaces that cross keeps its sides, because that would keep them from parting. A point of one that is inside
-of the other is pushed towards the triangle that is nearest then; two edges whose nearest places are inside of each
-other's things are pushed past each other.
+Pairs of surfaces that cross do not keep their sides, because that would prevent their separation. A point of one thing
+that is inside of the other is pushed towards the triangle that is nearest at that time. Two edges whose nearest places
+are inside of each other's things are pushed past each other.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from supple.solvers.xpbd.contact.search.surface import Simplices
 
 
 class Overlaps(NamedTuple):
-    """What begins through each other.
+    """Things that are through each other when a frame begins.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Overlaps(NamedTuple):
 
     @classmethod
     def none(cls, things: int) -> Overlaps:
-        """Of things that are apart."""
+        """Of things that are apart: empty."""
         pairs = np.zeros((0, 2), dtype=np.int32)
         return cls(np.zeros((things, things), dtype=np.bool_), pairs, pairs, np.zeros((0, 3)))
 

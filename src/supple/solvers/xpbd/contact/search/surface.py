@@ -1,8 +1,8 @@
 """The surfaces of a scene on the nodes of the solver.
 
 Nodes are the rows of the solver's arrays: the vertices, then the anchors of stitches, then the vertices of obstacles
-that have triangles. Whatever touches is a node, so that one kernel serves bodies and obstacles; what is held or follows
-a script has the inverse mass zero.
+that have triangles. Everything that touches is a node, so that one kernel serves bodies and obstacles. Nodes that are
+held or follow a script have the inverse mass zero.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from supple.scene.contact_pairs import pair_table
 from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 
-# Of the gap between surfaces: that from obstacles that are given by a formula, so that what stands on a table looks so.
-# A fifth of it is what rows may leave over.
+# Of the gap between surfaces: that from obstacles that are given by a formula. It is small, so that a body on a table
+# does not appear to float. Rows may leave a fifth of it.
 ON_SOLIDS = 0.1
 
 
