@@ -98,8 +98,8 @@ def simulate(
         scene describes.
     start : a frame or state of this scene to continue from, of any solver or from a recording; excludes the two above.
         From a `Frame` of the same scene object and an equal solver, the frames have the bits of an uninterrupted run.
-    control : called before each step with the latest frame; returns values of the scene's inputs that they shall have
-        at the end of the step, by name, or None. Others stay as they are. `send` of the generator does the same.
+    control : called before each step with the latest frame; returns values of the scene's inputs for the end of the
+        step, by name, or None. Others stay as they are. `send` of the generator does the same.
     sinks : receive the start, every frame, and the end.
     progress : whether to show a bar, in a terminal or a notebook; see `ProgressBar`.
 

@@ -211,7 +211,7 @@ def test_a_recording_with_a_hostile_formula_is_refused(tmp_path):
     [
         ({"psi": lambda I1, I2, J: np.exp(I1)}, r"psi cannot be called with symbols \(.*\); use \+, -,"),
         ({"psi": lambda I1, I2: I1}, "psi cannot be called with symbols"),
-        ({"psi": lambda I1, I2, J: 1e5 * I1}, r"psi has a stress of 200000 Pa at rest; add a term that takes it away"),
+        ({"psi": lambda I1, I2, J: 1e5 * I1}, r"psi has a stress of 200000 Pa at rest; add a term that cancels it"),
         ({"psi": lambda s0, s1, s2: (s0 - 1) ** 2 + s1**2 - 2 * s1, "of": "stretches"}, "psi is not symmetric"),
         (
             {"psi": lambda I1, I2, J: -mooney(I1, I2, J, 1e5, 0), "bulk": 1e6},

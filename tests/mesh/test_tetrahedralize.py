@@ -366,5 +366,5 @@ def test_two_threads_can_mesh_at_once() -> None:
 @pytest.mark.skipif(not meshers.ftetwild_installed(), reason="needs pytetwild")
 def test_a_sheet_encloses_nothing() -> None:
     sheet = SurfaceMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    with pytest.raises(MeshingError, match="fTetWild found nothing that the surface encloses"):
+    with pytest.raises(MeshingError, match="fTetWild found no volume inside of the surface"):
         fill(sheet, tets=100, mesher="ftetwild")

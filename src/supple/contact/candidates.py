@@ -13,8 +13,8 @@ from supple.contact.search.distances import edges_nearer, points_nearer
 from supple.contact.search.patch_search import PatchSearch
 from supple.runtime.kernel_cache import njit
 
-# Margins are this share of the present motion, between these shares of dhat and of the mean edge: what moves by little
-# needs no new search for several steps, and what moves by much needs one anyway.
+# Margins are this share of the present motion, between these shares of dhat and of the mean edge: points that move
+# little do not need a new search for several steps, and points that move far need one for any margin.
 _SHARE, _LEAST, _MOST = 0.5, 0.5, 0.1
 # Points that are nearer to a straight way than this share of the margin are on it.
 _ON_WAY = 0.25

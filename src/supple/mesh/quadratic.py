@@ -145,7 +145,7 @@ def check_middle_nodes(nodes: NDArray[np.int32], n_vertices: int) -> None:
                 )
             raise MeshError(
                 f"TetMesh: vertex {middle[one]} is the middle node of the edges {ends[one].tolist()} and "
-                f"{ends[two].tolist()}; give each edge a node of its own, in VTK's order"
+                f"{ends[two].tolist()}; give each edge its own node, in VTK's order"
             )
 
 

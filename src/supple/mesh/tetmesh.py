@@ -172,8 +172,8 @@ class TetMesh(Showable):
 
         Raises
         ------
-        MeshError : where the extension is none of these, the file cannot be written, or quadratic tets shall go to
-            TetGen's or USD's files. No partial file is left.
+        MeshError : where the extension is none of these, the file cannot be written, or quadratic tets would be written
+            to TetGen's or USD's files. No partial file is left.
         """
         if is_tetgen_path(path):
             if self.order == 2:

@@ -46,7 +46,7 @@ def facet_keys(triangles: NDArray[np.integer], n_vertices: int) -> NDArray[np.in
     low, middle, high = np.sort(triangles, axis=1).astype(np.int64).T
     if n_vertices < 2**21:
         return (low * n_vertices + middle) * n_vertices + high
-    # Three indices no longer fit into 63 bits: number the pairs first.
+    # Three indices do not fit into 63 bits: number the pairs first.
     _, rank = np.unique(low * n_vertices + middle, return_inverse=True)
     return rank.astype(np.int64) * n_vertices + high
 

@@ -1,8 +1,8 @@
 """A scene as flat arrays, the input of solvers.
 
 The bodies' vertices, tets, edges, points and surface triangles are concatenated; a `BodyRange` has the rows of one.
-Vertices are what moves. Points are what touches: combinations of vertices, of a soft body its vertices or those of its
-skin. This file does not depend on solvers, files or viewers.
+Vertices move. Points touch; they are combinations of vertices: of a soft body its vertices or those of its skin. This
+file does not depend on solvers, files or viewers.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ from supple.runtime.kernel_cache import njit, prange
 
 # The lower bound is sharp enough when it is above this share of the upper one.
 _SHARP = 0.95
-# After so many bisections, the lower bound is taken as it is.
+# After this many bisections, the lower bound is taken as it is.
 _DEEPEST = 24
 _RUN = 64
 

@@ -137,7 +137,7 @@ class Frame(FrameReadings):
 def completed_report(
     system: System, state: State, step: StepReport, seconds: float, energy_before: float | None = None
 ) -> Report:
-    """The report of a step that took so many seconds, with what is measured on its state.
+    """The report of a step that took this many seconds, with what is measured on its state.
 
     energy_before : `energy` where the step began [J]; None where there was no step. Works of a solver that reports
         some get the numerical one.

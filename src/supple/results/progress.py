@@ -1,4 +1,4 @@
-"""What a terminal shows of progress: of a simulation by a sink, and of compilation, so that no wait is silent."""
+"""The progress that a terminal shows: of a simulation by a sink, and of compilation; every wait shows its cause."""
 
 from __future__ import annotations
 

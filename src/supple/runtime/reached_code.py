@@ -31,7 +31,7 @@ def reached_code(kernel: FunctionType | Dispatcher) -> bytes:
     while pending:
         value = pending.pop()
         if isinstance(value, Dispatcher):
-            # Sets of options have no order of their own.
+            # Sets of options are not ordered.
             options = {k: sorted(v) if isinstance(v, (set, frozenset)) else v for k, v in value.targetoptions.items()}
             digest.update(repr(sorted(options.items())).encode())
             value = value.py_func

@@ -73,7 +73,7 @@ class ThreadTuner:
             self._interval = min(2 * self._interval, LARGEST_MULTIPLE * self._shortest)
 
     def threads(self, parallel: bool, threads: int | None = None) -> AbstractContextManager[None]:
-        """Run parallel kernels on so many threads (None: as many as there are), or on one.
+        """Run parallel kernels on this many threads (None: as many as there are), or on one.
 
         Where there is a choice, they have their parallel form on one thread too, so that none is compiled twice.
         """
@@ -82,7 +82,7 @@ class ThreadTuner:
         return one_thread() if self.choice else numba_threads(1)
 
     def tasks(self, count: int, threads: int) -> Iterator[int]:
-        """The numbers of so many tasks, each on several threads or on one; their times are noted.
+        """The numbers of this many tasks, each on several threads or on one; their times are noted.
 
         A task takes 1 or `threads` threads for all of its kernels: where another process is busy, each kernel that
         waits for a second thread takes many times longer. It can be interrupted before each task.

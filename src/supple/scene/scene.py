@@ -125,7 +125,7 @@ class Scene(Showable):
                 with at(key, i, "name"):
                     if item.name in named:
                         things = f"{named[item.name]} {item.name!r} and {thing} {item.name!r}"
-                        raise SceneError(f"{things} have the same name; give each body and obstacle a name of its own")
+                        raise SceneError(f"{things} have the same name; give each body and obstacle a different name")
                 named[item.name] = thing
         pinned = {body.name: np.zeros(len(body.points), dtype=bool) for body in self.bodies}
         for key in ("pins", "forces", "soft_targets"):
@@ -184,13 +184,13 @@ class Scene(Showable):
             with at("joints", i):
                 joint.check(bodies, obstacles)
                 if any(other.name == joint.name for other in self.joints[:i]):
-                    raise SceneError(f"{joint.label}: another joint has this name; give each a name of its own")
+                    raise SceneError(f"{joint.label}: another joint has this name; give each a different name")
 
     def _check_welds(self, pinned: dict[str, NDArray[np.bool_]]) -> None:
         for i, weld in enumerate(self.welds):
             with at("welds", i):
                 if any(other.name == weld.name for other in self.welds[:i]):
-                    raise SceneError(f"{weld.label}: another weld has this name; give each a name of its own")
+                    raise SceneError(f"{weld.label}: another weld has this name; give each a different name")
         vertices, weld_of, begin = self.welding.vertices, self.welding.weld, 0
         for body in self.bodies:
             count = len(body.mesh.vertices)
@@ -307,7 +307,7 @@ class Scene(Showable):
 
 def _check_own_name(kind: str, item: Cavity | Cable | Sensor, others: Sequence[Cavity | Cable | Sensor]) -> None:
     if any(other.name == item.name for other in others):
-        raise SceneError(f"{item.label}: another {kind} has this name; give each a name of its own")
+        raise SceneError(f"{item.label}: another {kind} has this name; give each a different name")
 
 
 def _name(kind: Any) -> str:

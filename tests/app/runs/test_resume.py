@@ -125,7 +125,7 @@ def test_frames_that_are_computed_differently_are_replaced_from_there(out, caplo
     rest = list(sp.resume(out, drifting_scene(), other))
     assert rest[0].report.status == "iteration_limit"
     told = [record.getMessage() for record in caplog.records if record.name.startswith("supple.results")]
-    assert told == [f"{paths.recording}: frame 9 is computed differently now, and replaced from there"]
+    assert told == [f"{paths.recording}: frame 9 differs from the recorded one; replacing it and later ones"]
     with sp.read_recording(out / "recording.vtkhdf") as recording:
         assert recording.statuses[9] == "iteration_limit"
         assert len(recording) == STEPS + 1

@@ -1,4 +1,4 @@
-"""Scenes that are slower than time get lighter meshes, or another solver, on a page."""
+"""Scenes that are slower than real time get lighter meshes, or another solver, on a page."""
 
 from __future__ import annotations
 

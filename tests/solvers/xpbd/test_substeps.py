@@ -55,14 +55,14 @@ def test_two_bodies_that_approach_each_other_need_more_substeps():
 def test_beyond_the_largest_number_a_body_is_softened_and_the_message_says_what_helps():
     report = first(cube(1e7), max_substeps=50)
     assert (report.status, report.iterations) == ("softened", 50)
-    assert report.details.substeps_reason.startswith("max_substeps; the stiffness of body 'cube' asks for ")
+    assert report.details.substeps_reason.startswith("max_substeps; the stiffness of body 'cube' needs ")
     assert f"; take max_substeps={report.details.substeps_reason.split()[-1]}" in report.message
 
 
 def test_the_remedy_for_a_body_that_hardly_deforms_is_no_enormous_number_of_substeps():
     report = first(cube(1e12), max_substeps=20)
     assert report.status == "softened"
-    assert "take Implicit, or a RigidBody for what hardly deforms (max_substeps=" in report.message
+    assert "take Implicit, or a RigidBody for a body that hardly deforms (max_substeps=" in report.message
 
 
 def hit(youngs=2e5, accuracy=0.5):

@@ -53,7 +53,7 @@ def pixels(_: Any, tokens: Sequence[Token]) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Checkpoints:
-    """When a run writes checkpoints: after so many frames, and so many seconds by the clock."""
+    """When a run writes checkpoints: after this many frames, and this many seconds by the clock."""
 
     frames: int | None = 100
     seconds: float | None = 30.0

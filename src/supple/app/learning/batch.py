@@ -103,8 +103,8 @@ class Batch:
 
         Parameters
         ----------
-        actions : by name of an input, the values that it shall have at the end of the step: one for each copy, in an
-            array with n rows, or one for all. Other inputs stay as they are.
+        actions : by name of an input, its values for the end of the step: one for each copy, in an array with n rows,
+            or one for all. Other inputs stay as they are.
         copies : which ones, as for `restore`; the others stay where they are
 
         Raises

@@ -1,4 +1,4 @@
-"""A task: a soft arm hangs from the ceiling, and its tip shall reach a point and stay there."""
+"""A task: a soft arm hangs from the ceiling, and its tip has to reach a point and stay there."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from supple.solvers.solver import Solver
 
 
 def facts_of(system: System, start: tuple[int, float], dt: float, steps: int, solver: Solver) -> RunFacts:
-    """What a run is that begins with the index and the time [s] `start`, and has so many steps of dt [s]."""
+    """What a run is that begins with the index and the time [s] `start`, and has this many steps of dt [s]."""
     span = (float(start[1]), float(steps * dt))
     return RunFacts(start[0], int(steps), float(dt), scene_hash(system, *span), span, str(solver))
 

@@ -20,7 +20,7 @@ logger = logging.getLogger(__name__)
 
 
 class CheckpointSink:
-    """Keeps the latest frame that a run may go on from, at most once in so many seconds.
+    """Keeps the latest frame that a run may go on from, at most once in this many seconds.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ class ResumedFolder(FolderSink):
 
     Parameters
     ----------
-    journal : of the run so far, with the number of frames that it shall have
+    journal : of the run so far, with its intended number of frames
     """
 
     def __init__(self, folder: Path, journal: Journal) -> None:

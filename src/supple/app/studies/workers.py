@@ -148,7 +148,7 @@ class ClusterWorkers(Workers):
 
 
 Opener = Callable[[int], contextlib.AbstractContextManager[Workers]]
-"""Workers of which each has at least so many bytes; `StudyError` where that is impossible."""
+"""Workers of which each has at least this many bytes; `StudyError` where that is impossible."""
 
 
 def local_workers(count: int | None, logs: Path) -> Opener:

@@ -29,7 +29,7 @@ NEARER_SHARE = 0.25
 # dhat, not at all from the second on.
 _FULL, _NONE = 0.25, 0.75
 
-# So much farther than dhat are vertices that hang beyond an outline.
+# Of dhat: how far vertices that hang beyond an outline may be.
 REACH = math.sqrt(1.0 + _NONE**2)
 
 

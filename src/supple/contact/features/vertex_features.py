@@ -22,8 +22,8 @@ from supple.runtime.kernel_cache import njit, prange
 # Cosines of the angle between two faces that lie on each other, from none of the weight to all of it.
 _LEANING, _FLAT = 0.9, 0.98
 
-# Cosines of the angle of the most leaning face at an edge or a vertex, from none of the weight to all of it: others are
-# no part of an outline.
+# Cosines of the angle of the most inclined face at an edge or a vertex, from none of the weight to all of it: others
+# are not part of an outline.
 _BENT, _SHARP = 0.8, 0.6
 
 # Most parts of one triangle: itself, its edges, its corners.
@@ -198,9 +198,9 @@ def _normal(x, triangles, t):
 
 @njit
 def _facing_cosine(x, v, triangles, t, own_start, own_items):
-    """The largest cosine of the angle at which triangle t and one of vertex v's own look at each other.
+    """The largest cosine of the angle at which triangle t and one of vertex v's own face each other.
 
-    The sides that look are those of the normals, also of a sheet, which has no inside.
+    The sides that face each other are those of the normals, also of a sheet, which has no inside.
     """
     n, best = _normal(x, triangles, t), 0.0
     for k in range(own_start[v], own_start[v + 1]):

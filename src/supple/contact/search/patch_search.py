@@ -1,8 +1,8 @@
 """Which pairs of points and triangles, and of edges, may come near each other while all nodes go straight on.
 
-A pair is found if its parts may come nearer than `reach` on the given ways. Only relative ways count: what goes
-together is near what it was near. Boxes of patches are swept along an axis; in patches whose boxes overlap, the parts
-are compared that reach into the box of the other patch.
+A pair is found if its parts may come nearer than `reach` on the given ways. Only relative ways count: parts that move
+together keep their distance. Boxes of patches are swept along an axis; in patches whose boxes overlap, the parts are
+compared that reach into the box of the other patch.
 """
 
 from __future__ import annotations

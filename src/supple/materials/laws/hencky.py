@@ -1,4 +1,4 @@
-"""The Hencky energy, quadratic in the logarithmic strains e_i, and its use for what flows.
+"""The Hencky energy, quadratic in the logarithmic strains e_i, and its use for materials that flow.
 
     psi = mu |dev e|^2 + K/2 (ln J)^2
 

@@ -1,6 +1,6 @@
 """Energy densities, stresses and Hessians at given deformation gradients, of materials of any kind.
 
-What flows is not in them: see `supple.materials.laws.internal`.
+Materials that flow are not in them: see `supple.materials.laws.internal`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from supple.materials.isotropic import densities, hessians, piolas
 from supple.materials.per_tet import BY_LAW, TetMaterial
 from supple.runtime.threads import threads_for
 
-# One pass over so many tets takes half a millisecond; waiting for a second thread on a busy machine takes several.
+# One pass over this many tets takes half a millisecond; waiting for a second thread on a busy machine takes several.
 _SERIAL_TETS = 20_000
 
 

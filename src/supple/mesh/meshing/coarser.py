@@ -19,7 +19,7 @@ _FARTHEST, _LARGEST_CHANGE = 0.7, 0.15
 
 
 def coarser(mesh: TetMesh, tets: int) -> TetMesh | None:
-    """Well-shaped tets, at most so many, that fill about the same space; None where none have its shape.
+    """Well-shaped tets, at most this many, that fill about the same space; None where none have its shape.
 
     They have the same pieces and holes, about the same volume, and a surface near that of the mesh.
 

@@ -12,7 +12,7 @@ from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)
 
-# A closed surface has at least so many triangles.
+# A closed surface has at least this many triangles.
 _LEAST = 4
 
 # Of the volume: beyond it the shape is another one.
@@ -36,7 +36,7 @@ def decimate_surface(
     surface : SurfaceMesh
         With the faults that it may have: the result can have the same.
     triangles : int
-        At most so many are left, unless none can be removed without turning others over.
+        At most this many are left, unless none can be removed without turning others over.
     time_limit, memory_limit : float [s], int [bytes]
         Limits of the child process.
 

@@ -107,7 +107,7 @@ def mesh_with_ftetwild(
     unit = SurfaceMesh((surface.vertices - middle) / size, surface.triangles)
     result = run_mesher("ftetwild", unit, options, limits, "; fix the surface in a modelling program")
     if len(result.elements) == 0:
-        raise MeshingError("fTetWild found nothing that the surface encloses; close its holes, or give another surface")
+        raise MeshingError("fTetWild found no volume inside of the surface; close its holes, or give another surface")
     result = replace(result, vertices=result.vertices * size + middle)
     _warn_of_lost_pieces(surface, result, reach=(envelope + 0.05) * size)
     return result

@@ -84,7 +84,7 @@ def fill_with_count(
     Parameters
     ----------
     make : fills a surface with tets of at most a volume [m^3]; reduce : a surface to a number of triangles, or None
-        where the triangles shall stay
+        where the triangles must stay
     volume : of the surface, about [m^3]
     """
     fewest = max(_FEWEST_TRIANGLES, count // TETS_OF_TRIANGLE)

@@ -46,7 +46,7 @@ def of_order(mesh: TetMesh, order: int, onto: Onto | None = None) -> TetMesh:
 
 
 def tets_between_layers(triangles: NDArray[np.integer], points: int, layers: int) -> NDArray[np.int64]:
-    """(3 t layers, 4) tets between layers + 1 copies of triangles (t, 3), of so many points each.
+    """(3 t layers, 4) tets between layers + 1 copies of triangles (t, 3), of this many points each.
 
     The quad between two columns is cut from the bottom of the lower-numbered one, so that neighbours agree.
     """

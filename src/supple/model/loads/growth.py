@@ -1,4 +1,4 @@
-"""Growth on the tets of a system. It has no forces of its own: the elastic ones are those of the stress-free shape."""
+"""Growth on the tets of a system. Its forces are the elastic ones of the changed stress-free shape."""
 
 from __future__ import annotations
 

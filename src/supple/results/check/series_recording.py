@@ -195,7 +195,7 @@ class SeriesRecording(RecordedScene):
         other = None
         if (apart > self._apart).any():
             one, two = self._twins[int(np.argmax(apart))]
-            other = f"points {one} and {two} were one place and come apart by {apart.max():.3g}"
+            other = f"points {one} and {two} had the same place and separate by {apart.max():.3g}"
         return SeriesFrame(np.ascontiguousarray(x[self._points]), other)
 
     def _first(self) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from supple.model.loads.applied import AppliedLoad
 from supple.model.system import System
 from supple.scene.inputs import Input
 
-# Functions of time cannot be read; their values at so many times of a run are taken instead.
+# Functions of time cannot be read; their values at this many times of a run are taken instead.
 _TIMES = 16
 
 

@@ -154,7 +154,7 @@ def restored(description: Any, data: memoryview) -> dict[str, NDArray[Any]]:
         arrays[path] = np.frombuffer(data[place:end], dtype=kind).reshape(shape).copy()
         place = end
     if place != len(data):
-        raise ValueError("bytes are left over after its arrays")
+        raise ValueError("bytes remain after its arrays")
     return arrays
 
 

@@ -39,7 +39,7 @@ class Field:
         return source.at_vertices.values_of_all if self.name.endswith(_AT_VERTICES) else source.values_of_all
 
     def frame_bytes(self, vertices: int, tets: int) -> int:
-        """What a frame of so many vertices and tets takes in a recording."""
+        """What a frame of this many vertices and tets takes in a recording."""
         rows = tets if self.at == "tets" else vertices
         return NUMBER_BYTES * rows * int(np.prod(self.shape, dtype=np.int64))
 
@@ -81,7 +81,7 @@ def checked_fields(names: Iterable[str]) -> tuple[Field, ...]:
 
 
 def cost(fields: Iterable[Field], vertices: int, tets: int, frames: int) -> str:
-    """What fields take in a recording of so many frames, as a line of text."""
+    """What fields take in a recording of this many frames, as a line of text."""
     chosen = list(fields)
     each = sum(field.frame_bytes(vertices, tets) for field in chosen)
     names = ", ".join(field.name for field in chosen)

@@ -47,7 +47,7 @@ def tet_values(
     return von_mises(cauchy_of_tets(laws, x, first_piolas(laws, x, F, internal), F, internal))
 
 
-_OF_RIGID = "is rigid: it has no strain and no stress of its own"
+_OF_RIGID = "is rigid: it does not have strains and stresses"
 _NO_LAW = "has no known elastic law, so it has no {}; give it an elastic material such as StableNeoHookean"
 _RIGID = "has rigid edges or volumes, whose forces do not follow from positions; give both a compliance above 0"
 

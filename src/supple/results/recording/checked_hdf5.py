@@ -115,7 +115,7 @@ class CheckedFile:
         return values.astype(values.dtype.newbyteorder("="), copy=False)
 
     def check_series(self, series: Series, frames: int) -> h5py.Dataset:
-        """The dataset of a series, which has the rows of at least so many frames."""
+        """The dataset of a series, which has the rows of at least this many frames."""
         dataset = self.dataset(series.path)
         got, needed = dataset.shape or (), series.shape(frames)
         if got[1:] != needed[1:] or not got[:1] >= needed[:1]:

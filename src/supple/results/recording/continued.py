@@ -87,7 +87,9 @@ class ContinuedRecorder(Recorder):
         if number < self._file.written:
             if self._is_recorded(frame, number):
                 return
-            logger.warning("%s: frame %d differs from the recorded one; frames are replaced from there", self.path, frame.index)
+            logger.warning(
+                "%s: frame %d differs from the recorded one; replacing it and later ones", self.path, frame.index
+            )
             self._file.written = number
         super()._put(frame)
 

@@ -48,7 +48,7 @@ class View:
 def view_of_scene(points: NDArray[np.float64], up: NDArray[np.float64], obstacles: Sequence[RecordedObstacle]) -> View:
     """The view of bodies in the hull of points (k, 3) [m], of the floor not far below, and of obstacles about them.
 
-    Obstacles that are much larger do not count. Of a room the lower half counts, which is what is drawn.
+    Obstacles that are much larger do not count. Of a room the lower half counts, which is drawn.
     """
     bodies = View(points.min(axis=0), points.max(axis=0), up, points)
     outline = [bodies.outline]

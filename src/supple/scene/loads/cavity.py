@@ -95,7 +95,7 @@ class Cavity(Kind):
         return (self.body,)
 
     def check(self, bodies: Sequence[PlacedBody], others: Sequence[Cavity]) -> None:
-        """Raise `SceneError` where it has no surface of its own; see `surface`."""
+        """Raise `SceneError` where it has no surface, or shares one with another cavity; see `surface`."""
         mine = set(map(tuple, self.surface(bodies).tolist()))
         for other in others:
             if other.body == self.body and not mine.isdisjoint(map(tuple, other.surface(bodies).tolist())):

@@ -1,12 +1,12 @@
 """A rigid body: a solid with a mass, its placement and its initial velocity.
 
-What moves are its four control points, the vertices of one tet (see `ControlPoints`). The energy
+Its four control points move; they are the vertices of one tet (see `ControlPoints`). The energy
 
     kappa V |F^T F - 1|^2
 
 of that tet, with the body's volume V, keeps it rigid. With the Green strain E = (F^T F - 1) / 2 this is
 4 kappa V |E|^2, which is St. Venant-Kirchhoff's energy of the tet's volume V_t for mu = 4 kappa V / V_t and lam = 0.
-What touches, is drawn and has positions in a frame are the points of its surface, combinations of the control points.
+The points of its surface are combinations of the control points. They touch, are drawn, and have positions in a frame.
 
 Source: Lan et al., "Affine Body Dynamics" (2022), section 3.
 """
@@ -139,7 +139,7 @@ class RigidBody(PlacedBody):
             raise SceneError(f"{owner}: shape has quadratic tets; give its surface or mesh.to_order(1)")
         surface = (self.shape.surface if isinstance(self.shape, TetMesh) else self.shape).compact()
         control = control_points(properties, surface.vertices)
-        # What is drawn is what touches.
+        # The drawn surface is the one that touches.
         derived = {"surface": surface, "skin": surface, "properties": properties}
         for key, value in (derived | {"mesh": control.mesh, "weights": control.weights}).items():
             object.__setattr__(self, key, value)

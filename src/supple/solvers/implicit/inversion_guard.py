@@ -80,7 +80,7 @@ class InversionGuard:
 
     J of a quadratic tet is bounded everywhere in it.
 
-    A body is guarded as a whole. A guard on its positive tets alone would lock it: to untangle, some of them have to
+    A body is guarded as a whole. A guard on its positive tets alone would lock it: to recover, some of them have to
     pass through zero volume.
 
     Attributes

@@ -67,11 +67,11 @@ class Implicit(Solver):
     tolerance : Newton stops when no vertex's step is longer than this share of the (smallest) body's diagonal, per
         second of the step [1/s]; for "static", than this share of the diagonal [-]. None: 1e-3 1/s or 1e-9, and where
         there is contact no longer than a tenth of `dhat`, with friction than a hundredth of `friction_velocity`.
-    force_tolerance : where surfaces touch, Newton also goes on until the forces left over are below this share of
+    force_tolerance : where surfaces touch, Newton also goes on until the remaining forces are below this share of
         contact's [-].
     max_iterations : of Newton in one (sub)step. 1: one linearization, for real time; the step is not divided where it
         does not converge. Tets still do not invert and surfaces do not cross, but bodies that meet fast can hang at
-        each other for some steps. The status is `iteration_limit` where forces are left over, which the message names.
+        each other for some steps. The status is `iteration_limit` where forces remain, which the message names.
     linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
     max_substeps : largest number of substeps: a step that fails is halved. Steps in which scripts turn far are first
         divided into straight pieces (1024 at most), each of which may take this number. 1: never divided.

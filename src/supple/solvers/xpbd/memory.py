@@ -44,9 +44,9 @@ class XPBDMemory:
     viscous : of damping; None where nothing is damped
     ledger : of the assessment of frames; None at the start
     measured : how much of their stiffness bodies lacked; None at the start
-    substeps : what the last frame asks of the next one, where repetitions helped; falls back to zero
+    substeps : the number that the last frame requires of the next one, where repetitions helped; falls back to zero
     sleep : of bodies at rest; None at the start
-    futile : the statuses that the last frame had in spite of repetitions
+    futile : the statuses of the last frame that repetitions did not remove
     control : of rigid bodies; None where nothing is welded to any
     """
 

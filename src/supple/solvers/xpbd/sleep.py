@@ -5,16 +5,16 @@ frame in which each of its bodies has stayed, for a time T, within
 
     d = accuracy min(EDGES l, FALL g (T/2)^2 / 2)
 
-of one place, with l the mean length of the body's edges. What is less than that from rest is thus
+of one place, with l the mean length of the body's edges. A body that stays within this distance is thus
 
-- slower than a share of an edge in the time T, which is at least the body's damping time: what an overdamped body has
-  still to creep is no longer than d;
+- slower than a share of an edge in the time T, which is at least the body's damping time: the remaining creep of an
+  overdamped body is at most d;
 - in balance up to a share of its weight: an oscillation that turns has the displacement a (T/2)^2 / 2 to both sides.
   Where there is no gravity, nothing sleeps.
 
 An island wakes where something awake pushes it or has passed into it (the frame is then undone and simulated with the
-island awake), where its state was changed from outside, where an obstacle moves, and where anything in the scene is
-another than in the frame before. Bodies with loads, actuators, motors, soft targets or moving pins do not sleep.
+island awake), where its state was changed from outside, where an obstacle moves, and where anything in the scene
+differs from the previous frame. Bodies with loads, actuators, motors, soft targets or moving pins do not sleep.
 
 Source of the name and of islands: Catto, "Box2D" manual, "Simulation islands".
 """

@@ -77,7 +77,8 @@ def lost_position_message(system: System, layout: Layout, vertex: int, time: flo
     )
 
 
-# How often a bad frame is repeated with twice as many substeps. What crosses with twice as many crosses with more, too.
+# How often a bad frame is repeated with twice as many substeps. Surfaces that cross with twice as many also cross with
+# more.
 MOST_REPEATS, MOST_FOR_CROSSINGS = 2, 1
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
@@ -102,7 +103,7 @@ class XPBD(Solver):
     max_substeps : the largest automatic number.
     sleep_after : how long a body stays at its place before it sleeps [s], see `supple.solvers.xpbd.sleep`; None:
         nothing sleeps
-    start : what becomes of bodies that begin inside of something: an error, or they are slowly pushed out.
+    start : how bodies are treated that begin inside of something: an error, or they are slowly pushed out.
     threads : number of threads. None: one, or all of Numba's where the scene is large enough and several threads are
         measured to be faster. The result has the same bits for any number.
 
@@ -249,7 +250,7 @@ class XPBD(Solver):
         known = ws.assessment.softening.own(memory.measured)
         wanted = ws.choice.choose(ws.moment(state.time), dt, self.accuracy, memory.substeps, known)
         if wanted.count > self.max_substeps:
-            return Substeps(self.max_substeps, f"max_substeps; {wanted.reason} asks for {wanted.count}")
+            return Substeps(self.max_substeps, f"max_substeps; {wanted.reason} needs {wanted.count}")
         return wanted
 
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:

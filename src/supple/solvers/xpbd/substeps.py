@@ -8,7 +8,7 @@ The largest of:
 - what lets rigid bodies turn by less than a tenth of a radian in a substep;
 - what lets rigid bodies fall from rest by less than a small part of the height of their tets in a substep;
 - what lets a heavy body sink little into what is below a light rigid one between them: the light one passes on about
-  m / M of the load in each pass, and parting the others again lifts the heavy one;
+  m / M of the load in each pass, and the separation of the others lifts the heavy one;
 - after a frame that had to be repeated with more substeps: a number that falls back from there.
 """
 
@@ -33,7 +33,7 @@ APPROACH = 0.5
 # By how much a rigid body may turn in a substep [rad]; see `supple.solvers.xpbd.rigid.bodies`.
 MOST_TURN = 0.1
 # Largest r g h^2 / H in a substep h, with the ratio r of the masses of a body and of a lighter rigid one near it, and
-# the mean height H of a tet; and the ratio above which this is asked for. See docs/theory/rigid_bodies.md.
+# the mean height H of a tet; and the ratio above which this is required. See docs/theory/rigid_bodies.md.
 MOST_SINKING, LEAST_RATIO = 1.5e-4, 4.0
 # Largest g h^2 / H, with the height H of the smallest rigid body's tet: a stack that sinks farther into itself at an
 # impact gains energy when it is separated again. See notes/measured_trials.md.
@@ -46,7 +46,7 @@ MOST_KEPT = 4
 
 
 class Substeps(NamedTuple):
-    """A number of substeps, and what asks for it."""
+    """A number of substeps, and the reason for it."""
 
     count: int
     reason: str

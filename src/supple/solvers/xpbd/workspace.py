@@ -42,11 +42,11 @@ from supple.solvers.xpbd.welded_masses import WeldedMasses
 class XPBDWorkspace:
     """What is computed once for a system, and scratch arrays, in the solver's own numbering of vertices.
 
-    It caches and never remembers: a step reads nothing of an earlier step but the state.
+    It is only a cache: a step does not read anything of an earlier step but the state.
 
     Attributes
     ----------
-    growth : which the elastic constants have now
+    growth : that of the present elastic constants
     threads : of Numba's parallel kernels; None leaves their number as it is; most_threads : in the present frame
     extended : (n + a, 4) positions about one origin [m] and inverse masses [1/kg], of the vertices and then
         of the anchors (inverse mass 0); points : the rows of the vertices. Views of the nodes of contact

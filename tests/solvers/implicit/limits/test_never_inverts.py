@@ -224,7 +224,7 @@ def test_an_iteration_limit_is_reported_and_the_run_continues():
     assert len(frames) == 3
     assert all(frame.report.status == "iteration_limit" for frame in frames)
     assert "1 iteration;" in frames[0].report.message
-    assert "N are left over" in frames[0].report.message
+    assert "N remain" in frames[0].report.message
     assert all(pinned_exactly(frame) for frame in frames)
 
 

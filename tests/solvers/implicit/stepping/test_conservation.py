@@ -79,4 +79,4 @@ def test_a_step_that_makes_energy_is_repeated_shorter(youngs, spin):
 def test_energy_from_nowhere_is_named():
     report = next(report for report in turning(1) if report.status != "converged")
     assert report.status == "energy_gained"
-    assert "of the energy of body 'soft' came from nowhere; take a shorter step" in report.message
+    assert "of the energy of body 'soft' has no source; take a shorter step" in report.message

@@ -1,4 +1,4 @@
-"""The energy of bodies, and the balance of energy of frames: only what comes from nowhere is found."""
+"""The energy of bodies, and the balance of energy of frames: only energy without a source is found."""
 
 import numpy as np
 import pytest
@@ -114,7 +114,7 @@ def test_energy_from_nowhere_is_found_and_named(caplog, slides):
     frames = list(sp.simulate(sp.Scene([ball], [floor]), XPBD(substeps=10), DT, 20))
     bad = [frame for frame in frames if frame.report.status == "energy_gained"]
     assert bad
-    assert "of the energy came from nowhere, most in body 'ball'" in bad[0].report.message
+    assert "of the energy has no source, most of it in body 'ball'" in bad[0].report.message
     assert bad[0].report.details.energy_gained > 0.02
     energies = [f.report.kinetic_energy + f.report.elastic_energy + f.report.potential_energy for f in frames]
     assert max(energies) > 1.02 * energies[0]

@@ -27,7 +27,7 @@ def test_the_worst_gives_the_status_and_all_are_in_the_message():
     assert findings.status is Status.INVERTED
     assert findings.message(1.2, "take substeps=60") == (
         "12 tets of body 'ball' inverted, body 'ball' is 0.003 m deep in obstacle 'floor', 31 % of the energy came "
-        "from nowhere, most in body 'ball', body 'ball' about 5.1 % too soft at t = 1.2 s; take substeps=60"
+        "no source, most of it in body 'ball', body 'ball' about 5.1 % too soft at t = 1.2 s; take substeps=60"
     )
     assert all(
         status.can_go_on for status in (Status.INVERTED, Status.INTERSECTING, Status.ENERGY_GAINED, Status.SOFTENED)

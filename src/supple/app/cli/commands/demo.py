@@ -62,7 +62,7 @@ def demo(
         Show the scene in a browser while it runs, until Ctrl-C, so that it can be dragged and tuned. Nothing is
         recorded.
     full
-        With --live: simulate with the meshes and the solver as they are, also where that is slower than time.
+        With --live: simulate with the meshes and the solver as they are, also where that is slower than real time.
     port
         With --live: port to serve at; without it, 8080 or the next free one.
     open_

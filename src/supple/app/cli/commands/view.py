@@ -42,8 +42,8 @@ def view(
     solver
         Kind of solver, instead of the file's, with its default parameters.
     full
-        Simulate with the meshes and the solver as they are. Without this, a scene that would be slower than time gets
-        meshes of fewer tets on the page, with the same skins, or another solver unless --solver is given.
+        Simulate with the meshes and the solver as they are. Without this, a scene that would be slower than real time
+        gets meshes of fewer tets on the page, with the same skins, or another solver unless --solver is given.
     port
         Port to serve at; without it, 8080 or the next free one.
     open_

@@ -56,7 +56,7 @@ def warm(
                 bar.advance(task)
     except BrokenProcessPool:
         raise SceneError(
-            "supple warm: a process was ended from outside, as for want of memory; give fewer --processes"
+            "supple warm: another program ended a process, for instance because memory ran out; give fewer --processes"
         ) from None
     console.print(f"{len(kernels)} kernels are ready, {compiled} were compiled", highlight=False)
     return ExitCode.OK

@@ -78,7 +78,7 @@ DOMINOES = Demo(
     summary="twenty rigid dominoes knock each other over",
     explanation=(
         "Twenty rigid dominoes stand in a row on a floor with friction. The first is pushed; each one knocks over the "
-        "next, at a rate that soon becomes steady. Their surfaces never touch, and no energy comes from nowhere."
+        "next, at a rate that soon becomes steady. Their surfaces never touch, and energy never grows by itself."
     ),
     scene=scene,
     solvers={"implicit": lambda: Implicit()},

@@ -118,7 +118,7 @@ def _robot(root: ElementTree.Element, folder: Path) -> Robot:
     for element in root.findall("link"):
         link = _link(element, folder, ignored)
         if link.name in links:
-            raise Problem(f"two links are called {printable(link.name)!r}; give each a name of its own")
+            raise Problem(f"two links are called {printable(link.name)!r}; give each a different name")
         links[link.name] = link
     if not links:
         raise Problem("it has no link")
@@ -126,7 +126,7 @@ def _robot(root: ElementTree.Element, folder: Path) -> Robot:
     for element in root.findall("joint"):
         joint = _joint(element, links, ignored)
         if joint.name in joints:
-            raise Problem(f"two joints are called {printable(joint.name)!r}; give each a name of its own")
+            raise Problem(f"two joints are called {printable(joint.name)!r}; give each a different name")
         joints[joint.name] = joint
     for element in root:
         if element.tag not in ("link", "joint", "material"):

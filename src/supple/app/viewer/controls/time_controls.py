@@ -38,7 +38,7 @@ class TimeControls:
                 hint="Simulated seconds in a second; the time step of the solver does not change",
                 changed=lambda client, factor: controller.send(client, lambda: SetSpeed(factor)),
             )
-            self.remedy = gui.add_button("Remedy", visible=False, hint="Make the simulation as fast as time")
+            self.remedy = gui.add_button("Remedy", visible=False, hint="Make the simulation as fast as real time")
             self.restart = gui.add_button("Restart", visible=False, hint="Start the simulation again")
         self.play.on_click(sequential(lambda event: self.toggle(event.client)))
         self.frames.on_click(sequential(self._change_frame))

@@ -57,7 +57,7 @@ class UploadControls:
             vertices, tets = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
             added = self._controller.send(event.client, lambda: AddMesh(vertices, tets, youngs, body_name(name)))
             if added and upload.tets < DEFAULT_TETS:
-                why = "a scene of more would be slower than time"
+                why = "a larger scene would be slower than real time"
                 notify(event.client, "Added", f"{name}: {len(tets):,} tets; {why}", "blue")
         except SuppleError as error:
             self._refuse(event.client, str(error))
@@ -81,7 +81,7 @@ _SHARE = 0.9  # of the time of a frame that a step may take
 
 
 def tets_in_time(snapshot: Snapshot) -> int:
-    """How many more tets the scene may have to keep up with time, after what a step takes; 300 to 2,000."""
+    """How many more tets the scene may have to keep up with real time, after what a step takes; 300 to 2,000."""
     scene, step = snapshot.description, 1e-3 * snapshot.timing.step_ms
     if step <= 0.0 or not scene.n_tets:
         return DEFAULT_TETS

@@ -65,7 +65,7 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
 
 
 def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
-    """The live scene, or where it is slower than time one that is faster; and one line about it."""
+    """The live scene, or where it is slower than real time one that is faster; and one line about it."""
     from supple.app.viewer.engine.scene.lightening import lightened
     from supple.app.viewer.engine.scene.live_scene import LiveScene
 

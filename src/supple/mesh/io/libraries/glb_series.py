@@ -136,7 +136,7 @@ class _Glb:
         while stack:
             way = stack.pop()
             if len(way) > len(nodes):
-                raise FormatError("its nodes go in circles")
+                raise FormatError("its nodes form a cycle")
             node = nodes[way[-1]]
             stack += [[*way, child] for child in reversed(node.get("children", []))]
             if "mesh" in node:

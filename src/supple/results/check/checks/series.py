@@ -100,7 +100,7 @@ class Scale(FrameCheck):
 
     def begin(self) -> None:
         triangles = self.scene.surfaces.triangles
-        # A thousand sides tell as much as a million.
+        # A thousand sides are enough to find a change of the unit.
         self._sides = triangles[:: max(1, len(triangles) // 1000), :2]
         self._last: NDArray[np.float64] | None = None
 

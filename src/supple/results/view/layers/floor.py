@@ -59,7 +59,7 @@ def _picture(scene: Any, name: str, corners: NDArray[np.float64], image: NDArray
 
 
 _DISC_CELLS = 256
-_CELLS = 128  # a picture of so many is made in some milliseconds
+_CELLS = 128  # a picture of this many is made in some milliseconds
 
 
 class ShadowView(Layer):

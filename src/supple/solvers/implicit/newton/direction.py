@@ -20,13 +20,13 @@ from supple.solvers.implicit.newton.linear_solver import LinearReport, LinearSol
 from supple.solvers.implicit.newton.objective import Model, Objective
 from supple.solvers.implicit.timings import Clock
 
-# The relative tolerance of linear systems: 1e-2 at first, since a better solution of a poor model is lost work; below
+# The relative tolerance of linear systems: 1e-2 at first, since a better solution of a poor model does not help; below
 # 1e-8 round-off in the gradient makes up the rest of it.
 _LOOSEST = 1e-2
 _TIGHTEST = 1e-8
 
 # The tolerance of the last system where surfaces touch, below `Implicit.force_tolerance`: its error times the stiffness
-# of contact has to be less than the forces that may be left over.
+# of contact has to be less than the forces that may remain.
 _LAST = 1e-5
 
 

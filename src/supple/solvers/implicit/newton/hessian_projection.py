@@ -32,7 +32,7 @@ class ProjectedTerms(IntEnum):
 
 @dataclass(eq=False)
 class ProjectionPolicy:
-    """What one minimization has found out.
+    """The state of the choice in one minimization.
 
     Attributes
     ----------

@@ -26,20 +26,20 @@ _MOST_CUTS = 40
 # Energies are sums of many terms: differences below this share of the terms' size count as none.
 _ROUND_OFF = 1e-13
 
-# Decreases below this share of the terms' size are too near to round-off to tell whether a step went beyond the
-# minimum: its end then has to be no steeper uphill than this share of the slope at its start. Without it, steps go to
-# and fro across the kinks of a mesh that a frictionless vertex lies on.
+# Decreases below this share of the terms' size are too near to round-off to show whether a step went beyond the
+# minimum. The uphill slope at its end may then be at most this share of the slope at its start. Without this, steps
+# alternate across the kinks of a mesh that a frictionless vertex lies on.
 _UNCLEAR = 1e-10
 _STEEPEST = 0.5
 
 # A convex energy rises by no more than the slope at the end times the length. Where it rises by more than twice that
-# within so small a share of the first length, there is a jump. So many may be crossed in one minimization; contacts
-# that are met there keep their weights, so that the same one is not met again.
+# within this share of the first length, there is a jump. This many may be crossed in one minimization; contacts that
+# are met there keep their weights, so that the same one is not met again.
 _SHORT = 1.0 / 16.0
 _MOST_JUMPS = 5
 
 # A projected Hessian can be far too stiff: where a body buckles, and where surfaces slide over each other's edges.
-# Where this share of the slope is left at the end of a whole step, the step is made longer, up to so many times.
+# Where this share of the slope is left at the end of a whole step, the step is made longer, up to this many times.
 _LEFT = 0.3
 _LONGEST = 4.0
 

@@ -32,8 +32,8 @@ _STALLED = 400
 _REST = 40
 _ASSEMBLY = 10
 
-# The coarse level of the preconditioner is renewed where CG takes so many times its first number of iterations, and so
-# many more: a renewal costs about as much as the iterations that it saves.
+# The coarse level of the preconditioner is renewed where CG takes this factor times its first number of iterations, and
+# this many more: a renewal costs about as much as the iterations that it saves.
 _AGED_RATIO = 1.5
 _AGED_EXTRA = 4
 

@@ -35,7 +35,7 @@ class Convergence:
     Attributes
     ----------
     step : largest component of a Newton direction at the minimum [m]
-    force : where surfaces touch, the norm of the forces left over, relative to that of contact's forces: contact is so
+    force : where surfaces touch, the norm of the remaining forces, relative to that of contact's forces: contact is so
         stiff that a short step can change large forces
     """
 
@@ -72,8 +72,9 @@ _CRAWL = 0.5
 _NEARLY = 3e-3
 
 
-# After so many steps in a row that change the energy by less than this share of its terms, and with balanced forces, no
-# minimum below can be told from round-off: what is left are steps to and fro across the kinks of frictionless contact.
+# After this many steps in a row that change the energy by less than this share of its terms, and with balanced forces,
+# a lower minimum cannot be distinguished from round-off: the remaining steps alternate across the kinks of frictionless
+# contact.
 _SETTLED = 6
 _NOTHING = 1e-12
 
@@ -178,7 +179,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     text = (
         f"Newton's method took {problem.max_iterations} iteration{'s' * (problem.max_iterations > 1)}; "
         f"its last step was {rows[-1].direction:.2e} m, the tolerance is {convergence.step:.2e} m; "
-        f"forces of {_free_norm(here.gradient, tools) / (problem.scale or 1.0):.2e} N are left over"
+        f"forces of {_free_norm(here.gradient, tools) / (problem.scale or 1.0):.2e} N remain"
     )
     return Outcome(Status.ITERATION_LIMIT, here, text, rows)
 

@@ -37,7 +37,7 @@ from supple.solvers.implicit.newton.free_motion import FreeMotion
 _ALLOWED = 0.01
 # The largest share of the relative kinetic energy that one step removes.
 _MOST_TAKEN = 0.9
-# The share of a piece's energy, that of its rigid motion included, that may remain from nowhere after a step.
+# The share of a piece's energy, that of its rigid motion included, that may remain without a source after a step.
 _MOST_MADE = 0.1
 
 
@@ -107,7 +107,7 @@ class Conservation:
         return EnergyMade(made)
 
     def gained(self, before: State, end: State, damping: Iterable[Potential], place: float) -> tuple[float, str] | None:
-        """The share of its energy that a piece has from nowhere after `limit_energy`, and one of its bodies.
+        """The share of its energy that a piece has without a source after `limit_energy`, and one of its bodies.
 
         None where no share is too large.
 

@@ -166,7 +166,7 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     gained = workspace.conservation.gained(state, after, damping, plan.place)
     if gained is not None and outcome.status is Status.CONVERGED:
         share, name = gained
-        text = f"{100.0 * share:.2g} % of the energy of body {name!r} came from nowhere; take a shorter step"
+        text = f"{100.0 * share:.2g} % of the energy of body {name!r} has no source; take a shorter step"
         outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
     acted = state.positions + plan.place * (x - state.positions)
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)

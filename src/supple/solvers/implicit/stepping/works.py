@@ -83,7 +83,7 @@ def works_of_step(
     time: float,
     ws: Workspace,
 ) -> tuple[dict[str, float], float]:
-    """The works by name, and that of the forces which Newton's method left over [J].
+    """The works by name, and that of the forces that remain after Newton's method [J].
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ class Ledger:
     Attributes
     ----------
     tangled : names of the bodies that began with inverted tets and still have some
-    excess : energy that came from nowhere and has not been lost since [J]
+    excess : energy without a source that has not been lost since [J]
     scale : the largest energy so far without the excess of its time, to compare the excess with [J]
     """
 

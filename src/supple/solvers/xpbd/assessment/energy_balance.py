@@ -4,7 +4,7 @@ Kinetic, elastic and potential energy, and that of stitches, of all vertices; `W
 motors and pins. Contact does work where obstacles move: what it adds is theirs, as far as it exceeds what it takes. The
 work of joints that hold to what is moved is not known: such scenes are not judged.
 
-What violated hard constraints can give out counts where it falls, and not where it rises: it is an upper bound.
+The energy that violated hard constraints can release is an upper bound: it counts where it falls, not where it rises.
 
 Gains are added up over the frames, and losses pay them back, so that a periodic error does not grow and a lasting one
 does. The sum is kept in `XPBDMemory.excess`.

@@ -11,7 +11,7 @@ from supple.model.state import Status
 from supple.model.system import System
 from supple.solvers.xpbd.assessment.surfaces import Overlap
 
-# The share of the scene's energy that may come from nowhere, and that of the substeps in which motion may be shortened.
+# The share of the scene's energy that may have no source, and that of the substeps in which motion may be shortened.
 ENERGY_TOLERANCE, HELD_TOLERANCE = 0.02, 0.1
 
 
@@ -22,9 +22,9 @@ class Findings:
     Attributes
     ----------
     inverted : number of inverted tets by body, without bodies that began with some
-    overlaps : what is through what
+    overlaps : things that are through each other
     held : the share of the substeps in which the motion of bodies was shortened
-    gained : energy from nowhere, in this frame and before, that has not been lost since, over the scene's energy [-]
+    gained : energy without a source, so far, that has not been lost since, over the scene's energy [-]
     gainer : the body whose energy rose most in this frame
     softened : (share, body) for each body that is softer than the accuracy allows
     apart : (share of its size, joint) for each joint whose sides are too far apart
@@ -58,7 +58,7 @@ class Findings:
         if len(self.overlaps) > 3:
             found.append((Status.INTERSECTING, f"{len(self.overlaps) - 3} more such pairs"))
         if self.gained > ENERGY_TOLERANCE:
-            text = f"{_percent(self.gained)} of the energy came from nowhere, most in body {self.gainer!r}"
+            text = f"{_percent(self.gained)} of the energy has no source, most of it in body {self.gainer!r}"
             found.append((Status.ENERGY_GAINED, text))
         if self.held > HELD_TOLERANCE:
             found.append((Status.HELD_BACK, f"bodies were held back in {_percent(self.held)} of the substeps"))

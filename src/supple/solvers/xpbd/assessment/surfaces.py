@@ -75,7 +75,7 @@ def _welded(system: System, owner: NDArray[np.int32]) -> NDArray[np.int64]:
 
 # Of the mean surface edge: how deep a vertex may be in an obstacle. Old overlaps are removed slowly.
 TOLERATED_DEPTH = 0.05
-# More pairs of triangles than this say nothing new.
+# More pairs of triangles than this are not needed.
 MOST_PAIRS = 1000
 
 
@@ -138,7 +138,7 @@ class SurfaceCheck:
         self._surface, self._begins = np.concatenate(own), np.cumsum([0, *map(len, own[:-1])])
 
     def find(self, x: NDArray[np.float64], time: float, asleep: NDArray[np.bool_] | None = None) -> list[Overlap]:
-        """What is through what, at world positions x (n, 3) [m] and a time [s].
+        """The things that are through each other, at world positions x (n, 3) [m] and a time [s].
 
         Sleeping bodies (b,) are not compared with each other and with obstacles: nothing has moved there.
         """

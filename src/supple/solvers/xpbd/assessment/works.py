@@ -1,9 +1,8 @@
 """The works of a frame: of each force over the displacements of its substep.
 
-Loads, actuators, damping and contact have forces. What pins do is what their motion adds to the energy of tets and
-stitches, the mean of that before and after the other vertices follow, and what balances all other forces on the pinned
-vertices.
-What moving obstacles do by stitches is found likewise.
+Loads, actuators, damping and contact have forces. The work of pins has two parts: the energy that their motion adds to
+tets and stitches, as the mean of that before and after the other vertices follow, and the work of the forces that
+balance all other forces on the pinned vertices. The work of moving obstacles by stitches is found in the same way.
 """
 
 from __future__ import annotations

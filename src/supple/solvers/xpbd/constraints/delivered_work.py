@@ -34,7 +34,7 @@ from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, nine, put_twelve, tw
 if TYPE_CHECKING:
     from supple.solvers.xpbd.constraints.registry import ConstraintSet
 
-# Below this J the displacement du no longer grows.
+# Below this J the displacement du does not grow.
 LEAST_J = 0.1
 
 

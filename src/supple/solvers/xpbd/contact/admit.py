@@ -1,11 +1,11 @@
-"""The guarantee of a substep: what was apart at x_n stays apart, and J stays positive, whatever the forces were.
+"""The guarantee of a substep: surfaces that are apart at x_n stay apart, and J stays positive, for any forces.
 
 Nodes go straight from x_n to x. A pair is good if the plane across n that moves with it still separates both sides at
 x, by a share of the distance or, below a floor, by all of it. It is also good if a plane that turns with the pair
 separates the sides all the time. Only a pair that is not good gets a fixed plane, where both sides would meet. Motions
 are shortened so that each node ends on its side of it. A tet that loses too much volume gets the share for which any
-independent shorter motions keep J. Motions only become shorter, so that pairs with a plane and tets that were cut stay good; each is
-treated at most once, and the loop ends.
+independent shorter motions keep J. Motions only become shorter, so that pairs with a plane and tets that were cut stay
+good. Each is treated at most once, and the loop ends.
 
 Nodes of inverse mass zero are kinematic: their motion is prescribed and is not shortened. Nodes that they push are
 carried: their places at x_n are moved along n to their side, and their motion is shortened from there. Where that

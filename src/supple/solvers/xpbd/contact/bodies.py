@@ -1,6 +1,6 @@
 """Nodes on rigid bodies: what an impulse at a node moves, and where nodes are.
 
-A rigid body answers to an impulse f at the arm r about its center, both of the beginning of the substep, with the
+A rigid body responds to an impulse f at the arm r about its center, both of the beginning of the substep, with the
 displacement f / M of its center and the small rotation I^-1 (r x f). During the sweeps over rows these are collected in
 its twist (u, th), and a node of it is at x + u + th x r. At the end the twist is added to the momenta of its control
 points, and they determine its place (`RigidBodies.advance`). Joints act on the same twists.

@@ -33,16 +33,16 @@ from supple.solvers.xpbd.contact.tets import Tets
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joint_rows import JointRows, solve_joints
 
-# Of the mean edge: the gap between surfaces; of the gap: how far nodes may go beyond what was expected when rows
-# were found.
+# Of the mean edge: the gap between surfaces. Of the gap: how far nodes may go beyond the places that were expected when
+# rows were found.
 GAP, SLACK = 0.05, 0.25
-# Of the mean edge: how much of a lack of gap is taken back in a frame.
+# Of the mean edge: by how much a gap that is too narrow is widened in a frame.
 RECOVERED = 0.05
 # Of the gap: what the last sweep over the rows may change; the most sweeps.
 RESIDUAL, MOST_SWEEPS = 0.02, 4
 # The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps.
 RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 60
-# For each joint, where that is more: what pulls at a chain has to go along it.
+# For each joint, where that is more: a pull at a chain has to travel along it.
 SWEEPS_PER_JOINT = 10
 
 
@@ -226,7 +226,7 @@ class Contact:
             self._cuts = Cuts.room(most + len(self.tets.J))
 
     def solve(self, rows: int, most: int | None = None) -> float:
-        """Solve the rows with at most so many sweeps; returns what the last one changed, in gaps."""
+        """Solve the rows with at most this many sweeps; returns what the last one changed, in gaps."""
         if not rows:
             return 0.0
         nodes, most = self.nodes, most or (MOST_RIGID_SWEEPS if len(self._rigid) else MOST_SWEEPS)
@@ -323,7 +323,7 @@ class Contact:
         if cut or moved:
             keep_spin(nodes.begin, nodes.x, nodes.v[: len(v)], h, *self._spins)
             nodes.impulses += nodes.v[: len(v)] - v
-        # What is cut less than rows leave over is not held back.
+        # A cut that is smaller than the error that rows may leave does not count.
         self.counts.cut += math.sqrt(self._marks.longest[0]) > RESIDUAL * self.gap
 
     def _cut(self, rows: int, low: int, moved: int) -> int:

@@ -1,4 +1,4 @@
-"""What cuts take from motions, and how velocities change with it; see `admit`."""
+"""The parts of motions that cuts remove, and how velocities change with them; see `admit`."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def loaded_rows(rows, count, pairs, owner, shape_owners, origin, h):
 
 @dataclass
 class FrameForces:
-    """What the substeps of one frame had, in the numbering of the solver.
+    """The contact forces in the substeps of one frame, in the numbering of the solver.
 
     Attributes
     ----------

@@ -14,7 +14,7 @@ _INNER = 20
 
 @njit(cache=True)
 def solve_joined(points, bodies, begin, rows, count, joints, impulses, enough, tolerance, most):
-    """Sweep over joints and contacts in turn until both change little, at most so many times; see `solve`.
+    """Sweep over joints and contacts in turn until both change little, at most this many times; see `solve`.
 
     joints : their rows, with impulses (r,) [kg m], in place
     enough : contacts are left alone if joints need smaller corrections, as shares of their size

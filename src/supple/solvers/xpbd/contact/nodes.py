@@ -1,4 +1,4 @@
-"""What moves in contact: nodes, which are vertices, anchors of stitches, and points of obstacles and rigid bodies."""
+"""The nodes of contact: vertices, anchors of stitches, and points of obstacles and rigid bodies."""
 
 from __future__ import annotations
 

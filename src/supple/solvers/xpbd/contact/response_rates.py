@@ -1,9 +1,9 @@
-"""How fast the material around a vertex answers to its displacement, and how much of a contact's force is kept for it.
+"""How fast the material around a vertex responds to its displacement, and which share of a contact's force is kept.
 
 The force of a contact in one substep predicts that of the next one where the elastic constraints resolve the motion
 of single vertices: where kappa = h^2 k / m is well below one, with k the stiffness that a vertex feels. There, all of
 it is kept, and contact transmits the loads that the material carries. Where kappa is large, the elastic constraints
-answer with less than the true force, a kept force follows the motion with a delay of kappa substeps, and a delayed
+respond with less than the true force, a kept force follows the motion with a delay of kappa substeps, and a delayed
 spring gains energy. So the share that is kept is 1 / (1 + kappa), which bounds the delay to a quarter of a substep.
 """
 

@@ -74,7 +74,7 @@ def build_shapes(obstacles: Sequence[Obstacle]) -> ObstacleShapes:
 
 
 class Walls(NamedTuple):
-    """What points have of shapes, in the places that the shapes have at the end of a substep.
+    """The distances, normals and nearest places of points at shapes, which are where they end a substep.
 
     Attributes
     ----------

@@ -84,7 +84,7 @@ def _turn(out, scale, points, bodies, begin, nodes, e, moment):
 
 @njit(cache=True)
 def solve(points, bodies, begin, rows, count, tolerance, most):
-    """Sweep over the rows until no sweep changes an n . r by more than the tolerance [m], at most so many times.
+    """Sweep over the rows until no sweep changes an n . r by more than the tolerance [m], at most this many times.
 
     Returns the number of sweeps, and the largest change in the last one [m].
     """

@@ -65,7 +65,7 @@ def least_J(before, share):
 
 @njit(inline="always")
 def guarded_J(before):
-    """What the guard asks for."""
+    """The smallest J that the guard allows."""
     return min(before, max(ONSET, 0.5 * before)) if before > 0.0 else -np.inf
 
 

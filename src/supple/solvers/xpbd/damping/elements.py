@@ -1,4 +1,4 @@
-"""What resists in Kelvin-Voigt damping: tetrahedra and springs, with their stiffness and their times tau.
+"""The elements of Kelvin-Voigt damping: tetrahedra and springs, with their stiffness and their times tau.
 
 A damped constraint with stiffness k has the viscosity tau k. An edge or a volume that is so stiff that a substep of h
 keeps it rigid, h^2 k sum w |grad C|^2 >> 1, has almost no rate of strain to resist, and its viscosity goes to zero:

@@ -41,8 +41,8 @@ LONGEST_CYCLE = 4
 # Of the conjugate gradients. The largest eigenvalue of P^-1 (M + H K) is 2.5 to 5. Longer steps, which one solution
 # may take where modes of small eigenvalues dominate, let the highest modes overshoot, cycle after cycle.
 LONGEST_STEP = 0.4
-# The power that the step needs is that of one group of elements in so many, in turn, where a body has groups enough.
-# It may be wrong by some per cent; `LONGEST_STEP` keeps the iteration stable for any value.
+# The power that the step needs is estimated from one group of elements in this many, in turn, where a body has enough
+# groups. It may be wrong by some per cent; `LONGEST_STEP` keeps the iteration stable for any value.
 PARTS, ENOUGH_GROUPS = 4, 64
 # Change of strain in a cycle beyond which a body begins from f = 0: bodies that are released from random positions gain
 # energy without limit otherwise.

@@ -98,7 +98,7 @@ def damping_in(ws: XPBDWorkspace, h: float) -> Damping | None:
 
 
 def overlaps_of(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> list[Overlap]:
-    """What is through what at the world positions of the workspace."""
+    """The things that are through each other at the world positions of the workspace."""
     return ws.assessment.surfaces.find(ws.world, time, sleep.asleep) if ws.contact else []
 
 

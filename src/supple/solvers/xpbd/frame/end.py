@@ -119,12 +119,12 @@ def end_frame(
 
 
 def _remedy(findings: Findings, used: int, shares: Mapping[str, float], accuracy: float, setting: str) -> str:
-    """What helps against what was found."""
+    """The remedy for the findings."""
     count = enough(used, shares, accuracy)
     contradicted = bool(findings.apart or findings.stalled)
     if findings.status is not Status.SOFTENED or contradicted:
         count = max(count, 2 * used)
     more = ", or remove what contradicts the joint: a pin, a script, contact or another joint" if contradicted else ""
     if count > IMPRACTICAL:
-        return f"take Implicit, or a RigidBody for what hardly deforms ({setting}={count} would do){more}"
+        return f"take Implicit, or a RigidBody for a body that hardly deforms ({setting}={count} would be enough){more}"
     return f"take {setting}={count}{more}"

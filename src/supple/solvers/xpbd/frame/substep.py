@@ -15,7 +15,7 @@ from supple.solvers.xpbd.integration import first_lost, hold, predict
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
 # The rows of joints are linear in small turns of bodies. With contacts they are linearized again at the same places, at
-# most so many times, until none is off by more than this share of its joint's size.
+# most this many times, until none is off by more than this share of its joint's size.
 MOST_LINEARIZATIONS, JOINT_EXACT = 20, 1e-5
 
 
@@ -75,8 +75,8 @@ def push(ws: XPBDWorkspace, damping: Damping | None, h: float) -> None:
     ws.rigid.gather(ws.points, ws.velocities, h)
     ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
     if len(welded):
-        # Constraints use welded vertices at the places that their bodies will have. Momenta are restored to those without internal
-        # forces, of which bodies have their part already.
+        # Constraints use welded vertices at the places that their bodies will have. Momenta are restored to those
+        # without internal forces, of which bodies have their part already.
         ws.velocities[welded] -= internal
 
 

@@ -19,7 +19,7 @@ LEFT, FLAT = 0.25, 0.2
 
 
 def hold_volumes(ws: XPBDWorkspace, rows: int, h: float) -> int:
-    """Project tets; shorten the motions of what is left over.
+    """Project tets; shorten the motions of those that still lose too much volume.
 
     They are shortened relative to the mean motion of their body, so that nothing stops in the world for it.
     Returns how many tets, listed, have still lost too much.

@@ -67,7 +67,7 @@ def sweep_joints(rows, impulses, twists, turn):
 
 @njit(cache=True)
 def solve_joints(rows, impulses, twists, most):
-    """Sweep over the rows of joints alone, at most so many times."""
+    """Sweep over the rows of joints alone, at most this many times."""
     for turn in range(most):
         if sweep_joints(rows, impulses, twists, turn) <= EXACT:
             break

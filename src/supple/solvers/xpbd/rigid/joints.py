@@ -36,9 +36,9 @@ from supple.solvers.xpbd.sweeps.ordering import Layout
 
 Floats = NDArray[np.float64]
 
-# Of the largest inverse mass of the joint's rows: rows that move less say nothing of their own.
+# Of the largest inverse mass of the joint's rows: rows that move less follow from the others.
 _IDLE = 1e-5
-# Of the joint's size: what motors may lack in a frame, which contact leaves over in substeps.
+# Of the joint's size: what motors may lack in a frame, because of errors that contact leaves in substeps.
 _STALLED = 1e-3
 # Of the size of a joint: by how much it may be off in a frame that has converged.
 MOST_APART = 1e-3

@@ -28,7 +28,7 @@ import numpy as np
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
 
-# Newton's method ends where the quaternion changes by less than this, or after so many iterations.
+# Newton's method ends where the quaternion changes by less than this, or after this many iterations.
 _EXACT, _MOST_ITERATIONS = 1e-15, 10
 # The largest |q| that is looked for; the sine of half of the angle.
 _LARGEST = 0.6
@@ -163,7 +163,7 @@ def advance(points, previous, velocities, control, h):
             moment = cross(r, row(ends, k))
             shift = (shift[0] + 0.25 * ends[k, 0], shift[1] + 0.25 * ends[k, 1], shift[2] + 0.25 * ends[k, 2])
             missing = (missing[0] - moment[0] / h, missing[1] - moment[1] / h, missing[2] - moment[2] / h)
-        # What Newton's method has left over.
+        # The remaining error of Newton's method.
         rest = solve_symmetric(S, missing)
         for k in range(4):
             i = control[b, k]

@@ -92,7 +92,7 @@ def test_a_slow_scene_gets_a_file_with_fewer_tets(live, fake, visitor, meshed, h
     give(visitor, live, b"abc")
     until(lambda: heard)
     assert meshed[0].tets == np.clip(int((allowed - 0.01) / of_a_tet), 300, 2000)
-    assert heard == ["ball.stl: 6 tets; a scene of more would be slower than time"]
+    assert heard == ["ball.stl: 6 tets; a larger scene would be slower than real time"]
 
 
 def test_an_error_in_a_file_is_displayed_and_the_page_continues(live, fake, visitor, meshed, heard, until, monkeypatch):

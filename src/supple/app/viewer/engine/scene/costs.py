@@ -1,4 +1,4 @@
-"""What a frame of XPBD takes on one core: for choices that keep a page as fast as time."""
+"""What a frame of XPBD takes on one core: for choices that keep a page as fast as real time."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def allowed(system: System, dt: float) -> float:
 def without_long_repetitions(solver: Solver, system: System, dt: float, usual: int) -> Solver:
     """XPBD that simulates a frame with at most twice the usual number of substeps, or what fits into a frame.
 
-    A body that is pressed against itself may ask for sixteen times as many: each frame then takes half a second, and
-    differs little. Its status says what is left over. Scenes with rigid bodies need more at times.
+    A body that is pressed against itself may need sixteen times as many: each frame then takes half a second, and
+    differs little. Its status names the remaining error. Scenes with rigid bodies sometimes need more.
     """
     if not isinstance(solver, XPBD) or solver.substeps != "auto" or any(part.rigid for part in system.bodies):
         return solver

@@ -1,4 +1,4 @@
-"""Fewer tets, or another solver, for scenes that would be slower than time on a page."""
+"""Fewer tets, or another solver, for scenes that would be slower than real time on a page."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _STIFF = 100
 
 
 def lightened(live: LiveScene, measured: float = 0.0) -> Iterator[tuple[LiveSource, str]]:
-    """Sources that keep up with time, or nearly, and one line about each, the best one first.
+    """Sources that keep up with real time, or nearly, and one line about each, the best one first.
 
     There is none where the scene keeps up with time, or nothing helps. One stiff body gets the solver `Implicit`.
 
@@ -65,7 +65,7 @@ def lightened(live: LiveScene, measured: float = 0.0) -> Iterator[tuple[LiveSour
     if fewer > _LEAST_GAIN * tets:
         return
     line = (
-        f"the page simulates {fewer:,} tets instead of {tets:,}, with the same skins, to keep up with time; "
+        f"the page simulates {fewer:,} tets instead of {tets:,}, with the same skins, to keep up with real time; "
         "supple view --full keeps the meshes"
     )
     yield replace(source, scene=replace(scene, bodies=changed)), line

@@ -271,7 +271,7 @@ class LiveScene:
         self._anchors = _anchors_of(start.system)
 
     def _keep_start(self) -> None:
-        """Keep the present state for later resets. Only a workspace of XPBD remembers nothing of a step."""
+        """Keep the present state for later resets. Only a workspace of XPBD does not depend on earlier steps."""
         if isinstance(self.workspace, XPBDWorkspace):
             self._start = Start(self.setup, self.state, self.system, self.workspace)
 
