@@ -122,7 +122,7 @@ def _called_kernels(function: FunctionType) -> dict[str, ParallelKernel]:
 def _form(function: FunctionType, form: str) -> FunctionType:
     """A copy of a function that calls the same form of other kernels: "serial" or "parallel".
 
-    It has a name of its own: Numba's cache distinguishes kernels by name, not by options.
+    It has a different name: Numba's cache distinguishes kernels by name, not by options.
     """
     called = {name: getattr(kernel, form) for name, kernel in _called_kernels(function).items()}
     names = {**function.__globals__, **called} if called else function.__globals__

@@ -28,7 +28,7 @@ class ParallelKernel:
 
     Parameters
     ----------
-    function : in Python; serial, parallel : its two forms, each with a name of its own in the cache
+    function : in Python; serial, parallel : its two forms, each with a different name in the cache
     rows : the least number of rows of an array among the arguments for the parallel form
 
     Source: Numba's manual, "The Threading Layers", on safety.

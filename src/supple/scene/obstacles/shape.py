@@ -57,7 +57,7 @@ def concave_contact(signed_distance: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _compiled(contact: Any, signed_distance: Any) -> Callable[..., Any]:
-    """The function under a name of its own.
+    """The function under a different name.
 
     Cached kernels contain what they call, under its name and a number that starts again in every process. Kernels that
     different processes have compiled would confuse two functions of the same name.

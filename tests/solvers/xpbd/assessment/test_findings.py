@@ -26,7 +26,7 @@ def test_the_worst_gives_the_status_and_all_are_in_the_message():
     )
     assert findings.status is Status.INVERTED
     assert findings.message(1.2, "take substeps=60") == (
-        "12 tets of body 'ball' inverted, body 'ball' is 0.003 m deep in obstacle 'floor', 31 % of the energy came "
+        "12 tets of body 'ball' inverted, body 'ball' is 0.003 m deep in obstacle 'floor', 31 % of the energy has "
         "no source, most of it in body 'ball', body 'ball' about 5.1 % too soft at t = 1.2 s; take substeps=60"
     )
     assert all(
