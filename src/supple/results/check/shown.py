@@ -57,7 +57,7 @@ class Place:
 
 
 def place_of(scene: Scene, failures: Sequence[CheckResult]) -> Place | None:
-    """The worst frame of the most informative failure, or None where no failure belongs to a frame that can be drawn."""
+    """The worst frame of the most informative failure; None where no failure belongs to a frame that can be drawn."""
     rank = {name: k for k, name in enumerate(_ORDER)}
     for result in sorted(failures, key=lambda result: rank.get(result.name, len(rank))):
         if result.frame is None:
