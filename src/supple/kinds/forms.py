@@ -61,7 +61,7 @@ class Number(Form):
     def needed(self, given: float) -> str:
         """What a number that is not allowed must be, in words."""
         ends = sum(end is not None for end in (self.above, self.least, self.below, self.most))
-        # Bounds on both sides say it themselves.
+        # Bounds on both sides already exclude it.
         return f"finite and {self.bounds}" if ends == 1 and not np.isfinite(given) else self.bounds
 
     @property

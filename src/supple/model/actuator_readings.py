@@ -1,4 +1,4 @@
-"""What a step did to the actuators of a scene, and with which forces."""
+"""The actuators of a scene after a step: pressures, volumes, tensions, lengths and works."""
 
 from __future__ import annotations
 

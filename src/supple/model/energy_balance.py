@@ -57,7 +57,7 @@ def works_of_actuators(system: System, works: Sequence[NDArray[np.float64]]) -> 
 
 
 def work_of_growth(system: System, before: State, after: State) -> dict[str, float]:
-    """What growth between two states adds to the elastic energy [J].
+    """The elastic energy that growth between two states adds [J].
 
     The mean of its rates at the beginning and at the end of the step, each for the change of the whole step: growth
     without stress does no work, neither does the rotation of a body.
@@ -86,7 +86,7 @@ def completed_works(works: Mapping[str, float], residual: float, change: float) 
 
 
 def dissipated_energy(laws: TetLaws, internal: NDArray[np.float64]) -> float:
-    """What flow has dissipated since the start [J]; internal : (k, 11) variables of what flows."""
+    """The energy that flow has dissipated since the start [J]; internal : (k, 11) variables of tets that flow."""
     if not len(internal):
         return 0.0
     dissipated = internal[:, DISSIPATED]

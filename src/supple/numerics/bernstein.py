@@ -32,7 +32,7 @@ TERMS = len(_TRIPLES)
 ROUND_OFF = 2.0**-45
 
 # Twelve bisections make pieces of a sixteenth of the element's size. Where the determinant comes closer to zero than
-# the bounds on these pieces tell, it counts as zero.
+# the bounds on these pieces show, it counts as zero.
 DEEPEST = 12
 
 
@@ -138,7 +138,7 @@ def _all_above(values, least):
 
 @njit
 def _is_positive(coefficients, least):
-    """Whether the cubic is above `least` on the whole element, as far as `DEEPEST` bisections tell."""
+    """Whether the cubic is above `least` on the whole element, as far as `DEEPEST` bisections show."""
     unsure = False
     for k in range(TERMS):
         if not coefficients[k] > least:

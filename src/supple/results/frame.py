@@ -58,7 +58,7 @@ class Report(DisplayedReport, Diagnostics):
 
     @property
     def joints(self) -> Mapping[str, JointReading]:
-        """What every joint does, by name."""
+        """The state and the forces of every joint, by name."""
         return joint_readings(self.details)
 
     @property

@@ -12,7 +12,7 @@ _PROC, _CGROUP = Path("/proc"), Path("/sys/fs/cgroup")
 
 
 def available_bytes() -> int | None:
-    """Memory that this process can still use without swapping [bytes]; None where the system does not tell.
+    """Memory that this process can still use without swapping [bytes]; None where the system does not report it.
 
     The smallest of what the machine has free, what the limits of the container leave, and what the limit of the
     process (`ulimit -v`) leaves.
@@ -49,7 +49,7 @@ def _of_machine() -> int | None:
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             return int(line.split()[1]) * 1024
-    try:  # macOS, which does not tell how much is free: half of all
+    try:  # macOS, which does not report the free memory: half of all
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
     except (AttributeError, ValueError, OSError):
         return None

@@ -64,7 +64,7 @@ def code_of_module(module: ModuleType) -> bytes:
 
 @cache
 def _text(code: CodeType, docstring: str | None) -> bytes:
-    """What a code object and those in it say, without lines and without the docstring."""
+    """The content of a code object and of those in it, without line numbers and without the docstring."""
     constants = [None if constant is docstring else _constant(constant) for constant in code.co_consts]
     return repr((code.co_code, code.co_names, code.co_varnames, code.co_freevars, constants)).encode()
 

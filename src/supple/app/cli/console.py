@@ -21,7 +21,7 @@ class ExitCode(IntEnum):
     FAILED = 1
     """A check of a recording failed, a claim of a demo does not hold, or a frame did not converge with --strict."""
     INPUT = 2
-    """The input, the options or the place for the output cannot be used: one line on stderr tells why."""
+    """The input, the options or the place for the output cannot be used: one line on stderr gives the reason."""
     SOLVER = 3
     """The solver could not go on. The recording up to there is complete."""
     INTERRUPTED = 130

@@ -22,7 +22,7 @@ logger = logging.getLogger(__name__)
 _SILENT_AFTER = 2.0
 # Nobody watches where there was no browser for this time: one that loads the page again comes back sooner [s].
 _UNWATCHED_AFTER = 2.0
-_IDLE = 0.1  # between two looks for visitors, while nothing happens [s]
+_IDLE = 0.1  # between two checks for visitors, while nothing changes [s]
 
 
 class LivePage:

@@ -1,4 +1,4 @@
-"""What acts along the coordinate of a joint, or across it: conditions, limits and motors.
+"""The laws along the coordinate of a joint, or across it: conditions, limits and motors.
 
 Each is an energy psi of one number g whose derivative is a line that is cut off,
 

@@ -175,7 +175,7 @@ def _invert_diagonal(source, data, diagonal, out):
         det = a * A + b * B + c * C
         trace = a + d + f
         if not det > 1e-30 * trace * trace * trace:
-            # Semi-definite: a vertex that nothing holds in some direction. Any positive matrix of its scale will do.
+            # Semi-definite: a vertex that nothing holds in some direction. Any positive matrix of its scale is enough.
             scale = 1.0 / trace if trace > 0.0 else 1.0
             for r in range(3):
                 for s in range(3):

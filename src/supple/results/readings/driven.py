@@ -1,4 +1,4 @@
-"""What every obstacle and every pin does: how far it has moved, and the force on bodies."""
+"""The displacement of every obstacle and every pin, and its force on bodies."""
 
 from __future__ import annotations
 

@@ -234,7 +234,7 @@ def _pose_of(obstacle: int) -> Callable[[Moment], NDArray[np.float64]]:
 def _lower_half(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], up: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """What of a surface is below the middle of its height."""
+    """The part of a surface below the middle of its height."""
     from trimesh import Trimesh  # only where something is drawn
     from trimesh.intersections import slice_faces_plane
 

@@ -26,7 +26,7 @@ class AxisJoint(Joint):
     friction : largest effort of dry friction [N m] or [N], which holds the joint until the load exceeds it.
     max_effort : largest effort of its motor [N m] or [N], beside the `max_force` of that motor; None: no bound.
     max_velocity : largest rate of its coordinate in both directions [rad/s] or [m/s], the mean over a step: a limit
-        with whatever effort that takes, as of the coordinate; None: no bound. Equilibria have no rates.
+        with any effort that is needed, as of the coordinate; None: no bound. Equilibria have no rates.
     """
 
     axis: Annotated[ArrayLike, Direction()] = (0.0, 0.0, 1.0)

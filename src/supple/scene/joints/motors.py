@@ -95,7 +95,7 @@ class PositionMotor(Motor):
 
 @dataclass(frozen=True, eq=False)
 class VelocityMotor(Motor):
-    """Gives the coordinate the rate `target` with whatever effort that takes, up to `max_force`.
+    """Gives the coordinate the rate `target` with the effort that is needed, up to `max_force`.
 
     With the target 0 it is a brake, or dry friction: it holds the coordinate until the load exceeds `max_force`. It
     stops at the limits of its joint.
@@ -123,7 +123,7 @@ class ForceMotor(Motor):
     Parameters
     ----------
     force : [N] for a slider, a torque [N m] for a hinge; a number, a `Curve`, or a function of time.
-    max_force : where the effort is cut off [N] or [N m]; None: nowhere.
+    max_force : where the effort is cut off [N] or [N m]; None: it is not cut off.
 
     Raises
     ------

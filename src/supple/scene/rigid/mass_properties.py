@@ -24,7 +24,7 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 
 # Flatter than this, relative to its largest second moment, a body has no thickness: the motion across it would have
-# no inertia that double precision can tell from zero.
+# no inertia that double precision can distinguish from zero.
 _FLAT = 1e-12
 
 # Masses and inertia whose products double precision can hold.

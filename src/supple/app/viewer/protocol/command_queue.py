@@ -57,7 +57,7 @@ class CommandQueue:
     def put(self, number: int, command: Command) -> bool:
         """Append a command. Returns False where the queue is full: the command is dropped.
 
-        The release of an accepted grab is never dropped, because its spring would pull for ever.
+        The release of an accepted grab is never dropped, because its spring would not stop pulling.
         """
         with self._changed:
             about = subject(command)

@@ -81,7 +81,7 @@ def _cable_law(cable: Cable, start: float) -> Law:
 
 
 class Wound:
-    """What a winch has wound up since time 0 [m], as a function of time: the integral of its speed.
+    """The length that a winch has wound up since time 0 [m], as a function of time: the integral of its speed.
 
     Exact for numbers and curves; of functions by Gauss's rule with three points in each of `PANEL` [s].
     """

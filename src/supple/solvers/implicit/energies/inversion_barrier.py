@@ -68,7 +68,7 @@ class InversionBarrier(Potential):
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float:
-        """See `Potential.add_model`; most often no tet is below the onset, and the energy alone tells that."""
+        """See `Potential.add_model`; most often no tet is below the onset, and the energy alone shows that."""
         energy = self.value(x)
         if energy:
             self.add_gradient(x, gradient)

@@ -132,7 +132,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         vector = found.vector
         largest, _, reason = limits.largest_step(here.positions, vector)
         end, step, cuts = search(objective, here, vector, found.slope, largest, limits, jumps)
-        # True Hessians need no longer steps, and bodies with inverted tets recover in small ones.
+        # True Hessians do not need longer steps, and bodies with inverted tets recover in small ones.
         projected = found.projected is not ProjectedTerms.NONE and limits.guard.complete
         if step == 1.0 and rate > _CRAWL and not last and projected:
             end, step = extended(objective, here, vector, found.slope, end, limits)

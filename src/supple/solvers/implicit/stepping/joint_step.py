@@ -23,7 +23,7 @@ _INERTIA = 100.0
 # A joint holds where its violation is below this share of its size.
 _HELD = 1e-7
 _MOST_UPDATES = 12
-# An update that does not reduce the largest violation below this share of it leads nowhere.
+# An update that does not reduce the largest violation below this share of it is the last one.
 _GAIN = 0.9
 
 

@@ -11,7 +11,7 @@ from supple.model.state import Status
 from supple.model.system import System
 from supple.solvers.xpbd.assessment.surfaces import Overlap
 
-# The share of the scene's energy that may have no source, and that of the substeps in which motion may be shortened.
+# The share of the scene's energy that may lack a source, and that of the substeps in which motion may be shortened.
 ENERGY_TOLERANCE, HELD_TOLERANCE = 0.02, 0.1
 
 

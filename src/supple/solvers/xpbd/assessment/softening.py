@@ -60,7 +60,7 @@ class MeasuredWork:
 
 
 class Softening:
-    """The estimates for every body of a system, and what measurements make of them.
+    """The estimates for every body of a system, and their corrections by measurements.
 
     Attributes
     ----------

@@ -48,7 +48,7 @@ SWEEPS_PER_JOINT = 10
 
 @dataclass
 class RowCounts:
-    """What happened in the substeps of a frame.
+    """Counts over the substeps of a frame.
 
     Attributes
     ----------

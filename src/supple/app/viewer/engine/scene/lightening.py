@@ -28,7 +28,8 @@ _STIFF = 100
 def lightened(live: LiveScene, measured: float = 0.0) -> Iterator[tuple[LiveSource, str]]:
     """Sources that keep up with real time, or nearly, and one line about each, the best one first.
 
-    There is none where the scene keeps up with time, or nothing helps. One stiff body gets the solver `Implicit`.
+    There is none where the scene keeps up with real time, or no source is faster. One stiff body gets the solver
+    `Implicit`.
 
     Bodies that something refers to, such as a pin or a stitch, keep their meshes, and so do bodies with several
     materials, with quadratic tets or with a deformed start. Skins stay; a body without one is drawn with its surface.

@@ -65,7 +65,7 @@ class BernsteinBarrier(Potential):
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float:
-        """See `Potential.add_model`; most often no coefficient is below the onset, and the energy alone tells that."""
+        """See `Potential.add_model`; most often no coefficient is below the onset, and the energy alone shows that."""
         energy = self.value(x)
         if energy:
             self._add(x, gradient, hessian, project)
