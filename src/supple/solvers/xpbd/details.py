@@ -31,6 +31,8 @@ class XPBDDetails(SolverDetails):
     asleep : by body, whether it rests, so that no substep was taken for it (see `supple.solvers.xpbd.sleep`)
     held_back : substeps in which motion was shortened by more than the error that contacts may leave, so that no tet
         inverts and nothing passes through anything
+    contact_residual : largest change of a distance in the last sweep over contacts of a substep, as a share of the gap
+        that surfaces keep
     """
 
     smallest_gap: float | None = None
@@ -40,6 +42,7 @@ class XPBDDetails(SolverDetails):
     softening: Mapping[str, float] = field(default_factory=dict)
     energy_gained: float = 0.0
     held_back: int = 0
+    contact_residual: float = 0.0
     asleep: Mapping[str, bool] = field(default_factory=dict)
     weld_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     contact_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)

@@ -81,6 +81,7 @@ def test_a_stack_stands(ratio: float, youngs: float, substeps: int) -> None:
     assert np.abs(last.velocities["heavy"]).max() < 0.05
     assert not crossing(last, scene)
     assert last.report.min_det_F > 0.5
+    assert 0.0 < last.report.details.contact_residual < 0.02
 
 
 def test_ten_boxes_stand_on_each_other() -> None:

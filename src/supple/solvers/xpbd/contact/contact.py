@@ -54,11 +54,13 @@ class RowCounts:
     ----------
     cut : substeps in which motion was shortened; crushed : those in which that could not help
     smallest : distance of a contact where a substep began [m]
+    residual : the largest change in the last sweep over the rows of a substep, in gaps
     """
 
     cut: int = 0
     crushed: int = 0
     smallest: float = math.inf
+    residual: float = 0.0
 
 
 class Contact:
@@ -102,7 +104,7 @@ class Contact:
         free[labels[system.inverse_masses == 0.0]] = free[labels[system.stitching.anchored_vertices()]] = False
         masses = np.where(rigid.welded_to >= 0, 0.0, system.masses)
         self._spins = masses, labels, free, np.zeros((len(free), 13))
-        self._h = self._dt = 0.0
+        self._h = self._dt = self._left = 0.0
         self._frames = self._shapes.frames(0.0, np.zeros(3)), self._shapes.frames(0.0, np.zeros(3))
         self._walls: Walls = no_walls()
         self._names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
@@ -195,6 +197,7 @@ class Contact:
 
     def detect(self) -> int:
         """Find the rows of the substep; returns their number."""
+        self._left = 0.0
         if not self:
             return 0
         self.nodes.bend(self._h)
@@ -233,7 +236,8 @@ class Contact:
         x = nodes.x[: len(nodes.impulses), :3].copy()
         _, residual = solve(nodes.x, nodes.bodies, nodes.begin, self._rows, rows, self._tolerance(), most)
         self._take_over(x)
-        return residual / self.gap
+        self._left = residual / self.gap
+        return self._left
 
     def solve_joined(self, rows: int, joints: JointRows, enough: float) -> tuple[NDArray[np.float64], float]:
         """Solve the rows of contacts and of joints; the joints' impulses (r,) [kg m], and by how much joints were off.
@@ -245,7 +249,8 @@ class Contact:
         most, off = max(MOST_RIGID_SWEEPS, SWEEPS_PER_JOINT * len(np.unique(joints.bodies))), 0.0
         if rows:
             contacts = nodes.x, nodes.bodies, nodes.begin, self._rows, rows
-            off = solve_joined(*contacts, joints, impulses, enough, self._tolerance(), most)
+            off, residual = solve_joined(*contacts, joints, impulses, enough, self._tolerance(), most)
+            self._left = residual / self.gap
         else:
             solve_joints(joints, impulses, nodes.bodies.twists, most)
         twists = np.zeros((len(self._rigid) + 1, 6))
@@ -282,6 +287,7 @@ class Contact:
         if not self:
             return
         lists.loaded = rows > 0
+        self.counts.residual = max(self.counts.residual, self._left)
         if not rows:
             self.forces.end_substep(LoadedRows.none())
             return

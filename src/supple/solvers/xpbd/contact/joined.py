@@ -19,9 +19,9 @@ def solve_joined(points, bodies, begin, rows, count, joints, impulses, enough, t
     joints : their rows, with impulses (r,) [kg m], in place
     enough : contacts are left alone if joints need smaller corrections, as shares of their size
 
-    Returns the largest correction of joints in the first turn.
+    Returns the largest correction of joints in the first turn, and what the last sweep over contacts changed [m].
     """
-    first = np.inf
+    first, residual = np.inf, 0.0
     for turn in range(most):
         largest = 0.0
         for k in range(_INNER):
@@ -36,4 +36,4 @@ def solve_joined(points, bodies, begin, rows, count, joints, impulses, enough, t
         _, residual = solve(points, bodies, begin, rows, count, tolerance, 1)
         if largest <= _SMALL and residual <= tolerance:
             break
-    return first
+    return first, residual

@@ -97,6 +97,7 @@ def end_frame(
         softening=shares,
         energy_gained=findings.gained,
         held_back=held_back,
+        contact_residual=ws.contact.counts.residual,
         asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
         contact_forces=pushes,
         friction_forces=friction,
