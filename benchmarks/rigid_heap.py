@@ -31,7 +31,7 @@ def scene(count: int) -> sp.Scene:
         a, b = divmod(place, PER_SIDE)
         axis = rng.normal(size=3)
         turn = rng.uniform(0.0, np.pi) / np.linalg.norm(axis) * axis
-        position = SIZE * GAP * np.array([a - 2, layer + 0.6, b - 2])
+        position = SIZE * GAP * np.array([a - 2, layer + 0.9, b - 2])
         bodies.append(sp.RigidBody(f"{i}", box, density=500.0, position=position, rotation=turn, friction=0.5))
     return sp.Scene(bodies, obstacles=[sp.HalfSpace(friction=0.5)])
 

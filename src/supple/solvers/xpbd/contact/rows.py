@@ -32,6 +32,7 @@ class Rows(NamedTuple):
     weights : (r, 4) c_i; places : (r, 3) q (see `pairs`); normals : (r, 3) n
     targets, distances : (r,) the least n . r, and d [m]; gaps : (r,) that are kept [m]
     masses : (r,) the impulse [kg m] along n that changes n . r by one, see `softness`; 0 where nothing moves or pushes
+    across : (r,) the same along the surface, of rows with a rigid body; 0 until something slips
     friction : (r,); impulses : (r, 3), accumulated [kg m]
     """
 
@@ -45,6 +46,7 @@ class Rows(NamedTuple):
     distances: NDArray[np.float64]
     gaps: NDArray[np.float64]
     masses: NDArray[np.float64]
+    across: NDArray[np.float64]
     friction: NDArray[np.float64]
     impulses: NDArray[np.float64]
 
@@ -52,7 +54,7 @@ class Rows(NamedTuple):
     def room(cls, r: int) -> Rows:
         """For r rows."""
         wide = (np.empty((r, 4)), np.empty((r, 3)), np.empty((r, 3)))
-        flat = (np.empty(r), np.empty(r), np.empty(r), np.empty(r), np.empty(r))
+        flat = (np.empty(r), np.empty(r), np.empty(r), np.empty(r), np.empty(r), np.empty(r))
         return cls(
             np.empty(r, np.int64), np.empty((r, 4), np.int32), np.empty(r, np.int8), *wide, *flat, np.empty((r, 3))
         )
@@ -118,7 +120,7 @@ def detect(begin, end, bodies, first_of, near, pairs, walls, reach, nil, chosen,
         elif kind == POINT and not pairs.deep[k]:
             pushes = pushes and _is_own(c, pairs.shapes[k], first_of)
         rows.masses[count] = 1.0 / soft if soft > 0.0 and pushes else 0.0
-        rows.friction[count] = pairs.friction[k]
+        rows.across[count], rows.friction[count] = 0.0, pairs.friction[k]
         count += 1
     return count
 

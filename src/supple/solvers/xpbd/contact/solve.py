@@ -105,13 +105,15 @@ def solve(points, bodies, begin, rows, count, tolerance, most):
             residual = max(residual, abs(push - before) / mass)
             held = (f[0] - before * n[0], f[1] - before * n[1], f[2] - before * n[2])
             slip = (r[0] - s * n[0], r[1] - s * n[1], r[2] - s * n[2])
-            if has_body(bodies, rows.nodes, e):
-                # A rigid body answers differently along the surface.
+            if rows.friction[e] > 0.0 and has_body(bodies, rows.nodes, e):
+                # A rigid body answers differently along the surface; the direction of the first slip stands for all.
                 length = math.sqrt(dot(slip, slip))
-                if length > 0.0:
+                if rows.across[e] == 0.0 and length > 0.0:
                     along = (slip[0] / length, slip[1] / length, slip[2] / length)
                     c = rows.weights[e]
-                    mass = 1.0 / softness(points, bodies, rows.nodes, e, (c[0], c[1], c[2], c[3]), along)
+                    soft = softness(points, bodies, rows.nodes, e, (c[0], c[1], c[2], c[3]), along)
+                    rows.across[e] = 1.0 / soft
+                mass = rows.across[e]
             t = (held[0] - slip[0] * mass, held[1] - slip[1] * mass, held[2] - slip[2] * mass)
             size, limit = math.sqrt(dot(t, t)), rows.friction[e] * push
             share = limit / size if size > limit else 1.0
