@@ -61,7 +61,7 @@ def test_a_masked_pair_touches_and_its_neighbours_do_not():
     thickness = GAP * mean_edge_length(build_system(scene))
     assert min(gaps["free"]) > 0.9 * thickness
     assert gaps["stitched"][0] < 0.7 * thickness
-    assert gaps["stitched"][1] > 0.7 * thickness
+    assert gaps["stitched"][1] > 0.5 * thickness
 
 
 @pytest.mark.parametrize("kind", range(3), ids=["triangle", "vertex", "edge"])
