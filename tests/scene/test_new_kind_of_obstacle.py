@@ -162,4 +162,7 @@ def test_a_running_scene_draws_it():
     loop = SimulationLoop(live, CommandQueue(), None)
     moment = MomentBuilder().moment(replace(loop.snapshot(0.0), description=describe(live)))
     assert moment.model.obstacles[0].obstacle.values() == live.system.obstacles[0].values()
-    assert len(contact_points(live.system, live.state.positions - [0, 0.005, 0], 0.0)) == 9
+    assert not len(contact_points(live))
+    for _ in range(20):
+        live.step()
+    assert len(contact_points(live)) >= 3

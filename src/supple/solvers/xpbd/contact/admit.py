@@ -27,7 +27,8 @@ from supple.solvers.xpbd.contact.tets import determinant, least_J, share_of_tet
 
 # Of the gap: a distance below this may not become smaller in a substep.
 NEAREST = 0.02
-# Of the gap: what narrower ones are widened to.
+# Of the gap: what narrower ones are widened to. With a half, boxes that are stacked with gaps of 1 % are lifted, and
+# gain energy.
 WIDENED = 0.15
 # Of sqrt(a c), see `_keeps_apart`: 1 is where sides meet.
 TURNING = 0.9
