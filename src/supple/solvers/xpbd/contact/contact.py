@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact import admit as guarantee
 from supple.solvers.xpbd.contact import tets as volumes
 from supple.solvers.xpbd.contact.admit import Marks
+from supple.solvers.xpbd.contact.counts import RowCounts
 from supple.solvers.xpbd.contact.cuts import Cuts, keep_spin, share_motion
 from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows, loaded_rows
 from supple.solvers.xpbd.contact.joined import solve_joined
@@ -45,23 +45,6 @@ RESIDUAL, MOST_SWEEPS = 0.02, 4
 RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 10
 # With joints, and for each joint where that is more: what pulls at a chain has to go along it.
 MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT = 60, 10
-
-
-@dataclass
-class RowCounts:
-    """Counts over the substeps of a frame.
-
-    Attributes
-    ----------
-    cut : substeps in which motion was shortened; crushed : those in which that could not help
-    smallest : distance of a contact where a substep began [m]
-    residual : the largest change in the last sweep over the rows of a substep, in gaps
-    """
-
-    cut: int = 0
-    crushed: int = 0
-    smallest: float = math.inf
-    residual: float = 0.0
 
 
 class Contact:
