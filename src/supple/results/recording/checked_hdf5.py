@@ -98,12 +98,22 @@ class CheckedFile:
         """A text."""
         dataset = self.dataset(path)
         try:
-            value = dataset[()] if dataset.shape == () else None
+            short = dataset.shape == () and self._length_of_text(dataset) <= self._bytes
+            value = dataset[()] if short else None
         except (OSError, RuntimeError, ValueError):
             value = None
         if not isinstance(value, bytes):
             raise self.broken(f"{path} is not a text")
         return value.decode("utf-8", errors="replace")
+
+    def _length_of_text(self, dataset: h5py.Dataset) -> int:
+        """The length that the file gives for a text; HDF5 takes memory for it before it reads."""
+        place = dataset.id.get_offset()
+        if place is None or dataset.dtype.kind != "O":
+            return dataset.dtype.itemsize
+        with self.path.open("rb") as file:
+            file.seek(place)
+            return int.from_bytes(file.read(4), "little")
 
     def array(self, path: str) -> NDArray[Any]:
         """A whole array of numbers."""
