@@ -194,3 +194,20 @@ def test_a_recording_with_damaged_names_is_not_copied(tmp_path, recorded):
         export(tmp_path / "r.vtkhdf", "vtkhdf")
     assert "\n" not in str(caught.value)
     assert [path.name for path in tmp_path.iterdir()] == ["r.vtkhdf"]
+
+
+def test_a_damaged_length_of_the_header_is_refused_before_it_is_read(tmp_path, recorded, monkeypatch):
+    path = tmp_path / "damaged.vtkhdf"
+    shutil.copy(recorded[0], path)
+    with h5py.File(path) as file:
+        place = file["supple/header"].id.get_offset()
+    data = bytearray(path.read_bytes())
+    data[place : place + 4] = (3_500_000_000).to_bytes(4, "little")
+    path.write_bytes(data)
+
+    def read(self, where):
+        raise AssertionError("HDF5 takes 3.5 GB for this")
+
+    monkeypatch.setattr(h5py.Dataset, "__getitem__", read)
+    with pytest.raises(OutputError, match="supple/header is not a text"):
+        read_recording(path)

@@ -51,7 +51,7 @@ def substep(
     ws.loads.pull_to_targets(at)  # 6
     ws.loads.pull_springs(at)
     ws.actuators.project_between(at)
-    move_rigid(ws, h)
+    ws.rigid.move(ws.points, ws.previous, ws.velocities, h)
     if first_lost(x, v) >= 0:
         return
     rows = contact.detect()  # 7: (C4)
@@ -72,18 +72,11 @@ def push(ws: XPBDWorkspace, damping: Damping | None, h: float) -> None:
         damping.push(ws.points, h)
     welded = ws.rigid.welding.vertices
     internal = (ws.points[welded, :3] - ws.previous[welded]) / h - ws.velocities[welded]
-    ws.rigid.gather(ws.points, ws.velocities, h)
-    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+    ws.rigid.move(ws.points, ws.previous, ws.velocities, h)
     if len(welded):
         # Constraints use welded vertices at the places that their bodies will have. Momenta are restored to those
         # without internal forces, of which bodies have their part already.
         ws.velocities[welded] -= internal
-
-
-def move_rigid(ws: XPBDWorkspace, h: float) -> None:
-    """Move rigid bodies as all impulses of a substep determine."""
-    ws.rigid.gather(ws.points, ws.velocities, h)
-    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
 
 
 def solve(ws: XPBDWorkspace, rows: int, end: float, h: float) -> None:

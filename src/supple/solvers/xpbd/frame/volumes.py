@@ -52,7 +52,6 @@ def restore(ws: XPBDWorkspace, h: float) -> None:
     """The velocities of changed positions, with the momentum of the velocities before; rigid bodies are rigid."""
     if ws.momentum is not None:
         ws.momentum.apply(ws.points, ws.previous, ws.velocities, h)
-    ws.rigid.gather(ws.points, ws.velocities, h)
-    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+    ws.rigid.move(ws.points, ws.previous, ws.velocities, h)
     if ws.momentum is None:
         update_velocities(ws.points, ws.previous, ws.velocities, h)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.solvers.xpbd.rigid.motion import advance, keep_momenta
+from supple.solvers.xpbd.rigid.motion import advance
 
 # Relative difference of squares of distances that a motion of a body may make without being corrected.
 _RIGID = 1e-13
@@ -106,13 +106,12 @@ class RigidBodies:
         """
         return masses[:, None] * (velocities[self.welding.vertices] - self._begun) - self._impulses
 
-    def settle(self, points: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
-        """Make places rigid that something has moved freely; the momenta of velocities (n, 3) remain, in place."""
-        if len(self):
-            before = points[:, :3].copy()
-            self.place(points[:, :3])
-            keep_momenta(before, points, velocities, self.control)
-            self.follow(points, velocities)
+    def move(
+        self, points: NDArray[np.float64], previous: NDArray[np.float64], velocities: NDArray[np.float64], h: float
+    ) -> None:
+        """`gather`, then `advance`."""
+        self.gather(points, velocities, h)
+        self.advance(points, previous, velocities, h)
 
     def advance(
         self,

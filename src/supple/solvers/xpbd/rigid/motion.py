@@ -172,20 +172,3 @@ def advance(points, previous, velocities, control, h):
             for j in range(3):
                 points[i, j] = previous[i, j] + h * mean[j] + (ends[k, j] - shift[j])
                 velocities[i, j] = mean[j] + (ends[k, j] - shift[j]) / h + more[j]
-
-
-@njit(cache=True)
-def keep_momenta(before, x, velocities, control):
-    """Add rotations to the velocities so that sum r x v is about the places x what it was about those `before`."""
-    for b in range(len(control)):
-        old, _ = inertia_of(before, control, b)
-        center, S = inertia_of(x, control, b)
-        missing = (0.0, 0.0, 0.0)
-        for i in control[b]:
-            moment = cross(subtract(subtract(row(before, i), old), subtract(row(x, i), center)), row(velocities, i))
-            missing = (missing[0] + moment[0], missing[1] + moment[1], missing[2] + moment[2])
-        turn = solve_symmetric(S, missing)
-        for i in control[b]:
-            more = cross(turn, subtract(row(x, i), center))
-            for j in range(3):
-                velocities[i, j] += more[j]
