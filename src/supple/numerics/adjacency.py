@@ -31,6 +31,13 @@ def adjacency(rows: NDArray[np.integer], items: NDArray[np.integer], count: int)
     return Adjacency(start.astype(np.int32), found.astype(np.int32))
 
 
+def only(lists: Adjacency, kept: NDArray[np.bool_]) -> Adjacency:
+    """The lists with the items that are kept."""
+    stays = kept[lists.items]
+    start = np.concatenate([[0], np.cumsum(stays)])[lists.start]
+    return Adjacency(start.astype(np.int32), lists.items[stays])
+
+
 def no_lists(count: int) -> Adjacency:
     """Empty lists of `count` things."""
     return Adjacency(np.zeros(count + 1, dtype=np.int32), np.zeros(0, dtype=np.int32))

@@ -2,8 +2,8 @@
 
 A rigid body responds to an impulse f at the arm r about its center, both of the beginning of the substep, with the
 displacement f / M of its center and the small rotation I^-1 (r x f). During the sweeps over rows these are collected in
-its twist (u, th), and a node of it is at x + u + th x r. At the end the twist is added to the momenta of its control
-points, and they determine its place (`RigidBodies.advance`). Joints act on the same twists.
+its twist (u, th), and a node of it is at x + u + th x r; see `levers`. At the end the twist is added to the momenta of
+its control points, and they determine its place (`RigidBodies.advance`). Joints act on the same twists.
 
 Source: Müller, Macklin, Chentanez, Jeschke, Kim, "Detailed Rigid Body Simulation with Extended Position Based Dynamics"
 (2020), section 3.3.
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.adjacency import Adjacency
-from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.numerics.mat3 import cross, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.rigid.motion import center_of, inertia_of, solve_symmetric
 
@@ -54,21 +54,6 @@ class Movers(NamedTuple):
     nodes: Adjacency
 
 
-@njit(inline="always")
-def place(x, bodies, i):
-    """Where node i is, with the twist of its body; x (N, >= 3) without it [m]."""
-    p = row(x, i)
-    b = bodies.body[i]
-    if b < 0:
-        return p
-    t, r = bodies.twists, row(bodies.arms, i)
-    return (
-        p[0] + t[b, 0] + (t[b, 4] * r[2] - t[b, 5] * r[1]),
-        p[1] + t[b, 1] + (t[b, 5] * r[0] - t[b, 3] * r[2]),
-        p[2] + t[b, 2] + (t[b, 3] * r[1] - t[b, 4] * r[0]),
-    )
-
-
 @njit
 def has_body(bodies, nodes, e):
     """Whether one of the four nodes of row e is on a rigid body."""
@@ -100,35 +85,6 @@ def push_node(points, bodies, i, f):
         for j in range(3):
             bodies.twists[b, j] += bodies.w[b] * f[j]
         turn_body(bodies, b, cross(row(bodies.arms, i), f))
-
-
-@njit
-def softness(points, bodies, nodes, e, c, n):
-    """How far n . r of row e changes by a unit of impulse along n, with the weights c [1/kg]."""
-    total = 0.0
-    for i in range(4):
-        v = nodes[e, i]
-        b = bodies.body[v]
-        if b < 0:
-            total += points[v, 3] * c[i] * c[i]
-            continue
-        first, share, arm = True, 0.0, (0.0, 0.0, 0.0)
-        for j in range(4):
-            u = nodes[e, j]
-            if bodies.body[u] == b:
-                first = first and j >= i
-                share += c[j]
-                r = row(bodies.arms, u)
-                arm = (arm[0] + c[j] * r[0], arm[1] + c[j] * r[1], arm[2] + c[j] * r[2])
-        if first:
-            m, J = cross(arm, n), bodies.J
-            turned = (
-                J[b, 0, 0] * m[0] + J[b, 0, 1] * m[1] + J[b, 0, 2] * m[2],
-                J[b, 1, 0] * m[0] + J[b, 1, 1] * m[1] + J[b, 1, 2] * m[2],
-                J[b, 2, 0] * m[0] + J[b, 2, 1] * m[1] + J[b, 2, 2] * m[2],
-            )
-            total += bodies.w[b] * share * share + dot(m, turned)
-    return total
 
 
 @njit(cache=True)

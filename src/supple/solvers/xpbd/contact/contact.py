@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.obstacles import ObstaclePoses
 from supple.model.system import System
-from supple.numerics.cross_rows import cross_rows
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact import admit as guarantee
@@ -18,33 +17,26 @@ from supple.solvers.xpbd.contact.admit import Marks
 from supple.solvers.xpbd.contact.counts import RowCounts
 from supple.solvers.xpbd.contact.cuts import Cuts, keep_spin, share_motion
 from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows, loaded_rows
-from supple.solvers.xpbd.contact.joined import solve_joined
 from supple.solvers.xpbd.contact.memory import ContactMemory
 from supple.solvers.xpbd.contact.nodes import Nodes
 from supple.solvers.xpbd.contact.response_rates import response_rates
+from supple.solvers.xpbd.contact.row_solver import RESIDUAL, RowSolver
 from supple.solvers.xpbd.contact.rows import NIL, Rows, detect, is_last_shape, no_walls
 from supple.solvers.xpbd.contact.search.lists import Lists
 from supple.solvers.xpbd.contact.search.overlaps import find_overlaps
 from supple.solvers.xpbd.contact.search.surface import row_surface
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.contact.shapes import RowShapes, Walls
-from supple.solvers.xpbd.contact.solve import keep_impulses, push_kept, solve
+from supple.solvers.xpbd.contact.solve import keep_impulses, push_kept
 from supple.solvers.xpbd.contact.tets import Tets
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
-from supple.solvers.xpbd.rigid.joint_rows import JointRows, solve_joints
+from supple.solvers.xpbd.rigid.joint_rows import JointRows
 
 # Of the mean edge: the gap between surfaces. Of the gap: how far nodes may go beyond the places that were expected when
 # rows were found.
 GAP, SLACK = 0.05, 0.25
 # Of the mean edge: by how much a gap that is too narrow is widened in a frame.
 RECOVERED = 0.05
-# Of the gap: what the last sweep over the rows may change; the most sweeps.
-RESIDUAL, MOST_SWEEPS = 0.02, 4
-# The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps. In a heap of 200
-# boxes neither 10 nor 60 sweeps are enough; impulses that are kept go on with them.
-RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 10
-# With joints, and for each joint where that is more: what pulls at a chain has to go along it.
-MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT = 60, 10
 
 
 class Contact:
@@ -62,13 +54,14 @@ class Contact:
     ) -> None:
         n = len(system.masses)
         self.edge_length = mean_edge_length(system)
-        self._rigid, self._gravity = rigid, system.gravity
+        self._rigid = rigid
         thickness = settings.thickness if settings is not None else None
         self.gap = GAP * self.edge_length if thickness is None else thickness
         lengths = self.edge_length, self.gap
         self._surface = surface = row_surface(system, rigid, len(inverse_masses) - n, settings, lengths)
         count, poses = surface.count, ObstaclePoses(system.obstacles)
         self.nodes = Nodes(surface, rigid, poses, inverse_masses)
+        self._solver = RowSolver(self.nodes, rigid, system.gravity, self.gap)
         self._shapes = RowShapes(system, poses)
         self._lists = Lists(surface, self._shapes, self.gap)
         self.tets = Tets.of(system, count)
@@ -88,7 +81,7 @@ class Contact:
         free[labels[system.inverse_masses == 0.0]] = free[labels[system.stitching.anchored_vertices()]] = False
         masses = np.where(rigid.welded_to >= 0, 0.0, system.masses)
         self._spins = masses, labels, free, np.zeros((len(free), 13))
-        self._h = self._dt = self._left = 0.0
+        self._h = self._dt = 0.0
         self._frames = self._shapes.frames(0.0, np.zeros(3)), self._shapes.frames(0.0, np.zeros(3))
         self._walls: Walls = no_walls()
         self._names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
@@ -181,7 +174,7 @@ class Contact:
 
     def detect(self) -> int:
         """Find the rows of the substep; returns their number."""
-        self._left = 0.0
+        self._solver.left = 0.0
         if not self:
             return 0
         self.nodes.bend(self._h)
@@ -213,57 +206,12 @@ class Contact:
             self._cuts = Cuts.room(most + len(self.tets.J))
 
     def solve(self, rows: int, most: int | None = None) -> float:
-        """Solve the rows with at most this many sweeps; returns what the last one changed, in gaps."""
-        if not rows:
-            return 0.0
-        nodes, most = self.nodes, most or (MOST_RIGID_SWEEPS if len(self._rigid) else MOST_SWEEPS)
-        x = nodes.x[: len(nodes.impulses), :3].copy()
-        _, residual = solve(nodes.x, nodes.bodies, nodes.begin, self._rows, rows, self._tolerance(), most)
-        self._take_over(x)
-        self._left = residual / self.gap
-        return self._left
+        """Solve the rows; see `RowSolver`."""
+        return self._solver.solve(self._rows, rows, self._h, most)
 
     def solve_joined(self, rows: int, joints: JointRows, enough: float) -> tuple[NDArray[np.float64], float]:
-        """Solve the rows of contacts and of joints; the joints' impulses (r,) [kg m], and by how much joints were off.
-
-        The latter as a share of their size; contacts are left alone if that is `enough`.
-        """
-        nodes, impulses = self.nodes, np.zeros(len(joints.total))
-        x = nodes.x[: len(nodes.impulses), :3].copy()
-        most, off = max(MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT * len(np.unique(joints.bodies))), 0.0
-        if rows:
-            contacts = nodes.x, nodes.bodies, nodes.begin, self._rows, rows
-            off, residual = solve_joined(*contacts, joints, impulses, enough, self._tolerance(), most)
-            self._left = residual / self.gap
-        else:
-            solve_joints(joints, impulses, nodes.bodies.twists, most)
-        twists = np.zeros((len(self._rigid) + 1, 6))
-        np.add.at(twists, joints.bodies, impulses[:, None, None] * joints.answers)
-        of_joints = twists[:-1, None]
-        arms = nodes.bodies.arms[self._rigid.control]
-        self._take_over(x, (of_joints[..., :3] + cross_rows(of_joints[..., 3:], arms)) / self._h)
-        return impulses, off
-
-    def _tolerance(self) -> float:
-        """What the last sweep over the rows may change [m]."""
-        fall = math.hypot(*self._gravity) * self._h**2
-        tolerance = RESIDUAL * self.gap
-        return min(tolerance, RIGID_RESIDUAL * fall) if len(self._rigid) and fall > 0.0 else tolerance
-
-    def _take_over(self, x: NDArray[np.float64], of_joints: NDArray[np.float64] | None = None) -> None:
-        """Give velocities what moved vertices from x (n, 3), and bodies.
-
-        of_joints : (b, 4, 3) the part of the control points' changes that is not one of contacts [m/s]
-        """
-        nodes, n = self.nodes, len(x)
-        changes = (nodes.x[:n, :3] - x) / self._h
-        nodes.v[:n] += changes
-        nodes.impulses += changes
-        if len(self._rigid):
-            control = self._rigid.control
-            v = nodes.v[control]
-            nodes.move_bodies(self._h)
-            nodes.impulses[control] += nodes.v[control] - v - (0.0 if of_joints is None else of_joints)
+        """Solve the rows of contacts and of joints; see `RowSolver`."""
+        return self._solver.solve_joined(self._rows, rows, joints, self._h, enough)
 
     def keep(self, rows: int) -> None:
         """Note the forces, and keep the impulses with which the next substep begins."""
@@ -271,7 +219,7 @@ class Contact:
         if not self:
             return
         lists.loaded = rows > 0
-        self.counts.residual = max(self.counts.residual, self._left)
+        self.counts.residual = max(self.counts.residual, self._solver.left)
         if not rows:
             self.forces.end_substep(LoadedRows.none())
             return

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.contact.bodies import has_body, push_node, softness
+from supple.solvers.xpbd.contact.bodies import has_body, push_node
+from supple.solvers.xpbd.contact.levers import softness
 from supple.solvers.xpbd.rigid.motion import solve_symmetric
 
 
@@ -138,7 +139,7 @@ def _stop_approach(points, bodies, rows, e, velocities, part):
             turned = cross((t[b, 3], t[b, 4], t[b, 5]), row(bodies.arms, v))
             u = (u[0] + t[b, 0] + turned[0], u[1] + t[b, 1] + turned[1], u[2] + t[b, 2] + turned[2])
         speed += rows.weights[e, i] * dot(n, u)
-    soft = softness(points, bodies, rows.nodes, e, (*row(rows.weights, e), rows.weights[e, 3]), n)
+    soft = softness(points, bodies, rows, e, n)
     if not speed < 0.0 or not soft > 0.0:
         return
     for i in range(4):

@@ -19,6 +19,8 @@ from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
 
 POINT, EDGES, SHAPE = 0, 1, 2
+# Of `Pairs.near`.
+FAR, NEAR, UNKNOWN = 0, 1, 2
 
 
 class Pairs(NamedTuple):
@@ -35,6 +37,7 @@ class Pairs(NamedTuple):
         but pushed out along the normals at that time
     friction : (k,) its coefficient; gaps : (k,) the distance that is kept [m]
     normals : (k, 3) as of the latest look; impulses : (k, 3) with which the next substep begins [kg m]
+    near : (k,) int8, whether the pair may come near while its nodes go on, see `near_pairs`
     """
 
     nodes: NDArray[np.int32]
@@ -47,23 +50,19 @@ class Pairs(NamedTuple):
     gaps: NDArray[np.float64]
     normals: NDArray[np.float64]
     impulses: NDArray[np.float64]
+    near: NDArray[np.int8]
 
     @classmethod
-    def none(cls) -> Pairs:
-        """No pairs."""
-        zeros = np.zeros
-        return cls(
-            zeros((0, 4), np.int32),
-            zeros(0, np.int8),
-            zeros(0, np.int32),
-            zeros(0, np.int64),
-            zeros(0, np.bool_),
-            zeros(0, np.bool_),
-            zeros(0),
-            zeros(0),
-            zeros((0, 3)),
-            zeros((0, 3)),
+    def room(cls, k: int) -> Pairs:
+        """For k pairs, of which nothing is known."""
+        numbers = (
+            np.zeros((k, 4), np.int32),
+            np.full(k, SHAPE, np.int8),
+            np.full(k, -1, np.int32),
+            np.zeros(k, np.int64),
         )
+        flags, vectors = (np.empty(k, np.bool_), np.zeros(k, np.bool_)), (np.zeros((k, 3)), np.zeros((k, 3)))
+        return cls(*numbers, *flags, np.empty(k), np.empty(k), *vectors, np.full(k, UNKNOWN, np.int8))
 
 
 @njit
@@ -117,6 +116,12 @@ def along(x, i, n):
 @njit
 def is_loaded(impulses, k):
     return impulses[k, 0] != 0.0 or impulses[k, 1] != 0.0 or impulses[k, 2] != 0.0
+
+
+@njit(cache=True)
+def loaded_pairs(impulses):
+    """The numbers of the pairs that push, from impulses (k, 3)."""
+    return np.array([k for k in range(len(impulses)) if is_loaded(impulses, k)], dtype=np.int64)
 
 
 @njit(cache=True)
@@ -177,24 +182,59 @@ def relative_speed(v, nodes, k, kind):
 
 
 @njit(cache=True)
-def near_pairs(x, v, pairs, time, reach, out):
-    """The pairs that may come nearer than `reach` while their nodes go on for a time; all pairs with shapes."""
+def mean_square_speed(v, pairs):
+    """The mean square of the relative speeds of pairs of surfaces [m^2/s^2], zero without any."""
+    count, total = 0, 0.0
+    for k in range(len(pairs.nodes)):
+        if pairs.kinds[k] != SHAPE:
+            count += 1
+            total += relative_speed(v, pairs.nodes, k, pairs.kinds[k]) ** 2
+    return total / max(count, 1)
+
+
+@njit(cache=True)
+def copy_pairs(old, rows, new, first):
+    """Copy pairs to the rows from `first` on."""
+    for m in range(len(rows)):
+        k, o = first + m, rows[m]
+        for i in range(4):
+            new.nodes[k, i] = old.nodes[o, i]
+        for j in range(3):
+            new.normals[k, j], new.impulses[k, j] = old.normals[o, j], old.impulses[o, j]
+        new.kinds[k], new.shapes[k], new.keys[k], new.near[k] = old.kinds[o], old.shapes[o], old.keys[o], old.near[o]
+        new.pushes[k], new.deep[k] = old.pushes[o], old.deep[o]
+        new.friction[k], new.gaps[k] = old.friction[o], old.gaps[o]
+
+
+@njit(cache=True)
+def near_pairs(x, v, pairs, time, reach, moved, out):
+    """List the pairs that may come nearer than `reach` while their nodes go on for a time, and all pairs with shapes.
+
+    Of others it is known already, unless a node has `moved` (N,); returns the number of near pairs.
+    """
     count = 0
     nodes = pairs.nodes
     for k in range(len(nodes)):
         kind = pairs.kinds[k]
         if kind == SHAPE or pairs.deep[k] or is_loaded(pairs.impulses, k):
-            out[count] = k
-            count += 1
-            continue
-        far = reach + time * relative_speed(v, nodes, k, kind)
-        if room_between(x, x, nodes, k, kind, row(pairs.normals, k)) > far:
-            continue
-        _, r = weights_of(x, nodes, k, kind)
-        size = math.sqrt(dot(r, r))
-        for j in range(3):
-            pairs.normals[k, j] = r[j] / size if size > 0.0 else 0.0
-        if size <= far:
-            out[count] = k
-            count += 1
+            pairs.near[k] = NEAR
+        elif (
+            pairs.near[k] == UNKNOWN
+            or moved[nodes[k, 0]]
+            or moved[nodes[k, 1]]
+            or moved[nodes[k, 2]]
+            or moved[nodes[k, 3]]
+        ):
+            pairs.near[k] = FAR
+            far = reach + time * relative_speed(v, nodes, k, kind)
+            if room_between(x, x, nodes, k, kind, row(pairs.normals, k)) > far:
+                continue
+            _, r = weights_of(x, nodes, k, kind)
+            size = math.sqrt(dot(r, r))
+            for j in range(3):
+                pairs.normals[k, j] = r[j] / size if size > 0.0 else 0.0
+            if size <= far:
+                pairs.near[k] = NEAR
+        out[count] = k
+        count += pairs.near[k]
     return count

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.contact.bodies import softness
+from supple.solvers.xpbd.contact.levers import set_levers, softness
 from supple.solvers.xpbd.contact.pairs import EDGES, POINT, SHAPE, Pairs, along, facing, is_loaded, room_between
 from supple.solvers.xpbd.contact.shapes import Walls
 
@@ -34,6 +34,8 @@ class Rows(NamedTuple):
     masses : (r,) the impulse [kg m] along n that changes n . r by one, see `softness`; 0 where nothing moves or pushes
     across : (r,) the same along the surface, of rows with a rigid body; 0 until something slips
     friction : (r,); impulses : (r, 3), accumulated [kg m]
+    rigid : (r,) whether a node is on a rigid body
+    movers : (r, 4), levers : (r, 4, 4) share and arm [m], fixed : (r, 3) [m] of rows with rigid bodies; see `levers`
     """
 
     pairs: NDArray[np.int64]
@@ -49,15 +51,19 @@ class Rows(NamedTuple):
     across: NDArray[np.float64]
     friction: NDArray[np.float64]
     impulses: NDArray[np.float64]
+    rigid: NDArray[np.bool_]
+    movers: NDArray[np.int32]
+    levers: NDArray[np.float64]
+    fixed: NDArray[np.float64]
 
     @classmethod
     def room(cls, r: int) -> Rows:
         """For r rows."""
         wide = (np.empty((r, 4)), np.empty((r, 3)), np.empty((r, 3)))
         flat = (np.empty(r), np.empty(r), np.empty(r), np.empty(r), np.empty(r), np.empty(r))
-        return cls(
-            np.empty(r, np.int64), np.empty((r, 4), np.int32), np.empty(r, np.int8), *wide, *flat, np.empty((r, 3))
-        )
+        numbers = np.empty(r, np.int64), np.empty((r, 4), np.int32), np.empty(r, np.int8)
+        of_bodies = np.empty(r, np.bool_), np.empty((r, 4), np.int32), np.empty((r, 4, 4)), np.empty((r, 3))
+        return cls(*numbers, *wide, *flat, np.empty((r, 3)), *of_bodies)
 
 
 @njit(cache=True)
@@ -113,7 +119,8 @@ def detect(begin, end, bodies, first_of, near, pairs, walls, reach, nil, chosen,
             rows.impulses[count, j] = pairs.impulses[k, j]
         rows.pairs[count], rows.kinds[count] = k, kind
         rows.targets[count], rows.distances[count], rows.gaps[count] = target, d, pairs.gaps[k]
-        soft = softness(end, bodies, rows.nodes, count, c, n)
+        set_levers(bodies, rows, count)
+        soft = softness(end, bodies, rows, count, n)
         pushes = pairs.pushes[k]
         if kind == EDGES and not pairs.deep[k]:
             pushes = pushes and _cross(begin, pairs.nodes, k, c)

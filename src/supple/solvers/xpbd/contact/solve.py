@@ -13,32 +13,10 @@ import math
 
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.contact.bodies import has_body, place, push_node, softness, turn_body
+from supple.solvers.xpbd.contact.bodies import push_node, turn_body
+from supple.solvers.xpbd.contact.levers import push_row, softness, vector
 from supple.solvers.xpbd.contact.pairs import SHAPE, facing, is_loaded, weights_of
 from supple.solvers.xpbd.contact.rows import NIL
-
-
-@njit
-def vector(x, bodies, rows, e):
-    """r of a row at places x and the twists of bodies."""
-    a, b, c, d = rows.weights[e, 0], rows.weights[e, 1], rows.weights[e, 2], rows.weights[e, 3]
-    p, q = place(x, bodies, rows.nodes[e, 0]), place(x, bodies, rows.nodes[e, 1])
-    r, s = place(x, bodies, rows.nodes[e, 2]), place(x, bodies, rows.nodes[e, 3])
-    o = row(rows.places, e)
-    return (
-        a * p[0] + b * q[0] + c * r[0] + d * s[0] - o[0],
-        a * p[1] + b * q[1] + c * r[1] + d * s[1] - o[1],
-        a * p[2] + b * q[2] + c * r[2] + d * s[2] - o[2],
-    )
-
-
-@njit
-def displace(points, bodies, rows, e, f):
-    """Move what a row pushes by the impulse f on its first side and its opposite on the second."""
-    for i in range(4):
-        c = rows.weights[e, i]
-        if c != 0.0:
-            push_node(points, bodies, rows.nodes[e, i], (c * f[0], c * f[1], c * f[2]))
 
 
 @njit
@@ -105,21 +83,19 @@ def solve(points, bodies, begin, rows, count, tolerance, most):
             residual = max(residual, abs(push - before) / mass)
             held = (f[0] - before * n[0], f[1] - before * n[1], f[2] - before * n[2])
             slip = (r[0] - s * n[0], r[1] - s * n[1], r[2] - s * n[2])
-            if rows.friction[e] > 0.0 and has_body(bodies, rows.nodes, e):
+            if rows.friction[e] > 0.0 and rows.rigid[e]:
                 # A rigid body answers differently along the surface; the direction of the first slip stands for all.
                 length = math.sqrt(dot(slip, slip))
                 if rows.across[e] == 0.0 and length > 0.0:
                     along = (slip[0] / length, slip[1] / length, slip[2] / length)
-                    c = rows.weights[e]
-                    soft = softness(points, bodies, rows.nodes, e, (c[0], c[1], c[2], c[3]), along)
-                    rows.across[e] = 1.0 / soft
+                    rows.across[e] = 1.0 / softness(points, bodies, rows, e, along)
                 mass = rows.across[e]
             t = (held[0] - slip[0] * mass, held[1] - slip[1] * mass, held[2] - slip[2] * mass)
             size, limit = math.sqrt(dot(t, t)), rows.friction[e] * push
             share = limit / size if size > limit else 1.0
             t = (share * t[0], share * t[1], share * t[2])
             new = (push * n[0] + t[0], push * n[1] + t[1], push * n[2] + t[2])
-            displace(points, bodies, rows, e, subtract(new, f))
+            push_row(points, bodies, rows, e, subtract(new, f))
             if rows.kinds[e] != SHAPE:
                 m, d = cross(n, subtract(t, held)), rows.distances[e]
                 if m[0] != 0.0 or m[1] != 0.0 or m[2] != 0.0:

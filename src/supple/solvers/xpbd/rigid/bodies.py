@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.solvers.xpbd.rigid.motion import advance
+from supple.solvers.xpbd.rigid.motion import advance, spins
 
 # Relative difference of squares of distances that a motion of a body may make without being corrected.
 _RIGID = 1e-13
@@ -135,8 +135,4 @@ class RigidBodies:
 
     def spins(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """(b,) how fast the bodies turn at positions x and velocities v (n, 3) [rad/s]."""
-        r, u = x[self.control], v[self.control]
-        r, u = r - r.mean(axis=1, keepdims=True), u - u.mean(axis=1, keepdims=True)
-        second = np.einsum("bki,bkj->bij", r, r)
-        inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
-        return np.linalg.norm(np.linalg.solve(inertia, np.cross(r, u).sum(axis=1)[:, :, None])[:, :, 0], axis=1)
+        return spins(x, v, self.control) if len(self) else np.zeros(0)

@@ -136,6 +136,21 @@ def half_turn(S, L):
 
 
 @njit(cache=True)
+def spins(x, v, control):
+    """(b,) how fast bodies turn at places x (N, >= 3) with velocities v (N, 3) of their control points [rad/s]."""
+    out = np.empty(len(control))
+    for b in range(len(control)):
+        center, S = inertia_of(x, control, b)
+        L = (0.0, 0.0, 0.0)
+        for i in control[b]:
+            moment = cross(subtract(row(x, i), center), row(v, i))
+            L = (L[0] + moment[0], L[1] + moment[1], L[2] + moment[2])
+        turn = solve_symmetric(S, L)
+        out[b] = math.sqrt(dot(turn, turn))
+    return out
+
+
+@njit(cache=True)
 def advance(points, previous, velocities, control, h):
     ends = np.empty((4, 3))
     for b in range(len(control)):

@@ -15,7 +15,17 @@ from numpy.typing import NDArray
 from supple.contact.search.patch_search import PatchSearch
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.memory import ContactMemory, ListMemory
-from supple.solvers.xpbd.contact.pairs import SHAPE, Pairs, describe_pairs, near_pairs
+from supple.solvers.xpbd.contact.pairs import (
+    SHAPE,
+    UNKNOWN,
+    Pairs,
+    copy_pairs,
+    describe_pairs,
+    loaded_pairs,
+    mean_square_speed,
+    near_pairs,
+)
+from supple.solvers.xpbd.contact.search.expected import Expected
 from supple.solvers.xpbd.contact.search.overlaps import Overlaps
 from supple.solvers.xpbd.contact.search.surface import RowSurface
 from supple.solvers.xpbd.contact.shapes import RowShapes
@@ -27,16 +37,10 @@ SKIN = 0.01
 WIDE, NEAR = 0.13, 0.05
 SOON, TOGETHER = 0.7, 0.5
 # Of the mean edge: how far the fastest node goes while the wide list is valid, and at most where that has fewer pairs
-# than the surfaces have points, so that a search costs more than the list. The number of substeps of the near list.
-WAY, LONGEST, STEPS = 0.35, 1.0, 6
-
-
-class _Expected:
-    """Where nodes were and how fast, when a list was made; until when the list holds."""
-
-    def __init__(self, count: int) -> None:
-        self.x, self.v = np.full((count, 3), np.inf), np.zeros((count, 3))
-        self.age = self.until = 0.0
+# than the surfaces have points, so that a search costs more than the list. The number of substeps of the near list. A
+# part of the list is made again for at most so many times as long as a list by the present velocities would be valid:
+# where falling boxes meet boxes that lie, a tenth of the list remains.
+WAY, LONGEST, STEPS, LATER = 0.35, 1.0, 6, 2.0
 
 
 class Lists:
@@ -53,7 +57,7 @@ class Lists:
         self._surface, self._shapes, self._gap = surface, shapes, gap
         self._edge = surface.edge_length
         self._search = PatchSearch(surface.parts, surface.patches)
-        self._left = np.zeros(surface.count, dtype=np.bool_)
+        self._every = np.ones(surface.count, dtype=np.bool_)
         self._collide, self._on_shapes = surface.simplices.collide.copy(), shapes.collide
         self._fixed = shapes.described()
         self._any = bool(self._collide.any()) or bool(self._on_shapes.any())
@@ -86,9 +90,9 @@ class Lists:
         self._deep = overlaps
         np.logical_and(self._collide & ~overlaps.crossing, ~(still[:, None] & still), out=s.collide)
         self._on_shapes = self._shapes.collide & ~still[:, None]
-        self.wide, self.tight = _Expected(count), _Expected(count)
+        self.wide, self.tight = Expected(count), Expected(count)
         self._points = self._edges = self._on_walls = np.zeros((0, 2), dtype=np.int32)
-        self.pairs = _room_for(0 if memory is None else len(memory.keys))
+        self.pairs = Pairs.room(0 if memory is None else len(memory.keys))
         if memory is not None:
             self.pairs.keys[:], self.pairs.normals[:] = memory.keys, memory.normals
             self.pairs.impulses[:] = h * h * memory.forces
@@ -99,8 +103,8 @@ class Lists:
         if known is not None and not len(overlaps.normals) and self._is_of(known):
             self.wide.x, self.wide.v = known.x - origin, known.v.copy()
             self.wide.age, self.wide.until = known.age, known.until
-            self._points, self._edges, self._on_walls = known.points, known.edges, known.walls
-            self._describe()
+            self._on_walls = known.walls
+            self._describe(None, known.points, known.edges)
             self._deviations = self._deviation(self.wide, x), np.inf
 
     def _is_of(self, known: ListMemory) -> bool:
@@ -124,7 +128,7 @@ class Lists:
 
     def memory(self, x: NDArray[np.float64], origin: NDArray[np.float64], h: float) -> ContactMemory:
         """What the next frame begins with, after substeps of h [s]; x (n, 3) are the vertices in the world [m]."""
-        k, wide = np.flatnonzero(self.pairs.impulses.any(axis=1)), self.wide
+        k, wide = loaded_pairs(self.pairs.impulses), self.wide
         k = k[np.argsort(self.pairs.keys[k])]
         masks = self._surface.simplices.collide.copy(), self._on_shapes, self._fixed
         pairs = self._points, self._edges, self._on_walls
@@ -140,13 +144,15 @@ class Lists:
         limits = SOON * WIDE * self._edge, SOON * NEAR * self._edge
         if wide.age + least > wide.until:
             self._find(x, v, self._time(v, h), frames, None)
-            self._choose(x, v, STEPS * h)
         elif not self._deviations[0] <= limits[0]:
-            nodes = self._nodes_off(x, TOGETHER * WIDE)
-            self._find(x, v, 0.0, frames, nodes)
-            self._choose(x, v, STEPS * h)
-        elif tight.age + least > tight.until or not self._deviations[1] <= limits[1]:
+            wide.until = min(wide.until, wide.age + LATER * self._time(v, h))
+            self._find(x, v, 0.0, frames, self._nodes_off(wide, x, TOGETHER * WIDE))
+        elif tight.age + least <= tight.until and self._deviations[1] <= limits[1]:
+            return
+        if tight.age + least > tight.until:
             self._choose(x, v, min(wide.until - wide.age, STEPS * h))
+        else:
+            self._choose_again(x, v)
 
     def cover(
         self, begin: NDArray[np.float64], end: NDArray[np.float64], h: float, frames: NDArray[np.float64]
@@ -160,23 +166,23 @@ class Lists:
         if all(inside):
             return True
         v = (end[:, :3] - begin[:, :3]) / h
+        nodes = self._nodes_off(tight, end, TOGETHER * NEAR)
+        off = self._nodes_off(wide, end, TOGETHER * WIDE)
+        wide.age -= h
+        tight.age -= h
         if not inside[0]:
-            nodes = self._nodes_off(end, TOGETHER * WIDE)
-            wide.age -= h
-            self._find(begin, v, 0.0, frames, nodes)
-            wide.age += h
-        self._choose(begin, v, h)
-        tight.age = h
+            self._find(begin, v, 0.0, frames, off)
+        self._choose_again(begin, v, nodes)
+        wide.age += h
+        tight.age += h
         self._deviations = self._deviation(wide, end), self._deviation(tight, end)
         return False
 
-    def _deviation(self, expected: _Expected, x: NDArray[np.float64]) -> float:
-        return math.sqrt(_largest_deviation(x, expected.x, expected.v, expected.age, self._surface.simplices.nodes))
+    def _deviation(self, expected: Expected, x: NDArray[np.float64]) -> float:
+        return expected.deviation(x, self._surface.simplices.nodes)
 
-    def _nodes_off(self, x: NDArray[np.float64], share: float) -> NDArray[np.bool_]:
-        wide = self.wide
-        _deviating(x, wide.x, wide.v, wide.age, self._surface.simplices.nodes, share * self._edge, self._left)
-        return self._left
+    def _nodes_off(self, expected: Expected, x: NDArray[np.float64], share: float) -> NDArray[np.bool_]:
+        return expected.off(x, self._surface.simplices.nodes, share * self._edge)
 
     def _find(
         self,
@@ -188,41 +194,43 @@ class Lists:
     ) -> None:
         """Search the pairs of some nodes (N,), or a new list of all that holds for a time [s]."""
         p, wide = self._surface.patches, self.wide
+        asked = None
         if nodes is None:
-            wide.x, wide.v = x[:, :3].copy(), v.copy()
-            wide.age, wide.until = 0.0, time
-            asked = None
-            at = wide.x
+            wide.begin(x, v, time)
         else:
-            wide.v[nodes] = v[nodes]
-            wide.x[nodes] = x[nodes, :3] - wide.age * v[nodes]
+            wide.correct(nodes, x, v)
             asked = _asked(nodes[self._surface.simplices.nodes], p.corners)
-            at = wide.x + wide.age * wide.v
-        way = (wide.until - wide.age) * wide.v
+        at, way = wide.places, (wide.until - wide.age) * wide.v
         found = self._search.find(at, way, self._gap + 2.0 * WIDE * self._edge, asked)
-        parts = (p.of_point, p.of_triangle), (p.of_edge, p.of_edge)
-        kept = []
-        for old, (one, other), new in zip((self._points, self._edges), parts, found, strict=True):
-            kept.append(new)
-            if asked is not None:
-                stays = ~(asked[one[old[:, 0]]] | asked[other[old[:, 1]]])
-                kept[-1] = np.concatenate([old[stays], new])
-        self._points, self._edges = kept
         self._on_walls = np.column_stack(self._walls(at, way, frames))
-        self._describe()
+        self._describe(asked, *found)
 
-    def _describe(self) -> None:
-        """Make the pairs of the lists; those that push keep their impulses."""
-        s, deep, p = self._surface.simplices, self._deep, len(self._points)
-        points, edges = np.concatenate([self._points, deep.points]), np.concatenate([deep.edges, self._edges])
-        k = len(points) + len(edges)
-        pairs = _room_for(k + len(self._on_walls))
-        describe_pairs(0, points, edges, s, 2.0 * self._gap, pairs)
-        pairs.deep[p : p + len(deep.normals)] = True
-        pairs.normals[p : p + len(deep.normals)] = deep.normals
-        self._describe_walls(pairs, k, *self._on_walls.T)
-        _hand_on(self.pairs, pairs)
-        self.pairs = pairs
+    def _describe(self, asked: NDArray[np.bool_] | None, points: NDArray[np.int32], edges: NDArray[np.int32]) -> None:
+        """Make the pairs of the lists: the old ones without patches that are asked, and those that are found.
+
+        Pairs that push keep their impulses.
+        """
+        s, deep, p, old = self._surface.simplices, self._deep, self._surface.patches, self.pairs
+        stays = [np.zeros(0, dtype=np.int64)] * 2
+        if asked is not None:
+            parts = (self._points, p.of_point, p.of_triangle), (self._edges, p.of_edge, p.of_edge)
+            stays = [np.flatnonzero(~(asked[one[of[:, 0]]] | asked[other[of[:, 1]]])) for of, one, other in parts]
+        d, listed = len(deep.normals), len(self._points)
+        self._points = np.concatenate([self._points[stays[0]], points])
+        self._edges = np.concatenate([self._edges[stays[1]], edges])
+        first = d + len(self._points)
+        new = Pairs.room(first + len(self._edges) + len(self._on_walls))
+        nothing = deep.points[:0]
+        describe_pairs(0, deep.points, deep.edges, s, 2.0 * self._gap, new)
+        new.deep[:d], new.normals[:d] = True, deep.normals
+        kept = np.concatenate([d + stays[0], d + listed + stays[1]])
+        copy_pairs(old, kept[: len(stays[0])], new, d)
+        copy_pairs(old, kept[len(stays[0]) :], new, first)
+        describe_pairs(d + len(stays[0]), points, nothing, s, 2.0 * self._gap, new)
+        describe_pairs(first + len(stays[1]), nothing, edges, s, 2.0 * self._gap, new)
+        self._describe_walls(new, first + len(self._edges), *self._on_walls.T)
+        _hand_on(old, kept, new)
+        self.pairs = new
 
     def _walls(
         self, x: NDArray[np.float64], way: NDArray[np.float64], frames: NDArray[np.float64]
@@ -249,73 +257,43 @@ class Lists:
         pairs.friction[mine] = self._shapes.friction[s.owner[nodes], shapes]
 
     def _choose(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
-        tight = self.tight
-        tight.x, tight.v, tight.age, tight.until = x[:, :3].copy(), v.copy(), 0.0, time
-        room = np.empty(len(self.pairs.keys), dtype=np.int64)
-        count = near_pairs(x, v, self.pairs, time, self._gap + 2.0 * NEAR * self._edge, room)
-        self.near = room[:count]
+        """Choose the near pairs for a time [s]."""
+        self.tight.begin(x, v, time)
+        self._choose_of(self._every)
+
+    def _choose_again(
+        self, x: NDArray[np.float64], v: NDArray[np.float64], nodes: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Choose again the near ones among the pairs of nodes (N,), or of those that have left their place."""
+        off = self._nodes_off(self.tight, x, TOGETHER * NEAR) if nodes is None else nodes
+        self.tight.correct(off, x, v)
+        self._choose_of(off)
+
+    def _choose_of(self, nodes: NDArray[np.bool_]) -> None:
+        tight, room = self.tight, np.empty(len(self.pairs.keys) + 1, dtype=np.int64)
+        reach, time = self._gap + 2.0 * NEAR * self._edge, tight.until - tight.age
+        self.near = room[: near_pairs(tight.places, tight.v, self.pairs, time, reach, nodes, room)]
         self._deviations = self._deviations[0], 0.0
 
     def _time(self, v: NDArray[np.float64], h: float) -> float:
         """For how long to search ahead: while the fastest node, seen from its body, goes `WAY` edges or more."""
         s, pairs = self._surface.simplices, len(self._points) + len(self._edges)
         way = min(LONGEST, WAY * max(1.0, len(s.nodes) / max(1, pairs))) * self._edge
-        fastest = math.sqrt(_fastest(v, s.nodes, s.owner, len(s.collide)))
+        fastest = math.sqrt(max(_fastest(v, s.nodes, s.owner, len(s.collide)), mean_square_speed(v, self.pairs)))
         return max(h, way / max(fastest, way / (200.0 * h)))
 
 
-def _room_for(k: int) -> Pairs:
-    return Pairs(
-        np.empty((k, 4), np.int32),
-        np.empty(k, np.int8),
-        np.full(k, -1, np.int32),
-        np.empty(k, np.int64),
-        np.empty(k, np.bool_),
-        np.zeros(k, np.bool_),
-        np.empty(k),
-        np.empty(k),
-        np.zeros((k, 3)),
-        np.zeros((k, 3)),
-    )
-
-
-def _hand_on(old: Pairs, new: Pairs) -> None:
-    """Give the impulses of loaded pairs to the same pairs of a new list."""
-    held = np.flatnonzero(old.impulses.any(axis=1))
-    if not len(held) or not len(new.keys):
+def _hand_on(old: Pairs, kept: NDArray[np.int64], new: Pairs) -> None:
+    """Give the impulses of loaded pairs that are not kept to the same pairs of a new list."""
+    held = np.setdiff1d(loaded_pairs(old.impulses), kept, assume_unique=True)
+    open_ = np.flatnonzero(new.near == UNKNOWN)
+    if not len(held) or not len(open_):
         return
     held = held[np.argsort(old.keys[held])]
-    place = np.minimum(np.searchsorted(old.keys[held], new.keys), len(held) - 1)
-    found = np.flatnonzero(old.keys[held[place]] == new.keys)
-    new.impulses[found], new.normals[found] = old.impulses[held[place[found]]], old.normals[held[place[found]]]
-
-
-@njit(cache=True)
-def _largest_deviation(x, begin, v, age, nodes):
-    """The square of how far a node is from where it was expected; inf where that is not finite."""
-    most = 0.0
-    for i in nodes:
-        a, b, c = (
-            x[i, 0] - begin[i, 0] - age * v[i, 0],
-            x[i, 1] - begin[i, 1] - age * v[i, 1],
-            x[i, 2] - begin[i, 2] - age * v[i, 2],
-        )
-        square = a * a + b * b + c * c
-        if not square <= most:
-            most = square if square < np.inf else np.inf
-    return most
-
-
-@njit(cache=True)
-def _deviating(x, begin, v, age, nodes, margin, left):
-    left[:] = False
-    for i in nodes:
-        a, b, c = (
-            x[i, 0] - begin[i, 0] - age * v[i, 0],
-            x[i, 1] - begin[i, 1] - age * v[i, 1],
-            x[i, 2] - begin[i, 2] - age * v[i, 2],
-        )
-        left[i] = not a * a + b * b + c * c <= margin * margin
+    place = np.minimum(np.searchsorted(old.keys[held], new.keys[open_]), len(held) - 1)
+    same = old.keys[held[place]] == new.keys[open_]
+    found, source = open_[same], held[place[same]]
+    new.impulses[found], new.normals[found] = old.impulses[source], old.normals[source]
 
 
 @njit(cache=True)

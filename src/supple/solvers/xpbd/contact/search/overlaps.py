@@ -85,13 +85,9 @@ def _nested(s: Simplices, closed: NDArray[np.bool_], x: NDArray[np.float64]) -> 
     np.minimum.at(boxes[0], s.owner[s.nodes], x[s.nodes, :3])
     np.minimum.at(boxes[1], s.owner[s.nodes], -x[s.nodes, :3])
     low, high = boxes[0], -boxes[1]
-    within = (
-        (low[:, None] >= low).all(axis=2)
-        & (high[:, None] <= high).all(axis=2)
-        & s.collide
-        & closed
-        & np.isfinite(low[:, :1])
-    )
+    within = s.collide & closed & np.isfinite(low[:, :1])
+    for a, b in zip(low.T, high.T, strict=True):
+        within &= (a[:, None] >= a) & (b[:, None] <= b)
     np.fill_diagonal(within, False)
     found = set()
     for a, b in np.argwhere(within).tolist():

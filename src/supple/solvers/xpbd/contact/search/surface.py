@@ -17,10 +17,14 @@ from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
 from supple.contact.mesh.obstacles import ObstacleRange, with_obstacles
 from supple.contact.search.patches import Parts, Patches
 from supple.model.system import System
+from supple.numerics.adjacency import only
+from supple.numerics.cross_rows import cross_rows
 from supple.scene.contact_pairs import pair_table
 from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 
+# The sine of the angle of an edge that counts as flat: its way out of the face is far below the kept distances.
+FLAT = 1e-6
 # Of the gap between surfaces: that from obstacles that are given by a formula. It is small, so that a body on a table
 # does not appear to float. Rows may leave a fifth of it.
 ON_SOLIDS = 0.1
@@ -55,7 +59,7 @@ class RowSurface:
 
     Attributes
     ----------
-    parts : the same arrays as a search takes them; patches : of them
+    parts : the same arrays as a search takes them; patches : of them, without edges and points in flat rigid faces
     closed : (p,) which things have a closed surface
     count : number of nodes; first : the first node of obstacles
     anchors : (o, 3) of the obstacles' nodes at time 0 [m]; of_anchor : (o,) their obstacle
@@ -136,7 +140,7 @@ def row_surface(
     return RowSurface(
         simplices,
         Parts(nodes, simplices.triangles, simplices.edges, simplices.collide, *mesh.excluded),
-        mesh.patches,
+        _without_flat(mesh, rest[nodes], system),
         closed,
         count,
         n + anchors,
@@ -147,6 +151,29 @@ def row_surface(
         points,
         (np.ascontiguousarray(control), np.ascontiguousarray(weights)),
     )
+
+
+def _without_flat(mesh: ContactMesh, x: NDArray[np.float64], system: System) -> Patches:
+    """The patches without the edges in flat faces of what does not deform, and without points that have no others.
+
+    Where such a face comes nearest to something, it does so at a point of that, or at its own outline.
+
+    x : (s, 3) places of the points at rest [m]
+    """
+    rigid = np.ones(len(mesh.names), dtype=np.bool_)
+    rigid[: mesh.body_count] = [part.rigid for part in system.bodies]
+    around = mesh.edge_triangles
+    two = np.flatnonzero(rigid[mesh.owner[mesh.edges[:, 0]]] & (np.diff(around.start) == 2))
+    a, b, c = x[mesh.triangles].transpose(1, 0, 2)
+    normals = cross_rows(b - a, c - a)
+    one, other = normals[around.items[around.start[two]]], normals[around.items[around.start[two] + 1]]
+    sines, cosines = np.linalg.norm(cross_rows(one, other), axis=1), np.einsum("ij,ij->i", one, other)
+    flat = np.zeros(len(mesh.edges), dtype=np.bool_)
+    flat[two] = sines < FLAT * cosines
+    kept = np.zeros(len(mesh.owner), dtype=np.bool_)
+    kept[mesh.edges[~flat]] = True
+    patches = mesh.patches
+    return patches._replace(edges=only(patches.edges, ~flat), points=only(patches.points, kept))
 
 
 def _gaps(system: System, gap: float) -> NDArray[np.float64]:

@@ -1,0 +1,100 @@
+"""The solution of the rows of a substep, and what velocities take over from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.cross_rows import cross_rows
+from supple.solvers.xpbd.contact.joined import solve_joined
+from supple.solvers.xpbd.contact.levers import hold_bodies
+from supple.solvers.xpbd.contact.nodes import Nodes
+from supple.solvers.xpbd.contact.rows import Rows
+from supple.solvers.xpbd.contact.solve import solve
+from supple.solvers.xpbd.rigid.bodies import RigidBodies
+from supple.solvers.xpbd.rigid.joint_rows import JointRows, solve_joints
+
+# Of the gap: what the last sweep over the rows may change; the most sweeps.
+RESIDUAL, MOST_SWEEPS = 0.02, 4
+# The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps. In a heap of 200
+# boxes neither 10 nor 60 sweeps are enough; impulses that are kept go on with them.
+RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 10
+# With joints, and for each joint where that is more: what pulls at a chain has to go along it.
+MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT = 60, 10
+
+
+class RowSolver:
+    """Solves the rows of contacts, and those of joints with them.
+
+    Attributes
+    ----------
+    left : what the last sweep over contacts changed, in gaps
+    """
+
+    def __init__(self, nodes: Nodes, rigid: RigidBodies, gravity: NDArray[np.float64], gap: float) -> None:
+        self._nodes, self._rigid, self._gap = nodes, rigid, gap
+        self._gravity = math.hypot(*gravity)
+        self.left = 0.0
+
+    def solve(self, rows: Rows, count: int, h: float, most: int | None = None) -> float:
+        """Solve the first `count` rows in a substep of h [s] with at most this many sweeps; returns `left`."""
+        if not count:
+            return 0.0
+        nodes, most = self._nodes, most or (MOST_RIGID_SWEEPS if len(self._rigid) else MOST_SWEEPS)
+        x = self._prepared(rows, count)
+        _, residual = solve(nodes.x, nodes.bodies, nodes.begin, rows, count, self._tolerance(h), most)
+        self._take_over(x, h)
+        self.left = residual / self._gap
+        return self.left
+
+    def solve_joined(
+        self, rows: Rows, count: int, joints: JointRows, h: float, enough: float
+    ) -> tuple[NDArray[np.float64], float]:
+        """Solve the rows of contacts and of joints; the joints' impulses (r,) [kg m], and by how much joints were off.
+
+        The latter as a share of their size; contacts are left alone if that is `enough`.
+        """
+        nodes, impulses = self._nodes, np.zeros(len(joints.total))
+        x = self._prepared(rows, count)
+        most, off = max(MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT * len(np.unique(joints.bodies))), 0.0
+        if count:
+            contacts = nodes.x, nodes.bodies, nodes.begin, rows, count
+            off, residual = solve_joined(*contacts, joints, impulses, enough, self._tolerance(h), most)
+            self.left = residual / self._gap
+        else:
+            solve_joints(joints, impulses, nodes.bodies.twists, most)
+        twists = np.zeros((len(self._rigid) + 1, 6))
+        np.add.at(twists, joints.bodies, impulses[:, None, None] * joints.answers)
+        of_joints = twists[:-1, None]
+        arms = nodes.bodies.arms[self._rigid.control]
+        self._take_over(x, h, (of_joints[..., :3] + cross_rows(of_joints[..., 3:], arms)) / h)
+        return impulses, off
+
+    def _prepared(self, rows: Rows, count: int) -> NDArray[np.float64]:
+        """Prepare the rows for a solution from the places as they are; a copy (n, 3) of these."""
+        nodes = self._nodes
+        if len(self._rigid):
+            hold_bodies(nodes.x, nodes.bodies, rows, count)
+        return nodes.x[: len(nodes.impulses), :3].copy()
+
+    def _tolerance(self, h: float) -> float:
+        """What the last sweep over the rows may change [m]."""
+        fall, tolerance = self._gravity * h**2, RESIDUAL * self._gap
+        return min(tolerance, RIGID_RESIDUAL * fall) if len(self._rigid) and fall > 0.0 else tolerance
+
+    def _take_over(self, x: NDArray[np.float64], h: float, of_joints: NDArray[np.float64] | None = None) -> None:
+        """Give velocities the changes of places since x (n, 3), and of bodies.
+
+        of_joints : (b, 4, 3) the part of the control points' changes that is not one of contacts [m/s]
+        """
+        nodes, n = self._nodes, len(x)
+        changes = (nodes.x[:n, :3] - x) / h
+        nodes.v[:n] += changes
+        nodes.impulses += changes
+        if len(self._rigid):
+            control = self._rigid.control
+            v = nodes.v[control]
+            nodes.move_bodies(h)
+            nodes.impulses[control] += nodes.v[control] - v - (0.0 if of_joints is None else of_joints)

@@ -1,0 +1,69 @@
+"""Where nodes are expected, if each of them goes straight on with the velocity that it had."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.runtime.kernel_cache import njit
+
+
+class Expected:
+    """Where nodes were and how fast, when a list was made; until when the list holds."""
+
+    def __init__(self, count: int) -> None:
+        self.x, self.v = np.full((count, 3), np.inf), np.zeros((count, 3))
+        self.age = self.until = 0.0
+
+    def begin(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
+        """Expect of all nodes that they go on from x (N, >= 3) with v (N, 3) for a time [s]."""
+        self.x, self.v = x[:, :3].copy(), v.copy()
+        self.age, self.until = 0.0, time
+
+    def correct(self, nodes: NDArray[np.bool_], x: NDArray[np.float64], v: NDArray[np.float64]) -> None:
+        """Expect of some nodes (N,) that they go on from x with v."""
+        self.v[nodes] = v[nodes]
+        self.x[nodes] = x[nodes, :3] - self.age * v[nodes]
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """(N, 3) where nodes are expected."""
+        return self.x + self.age * self.v
+
+    def deviation(self, x: NDArray[np.float64], nodes: NDArray[np.int32]) -> float:
+        """How far one of the nodes (s,) at x (N, >= 3) is from where it is expected, at most [m]; inf if not finite."""
+        return math.sqrt(_largest_deviation(x, self.x, self.v, self.age, nodes))
+
+    def off(self, x: NDArray[np.float64], nodes: NDArray[np.int32], most: float) -> NDArray[np.bool_]:
+        """(N,) which of the nodes (s,) at x (N, >= 3) are farther than `most` [m] from where they are expected."""
+        out = np.zeros(len(self.x), dtype=np.bool_)
+        _deviating(x, self.x, self.v, self.age, nodes, most, out)
+        return out
+
+
+@njit(cache=True)
+def _largest_deviation(x, begin, v, age, nodes):
+    most = 0.0
+    for i in nodes:
+        a, b, c = (
+            x[i, 0] - begin[i, 0] - age * v[i, 0],
+            x[i, 1] - begin[i, 1] - age * v[i, 1],
+            x[i, 2] - begin[i, 2] - age * v[i, 2],
+        )
+        square = a * a + b * b + c * c
+        if not square <= most:
+            most = square if square < np.inf else np.inf
+    return most
+
+
+@njit(cache=True)
+def _deviating(x, begin, v, age, nodes, margin, left):
+    for i in nodes:
+        a, b, c = (
+            x[i, 0] - begin[i, 0] - age * v[i, 0],
+            x[i, 1] - begin[i, 1] - age * v[i, 1],
+            x[i, 2] - begin[i, 2] - age * v[i, 2],
+        )
+        left[i] = not a * a + b * b + c * c <= margin * margin
