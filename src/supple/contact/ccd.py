@@ -32,6 +32,7 @@ from supple.runtime.kernel_cache import njit, prange
 
 # The share of its distance that a pair keeps; and where the search for the longest step ends.
 KEEP = 0.1
+_NEARLY_ALL = 0.99
 _CLOSE_ENOUGH = 1.05
 # Along the direction of the distance, no points of the two parts are nearer than the distance; the share allows for
 # round-off.
@@ -110,10 +111,17 @@ def _normal(u, v, n):
 
 
 @njit
-def point_triangle_time(x, way, v, corners, limit):
+def _kept(gap, floor):
+    """What remains of a gap."""
+    return max(KEEP * gap, min(_NEARLY_ALL * gap, floor))
+
+
+@njit
+def point_triangle_time(x, way, v, corners, limit, floor):
     """How long, up to `limit`, point v and the triangle of `corners` (3) may move along `way` (s, 3) from x (s, 3).
 
-    Until then they keep at least `KEEP` of their distance. Larger than `limit` where they may move longer than that.
+    Until then they keep at least `KEEP` of their distance, and `floor` [m] where it is larger. Larger than `limit`
+    where they may move longer than that.
     """
     o, shift = row(x, v), row(way, v)
     a, b, c = (subtract(row(x, corners[0]), o), subtract(row(x, corners[1]), o), subtract(row(x, corners[2]), o))
@@ -130,7 +138,7 @@ def point_triangle_time(x, way, v, corners, limit):
     for _ in range(_MOST_STEPS):
         n, gap = _direction(combine(closest_on_triangle(zero, a, b, c), a, b, c))
         if keep < 0.0:
-            keep = KEEP * gap + error
+            keep = _kept(gap, floor) + error
         elif gap <= _CLOSE_ENOUGH * keep:
             return time
         step, least = _point_triangle_bound(n, a, b, c, p, q, r, keep)
@@ -149,7 +157,7 @@ def point_triangle_time(x, way, v, corners, limit):
 
 
 @njit
-def edge_edge_time(x, way, one, other, limit):
+def edge_edge_time(x, way, one, other, limit, floor):
     """The same for edges with the ends `one` (2) and `other` (2); see `point_triangle_time`."""
     o, shift = row(x, one[0]), row(way, one[0])
     zero = (0.0, 0.0, 0.0)
@@ -168,7 +176,7 @@ def edge_edge_time(x, way, one, other, limit):
         w = subtract(d, c)
         n, gap = _direction((c[0] + t * w[0] - s * b[0], c[1] + t * w[1] - s * b[1], c[2] + t * w[2] - s * b[2]))
         if keep < 0.0:
-            keep = KEEP * gap + error
+            keep = _kept(gap, floor) + error
         elif gap <= _CLOSE_ENOUGH * keep:
             return time
         step, least = _edge_edge_bound(n, b, c, d, p, q, r, keep)
@@ -211,23 +219,31 @@ class Limit(NamedTuple):
 
 
 def largest_step(
-    mesh: ContactMesh, points: NDArray[np.float64], way: NDArray[np.float64], candidates: Candidates
+    mesh: ContactMesh,
+    points: NDArray[np.float64],
+    way: NDArray[np.float64],
+    candidates: Candidates,
+    floor: float = 0.0,
 ) -> Limit:
     """How far along `way` (s, 3) from `points` (s, 3), at most 1, every candidate keeps a tenth of its distance.
+
+    Distances above `floor` [m] stay above it, and those below stay nearly as they are.
 
     The points may be moved by step * way in rounded numbers. The pair is the first of those with the least step.
     """
     limit = Limit(1.0)
     if len(candidates.vertex_triangle):
-        step, k = _first_point(points, way, mesh.triangles, candidates.vertex_triangle)
+        step, k = _first_point(points, way, mesh.triangles, candidates.vertex_triangle, floor)
         limit = Limit(step, "vertex-triangle", _pair(candidates.vertex_triangle[k])) if k >= 0 else limit
     if len(candidates.edge_edge):
-        step, k = _first_edge(points, way, mesh.edges, candidates.edge_edge, limit.step)
+        step, k = _first_edge(points, way, mesh.edges, candidates.edge_edge, limit.step, floor)
         limit = Limit(step, "edge-edge", _pair(candidates.edge_edge[k])) if k >= 0 else limit
     return limit
 
 
-def largest_step_in_pieces(finder: CandidateFinder, points: NDArray[np.float64], way: NDArray[np.float64]) -> Limit:
+def largest_step_in_pieces(
+    finder: CandidateFinder, points: NDArray[np.float64], way: NDArray[np.float64], floor: float = 0.0
+) -> Limit:
     """As `largest_step`, with candidates from `finder`; a step of zero where the way is not finite."""
     mesh = finder.mesh
     longest = float(np.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)))
@@ -239,7 +255,7 @@ def largest_step_in_pieces(finder: CandidateFinder, points: NDArray[np.float64],
     for k in range(count):
         begin = points if k == 0 else points + (k * share) * way
         part = share * way
-        limit = largest_step(mesh, begin, part, finder.find(begin, begin + part))
+        limit = largest_step(mesh, begin, part, finder.find(begin, begin + part), floor)
         if limit.kind:
             return limit._replace(step=(k + limit.step) * share)
     # A complete way must give exactly 1: count * (1 / count) can be slightly less.
@@ -251,7 +267,7 @@ def _pair(row: NDArray[np.int32]) -> tuple[int, int]:
 
 
 @njit
-def _clear(x, way, a, b, c, d, ends):
+def is_clear(x, way, a, b, c, d, ends):
     """Whether the boxes of two parts stay so far apart along one axis that the pair certainly keeps its distance.
 
     The parts are the points a, and b, c, d for ends = 1; and a, b, and c, d for ends = 2.
@@ -277,15 +293,15 @@ def _clear(x, way, a, b, c, d, ends):
 
 
 @njit(cache=True, parallel=True)
-def _first_point(x, way, triangles, pairs):
+def _first_point(x, way, triangles, pairs, floor):
     """The least step of pairs (k, 2) of points and triangles, and the pair's row; 1 and -1 for a full step."""
     steps, rows = np.ones(_RUNS), np.full(_RUNS, -1, dtype=np.int64)
     for r in prange(_RUNS):
         least, at = 1.0, np.int64(-1)
         for k in range(r, len(pairs), _RUNS):
             v, t = pairs[k, 0], pairs[k, 1]
-            if not _clear(x, way, v, triangles[t, 0], triangles[t, 1], triangles[t, 2], 1):
-                step = point_triangle_time(x, way, v, triangles[t], least)
+            if not is_clear(x, way, v, triangles[t, 0], triangles[t, 1], triangles[t, 2], 1):
+                step = point_triangle_time(x, way, v, triangles[t], least, floor)
                 if step < least:
                     least, at = step, k
         steps[r], rows[r] = least, at
@@ -293,15 +309,15 @@ def _first_point(x, way, triangles, pairs):
 
 
 @njit(cache=True, parallel=True)
-def _first_edge(x, way, edges, pairs, limit):
+def _first_edge(x, way, edges, pairs, limit, floor):
     """The same for pairs of edges, of those with a step below `limit`."""
     steps, rows = np.full(_RUNS, limit), np.full(_RUNS, -1, dtype=np.int64)
     for r in prange(_RUNS):
         least, at = limit, np.int64(-1)
         for k in range(r, len(pairs), _RUNS):
             e, f = pairs[k, 0], pairs[k, 1]
-            if not _clear(x, way, edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1], 2):
-                step = edge_edge_time(x, way, edges[e], edges[f], least)
+            if not is_clear(x, way, edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1], 2):
+                step = edge_edge_time(x, way, edges[e], edges[f], least, floor)
                 if step < least:
                     least, at = step, k
         steps[r], rows[r] = least, at

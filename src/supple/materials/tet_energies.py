@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from supple.materials.isotropic import STABLE, hessian_block, is_kind, kernel_of_kinds, stable_piola
-from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
+from supple.numerics.mat3 import cross, dot, load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.svd3 import svd3 as decompose
 from supple.runtime.kernel_cache import njit, prange
 
@@ -103,7 +103,15 @@ def put_hessian(U, A, alpha, beta, V, B, volume, out, e):
     H22 = _symmetric(hessian_block(U, A, alpha, beta, g2, g2))
     H23 = hessian_block(U, A, alpha, beta, g2, g3)
     H33 = _symmetric(hessian_block(U, A, alpha, beta, g3, g3))
-    # Shape gradients sum to zero, so the blocks of every row do: a translation has exactly zero energy.
+    _put_blocks(out, e, H11, H12, H13, H22, H23, H33)
+
+
+@njit
+def _put_blocks(out, e, H11, H12, H13, H22, H23, H33):
+    """The 12x12 matrix of a tet into out[e] from the blocks of nodes 1, 2, 3.
+
+    Shape gradients sum to zero, so the blocks of every row do: a translation has exactly zero energy.
+    """
     H01 = _minus_sum(H11, transpose(H12), transpose(H13))
     H02 = _minus_sum(H12, H22, transpose(H23))
     H03 = _minus_sum(H13, H23, H33)
@@ -119,10 +127,52 @@ def put_hessian(U, A, alpha, beta, V, B, volume, out, e):
     _put_pair(out, e, 3, 3, H33)
 
 
+@njit
+def _minus_cross(a, scale, u, v, factor, diagonal):
+    """factor u v^T - scale [a]x, and `diagonal` on the diagonal; [a]x w = a x w."""
+    x, y, z = scale * a[0], scale * a[1], scale * a[2]
+    s, t, r = factor * u[0], factor * u[1], factor * u[2]
+    return (
+        diagonal + s * v[0],
+        s * v[1] + z,
+        s * v[2] - y,
+        t * v[0] - z,
+        diagonal + t * v[1],
+        t * v[2] + x,
+        r * v[0] + y,
+        r * v[1] - x,
+        diagonal + r * v[2],
+    )
+
+
+@njit
+def _put_stable_hessian(x, tets, B, volume, mu, lam, out, e):
+    """The Hessian of a Stable Neo-Hookean tet into out[e], from the derivatives of J = det(Ds) det(B) by its nodes."""
+    D = edge_matrix(x, tets, e)
+    a, b, d = (D[0], D[3], D[6]), (D[1], D[4], D[7]), (D[2], D[5], D[8])
+    g, h, k = B[0:3], B[3:6], B[6:9]
+    scale = dot(g, cross(h, k))
+    u, v, w = cross(b, d), cross(d, a), cross(a, b)
+    J = scale * dot(a, u)
+    c = volume * scale * (lam * (J - 1.0) - mu)
+    m, s = volume * mu, volume * lam * scale * scale
+    zero = (0.0, 0.0, 0.0)
+    _put_blocks(
+        out,
+        e,
+        _minus_cross(zero, 0.0, u, u, s, m * dot(g, g)),
+        _minus_cross(d, c, u, v, s, m * dot(g, h)),
+        _minus_cross(b, -c, u, w, s, m * dot(g, k)),
+        _minus_cross(zero, 0.0, v, v, s, m * dot(h, h)),
+        _minus_cross(a, c, v, w, s, m * dot(h, k)),
+        _minus_cross(zero, 0.0, w, w, s, m * dot(k, k)),
+    )
+
+
 @kernel_of_kinds(parallel=True)
 def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
     """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets from at most one
-    decomposition of each F, which takes most of the time.
+    decomposition of each F, which takes most of the time; without `project`, that of Stable Neo-Hookean needs none.
 
     Parameters
     ----------
@@ -135,9 +185,11 @@ def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, ene
             continue
         F = deformation_gradient(x, tets, Dm_inv, e)
         B = load_mat(Dm_inv, e)
-        if KIND == STABLE and not second:
+        if KIND == STABLE and not (second and project):
             energies[e] = volumes[e] * density(F, (0.0, 0.0, 0.0), mu[e], lam[e])
             put_gradient(stable_piola(F, mu[e], lam[e]), B, volumes[e], gradients, e)
+            if second:
+                _put_stable_hessian(x, tets, B, volumes[e], mu[e], lam[e], hessians, e)
             continue
         U, s, V = decompose(F)
         energies[e] = volumes[e] * density(F, s, mu[e], lam[e])

@@ -22,6 +22,7 @@ class Status(StrEnum):
     Attributes
     ----------
     CONVERGED : the step is what the solver promises
+    LINEARIZED : `Implicit(max_iterations=1)` to 3 did what it was asked to; forces remain that the message names
     ITERATION_LIMIT, LINE_SEARCH_FAILED, BLOCKED : how Newton's method ended (`Implicit`)
     NOT_FINITE : a position or velocity is lost
     INVERTED : a tet is inside out that was not at the start (`XPBD`, as the following)
@@ -42,6 +43,7 @@ class Status(StrEnum):
     SOFTENED = "softened"
     # Recordings store the number of a status in this list: a new one comes last.
     HELD_BACK = "held_back"
+    LINEARIZED = "linearized"
 
     @property
     def can_go_on(self) -> bool:

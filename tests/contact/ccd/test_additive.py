@@ -17,9 +17,9 @@ def all_times(kind, x, way, out):
     one, other, corners = np.array([0, 1]), np.array([2, 3]), np.array([1, 2, 3])
     for k in range(len(x)):
         if kind == POINT_TRIANGLE:
-            out[k] = point_triangle_time(x[k], way[k], 0, corners, 1.0)
+            out[k] = point_triangle_time(x[k], way[k], 0, corners, 1.0, 0.0)
         else:
-            out[k] = edge_edge_time(x[k], way[k], one, other, 1.0)
+            out[k] = edge_edge_time(x[k], way[k], one, other, 1.0, 0.0)
 
 
 def times(kind, x, way):

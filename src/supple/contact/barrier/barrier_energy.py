@@ -7,6 +7,9 @@ grows without bound as the distance goes to zero:
 
     e(d) = dhat b(d^2 / dhat^2),  b(s) = -(s - 1)^2 ln s  for s < 1, else 0
 
+Below `soft` [m], where that is above zero, e goes on as its quadratic expansion there, so that one linearization leads
+out of any distance. Then the filter of steps alone keeps surfaces apart.
+
 Source: Li et al., "Incremental Potential Contact" (2020), equation 6; Li et al., "Convergent Incremental Potential
 Contact" (2023), for the unit.
 """
@@ -28,10 +31,7 @@ from supple.runtime.threads import threads_for
 
 
 @njit
-def barrier_value(d, dhat):
-    """e(d) [m] for d > 0."""
-    if d >= dhat:
-        return 0.0
+def _value(d, dhat):
     r = d / dhat
     # s - 1 = (r - 1)(r + 1) has no cancellation near dhat.
     below = (r - 1.0) * (r + 1.0)
@@ -39,10 +39,7 @@ def barrier_value(d, dhat):
 
 
 @njit
-def barrier_slopes(d, dhat):
-    """First and second derivative of e by d [1, 1/m] for d > 0: not above and not below zero."""
-    if d >= dhat:
-        return 0.0, 0.0
+def _slopes(d, dhat):
     r = d / dhat
     s = r * r
     below = (r - 1.0) * (r + 1.0)
@@ -52,52 +49,74 @@ def barrier_slopes(d, dhat):
     return 2.0 * r * first, (4.0 * s * second + 2.0 * first) / dhat
 
 
+@njit
+def barrier_value(d, dhat, soft=0.0):
+    """e(d) [m] for d > 0."""
+    if d >= dhat:
+        return 0.0
+    if d >= soft:
+        return _value(d, dhat)
+    first, second = _slopes(soft, dhat)
+    return _value(soft, dhat) + (d - soft) * (first + 0.5 * (d - soft) * second)
+
+
+@njit
+def barrier_slopes(d, dhat, soft=0.0):
+    """First and second derivative of e by d [1, 1/m] for d > 0: not above and not below zero."""
+    if d >= dhat:
+        return 0.0, 0.0
+    if d >= soft:
+        return _slopes(d, dhat)
+    first, second = _slopes(soft, dhat)
+    return first + (d - soft) * second, second
+
+
 # Contacts from which a second thread pays.
 _PARALLEL_FROM = 300
 
 
 @njit(cache=True)
-def barrier_energy(contacts, dhat, stiffness):
+def barrier_energy(contacts, dhat, stiffness, soft=0.0):
     """E [J], infinite where a point is on a plane or behind it; stiffness : kappa [Pa]."""
     _, _, _, _, distances, weights = contacts
     total = 0.0
     for k in range(len(distances)):
         if distances[k] <= 0.0:
             return np.inf
-        total += weights[k] * barrier_value(distances[k], dhat)
+        total += weights[k] * barrier_value(distances[k], dhat, soft)
     return stiffness * total
 
 
 @njit(cache=True)
-def barrier_forces(contacts, dhat, stiffness):
+def barrier_forces(contacts, dhat, stiffness, soft=0.0):
     """(k,) normal forces -dE/dd [N], zero or more."""
     _, _, _, _, distances, weights = contacts
     out = np.empty(len(distances))
     for k in range(len(distances)):
-        out[k] = -stiffness * weights[k] * barrier_slopes(distances[k], dhat)[0]
+        out[k] = -stiffness * weights[k] * barrier_slopes(distances[k], dhat, soft)[0]
     return out
 
 
 @njit(cache=True)
-def add_barrier_gradient(contacts, dhat, stiffness, out):
+def add_barrier_gradient(contacts, dhat, stiffness, out, soft=0.0):
     """Add the gradient by the points [N] to `out` (s, 3)."""
     kinds, points, coefficients, vectors, distances, weights = contacts
     for k in range(len(distances)):
-        size = stiffness * weights[k] * barrier_slopes(distances[k], dhat)[0] / distances[k]
+        size = stiffness * weights[k] * barrier_slopes(distances[k], dhat, soft)[0] / distances[k]
         for i in range(point_count(kinds[k])):
             for j in range(3):
                 out[points[k, i], j] += size * coefficients[k, i] * vectors[k, j]
 
 
 def barrier_hessian(
-    x: NDArray[np.float64], contacts: Contacts, dhat: float, stiffness: float, project: bool
+    x: NDArray[np.float64], contacts: Contacts, dhat: float, stiffness: float, project: bool, soft: float = 0.0
 ) -> Couplings:
     """The Hessian by the points x (s, 3) [N/m]; with `project`, larger and positive semi-definite."""
     start = block_starts(contacts.kinds)
     rows, columns = block_points(contacts.kinds, contacts.points, start)
     blocks = np.empty((start[-1], 3, 3))
     with threads_for(len(contacts.kinds), _PARALLEL_FROM):
-        _write_hessians(x, contacts, start, dhat, stiffness, project, blocks)
+        _write_hessians(x, contacts, start, dhat, stiffness, soft, project, blocks)
     return Couplings(rows, columns, blocks)
 
 
@@ -127,7 +146,7 @@ def block_points(kinds, points, start):
 
 
 @njit(cache=True, parallel=True)
-def _write_hessians(x, contacts, start, dhat, stiffness, project, out):
+def _write_hessians(x, contacts, start, dhat, stiffness, soft, project, out):
     kinds, _, _, _, _, weights = contacts
     for k in prange(len(kinds)):
         follows = k > 0 and kinds[k - 1] == EDGE_EDGE and weights[k] < 0.0
@@ -135,26 +154,26 @@ def _write_hessians(x, contacts, start, dhat, stiffness, project, out):
         if project and follows:
             out[start[k] : start[k + 1]] = 0.0  # part of the matrix of the one before
         elif project and followed:
-            _write_joint_hessian(x, contacts, k, dhat, stiffness, out[start[k] : start[k + 1]])
+            _write_joint_hessian(x, contacts, k, dhat, stiffness, soft, out[start[k] : start[k + 1]])
         else:
-            _write_hessian(x, contacts, k, dhat, stiffness, project, out, start[k])
+            _write_hessian(x, contacts, k, dhat, stiffness, soft, project, out, start[k])
 
 
 @njit
-def _write_hessian(x, contacts, k, dhat, stiffness, project, out, first):
+def _write_hessian(x, contacts, k, dhat, stiffness, soft, project, out, first):
     """The blocks (i, j), i <= j, of contact k."""
     kinds, points, coefficients, vectors, distances, weights = contacts
     c = (coefficients[k, 0], coefficients[k, 1], coefficients[k, 2], coefficients[k, 3])
     # Points that the kind does not have are ignored; any row may stand for them.
     stencil = (row(x, points[k, 0]), row(x, points[k, 1]), row(x, points[k, 2]), row(x, points[k, 3]))
-    slope, curvature = barrier_slopes(distances[k], dhat)
+    slope, curvature = barrier_slopes(distances[k], dhat, soft)
     size = stiffness * weights[k]
     slopes = (size * slope, size * curvature)
     write_pair_hessian(kinds[k], c, row(vectors, k), distances[k], stencil, slopes, project, out, first)
 
 
 @njit
-def _write_joint_hessian(x, contacts, k, dhat, stiffness, out):
+def _write_joint_hessian(x, contacts, k, dhat, stiffness, soft, out):
     """The positive part of the sum of two edges and of their nearest end, contact k + 1, whose energy is taken away.
 
     Most of both cancels where the closest points are near that end. The positive parts of each would remain, and be
@@ -164,7 +183,7 @@ def _write_joint_hessian(x, contacts, k, dhat, stiffness, out):
     blocks = np.empty((10, 3, 3))
     dense = np.zeros((12, 12))
     for m in range(k, k + 2):
-        _write_hessian(x, contacts, m, dhat, stiffness, False, blocks, 0)
+        _write_hessian(x, contacts, m, dhat, stiffness, soft, False, blocks, 0)
         b = 0
         for i in range(point_count(kinds[m])):
             p = _place(points, k, points[m, i])

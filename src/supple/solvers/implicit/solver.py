@@ -69,9 +69,9 @@ class Implicit(Solver):
         there is contact no longer than a tenth of `dhat`, with friction than a hundredth of `friction_velocity`.
     force_tolerance : where surfaces touch, Newton also goes on until the remaining forces are below this share of
         contact's [-].
-    max_iterations : of Newton in one (sub)step. 1: one linearization, for real time; the step is not divided where it
-        does not converge. Tets still do not invert and surfaces do not cross, but bodies that meet fast can hang at
-        each other for some steps. The status is `iteration_limit` where forces remain, which the message names.
+    max_iterations : of Newton in one (sub)step. 1 to 3: that many linearizations, for real time, and up to 3 where
+        contact or an inversion cuts the step, which is not divided. Tets do not invert and surfaces do not cross. Where
+        forces remain, the status is `linearized`; `details.unbalanced_force` and the message name them.
     linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
     max_substeps : largest number of substeps: a step that fails is halved. Steps in which scripts turn far are first
         divided into straight pieces (1024 at most), each of which may take this number. 1: never divided.
@@ -240,10 +240,11 @@ class Implicit(Solver):
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
             if taken.outcome.status is not Status.CONVERGED:
                 logger.debug("step of %g s: %s", substepping.length, taken.outcome.status)
-                linearized = self.max_iterations == 1 and taken.outcome.status is Status.ITERATION_LIMIT
+                linearized = taken.outcome.status is Status.LINEARIZED
                 if not linearized and substepping.halve():
                     continue
-                worst, message = taken.outcome.status, _limit_message(taken.outcome.message, substepping)
+                message = taken.outcome.message if linearized else _limit_message(taken.outcome.message, substepping)
+                worst = taken.outcome.status
                 if not worst.can_go_on:
                     break
             now, last = taken.state, taken
@@ -261,6 +262,8 @@ class Implicit(Solver):
         nearest, contacts = None, None
         if last is not None:
             gradient = last.outcome.end.gradient / last.contact.weight
+            left = float(np.linalg.norm(workspace.tools.freed(gradient)))
+            details = replace(details, unbalanced_force=left)
             details = replace(details, weld_forces=weld_forces(system, gradient))
             if workspace.tools.linear_solver.reduction is not None:
                 workspace.tools.linear_solver.reduction.reduce(gradient)

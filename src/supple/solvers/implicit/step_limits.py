@@ -12,6 +12,9 @@ from supple.solvers.implicit.contact.model import ContactModel
 from supple.solvers.implicit.inversion_guard import InversionGuard
 from supple.solvers.implicit.timings import Clock
 
+# Pieces that collide in one step; where there are more, all have one length.
+_MOST_ROUNDS = 12
+
 
 class StepLimit(NamedTuple):
     """The largest step that is allowed, and what allows no more.
@@ -19,6 +22,7 @@ class StepLimit(NamedTuple):
     Attributes
     ----------
     step : in [0, 1]; tet : the one that would lose too much of its volume, or -1
+    points : two that are on the surfaces which would touch
     reason : "inversion of tet 5 of body 'a'", "contact of body 'a' and itself", or "length of the search for contacts",
         which ends before a very long direction does; "" for a whole step
     """
@@ -26,6 +30,7 @@ class StepLimit(NamedTuple):
     step: float
     tet: int = -1
     reason: str = ""
+    points: tuple[int, ...] = ()
 
 
 @dataclass(eq=False)
@@ -44,10 +49,40 @@ class StepLimits:
         if self.contact is None or step == 0.0:
             return inversion
         with self.clock.of("contact"):
-            free, names = self.contact.largest_step(x, step * direction)
+            free, points = self.contact.largest_step(x, step * direction)
         if free == 1.0:
             return inversion
-        return StepLimit(step * free, -1, f"contact of {names}" if names else "length of the search for contacts")
+        reason = f"contact of {self.contact.names(points)}" if points else "length of the search for contacts"
+        return StepLimit(step * free, -1, reason, tuple(points))
+
+    def shortened(
+        self, x: NDArray[np.float64], direction: NDArray[np.float64], share: NDArray[np.float64] | float = 1.0
+    ) -> tuple[NDArray[np.float64], StepLimit]:
+        """A direction (n, 3) along which a whole step is allowed; and its least share, with what was first to limit it.
+
+        Bodies that are joined or touch are shortened together, and others on their own: what collides does not stop
+        what flies. They go this share (n, 1) of the way that is free.
+        """
+        taken = np.ones((len(x), 1))
+        first = limit = self.largest_step(x, direction)
+        if limit.step == 1.0:
+            return direction, first
+        pieces = self.guard.system.joined_components
+        if self.contact is not None:
+            pieces = self.contact.clusters(x, pieces)
+        for _ in range(_MOST_ROUNDS):
+            if limit.step == 1.0:
+                break
+            if limit.tet >= 0:
+                meeting = pieces[self.guard.system.tets[limit.tet, :1]]
+            elif limit.points and self.contact is not None:
+                meeting = pieces[self.contact.vertices(limit.points)]
+            else:
+                break
+            taken = np.where(np.isin(pieces, meeting)[:, None], limit.step * share * taken, taken)
+            limit = self.largest_step(x, taken * direction)
+        taken = limit.step * taken
+        return taken * direction, first._replace(step=float(taken.min(initial=1.0)))
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every guarded tet has a positive volume and every vertex is in front of every plane, in rounded

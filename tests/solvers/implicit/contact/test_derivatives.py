@@ -142,7 +142,7 @@ def test_friction_has_slope_two(kind, size, speed):
     across = np.linalg.svd((lagged[:4].mean(axis=0) - lagged[4:8].mean(axis=0))[None])[2][1]
     start[:4] -= speed * SLOW * size * H * across
     start += 1e-2 * SLOW * size * H * rng.normal(size=start.shape)
-    (friction,) = model.frictions(1e4, lagged, start, H)
+    (friction,) = model.frictions(Barrier(model.collisions, 1e4), lagged, start, H)
     check_majorizer(friction, lagged, lagged - start, 2.0 * SLOW * size * H)
     d = unit(rng.normal(size=lagged.shape))
     friction.renew(lagged, np.zeros_like(lagged))
@@ -192,7 +192,7 @@ def test_friction_with_planes_has_slope_two(size, speed):
     across = np.cross(normal, rng.normal(size=3))
     start = lagged - speed * SLOW * size * H * across / np.linalg.norm(across)
     start[4:] = lagged[4:]
-    (friction,) = model.frictions(1e4, lagged, start, H)
+    (friction,) = model.frictions(Barrier(model.collisions, 1e4), lagged, start, H)
     d = rng.normal(size=lagged.shape)
     check_majorizer(friction, lagged, lagged - start, 2.0 * SLOW * size * H)
     friction.renew(lagged, np.zeros_like(lagged))
@@ -225,7 +225,7 @@ def test_planes_have_the_friction_that_triangles_have():
     for share in (0.0, 0.2, 0.99, 1.01, 5.0):
         start = lagged - share * reach * across
         start[4:] = lagged[4:]
-        (friction,) = model.frictions(1e4, lagged, start, H)
+        (friction,) = model.frictions(Barrier(model.collisions, 1e4), lagged, start, H)
         pressing = friction.slips.forces.sum()
         expected = pressing * ipctk.smooth_friction_f0(share * reach, reach)
         assert friction.value(lagged) == pytest.approx(expected, rel=1e-9)

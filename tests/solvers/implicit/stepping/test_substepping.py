@@ -97,7 +97,7 @@ def test_a_bar_twisted_into_itself_converges_with_the_defaults(dt: float):
 
 
 def test_the_message_names_the_limit_that_is_reached():
-    solver = sp.Implicit(max_iterations=2, max_substeps=2)
+    solver = sp.Implicit(max_iterations=4, max_substeps=2)
     frame = next(iter(sp.simulate(turning_bar(0.3), solver, 1.0, 1)))
     assert frame.report.status == "iteration_limit"
     assert "max_substeps" in frame.report.message

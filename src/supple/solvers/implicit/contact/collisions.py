@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.barrier.barrier_energy import add_barrier_gradient, barrier_energy, barrier_hessian
+from supple.contact.barrier.collision_rows import CollisionRows, write_collisions
 from supple.contact.candidates import CandidateFinder
 from supple.contact.ccd import Limit, largest_step_in_pieces
 from supple.contact.features.contact_set import ContactSet, Found
@@ -29,6 +30,7 @@ class Collisions:
 
     Attributes
     ----------
+    floor : distance [m] below which steps keep nearly all of it; 0 but in linearizations
     half_spaces : has the points that contacts name, and their owners
     """
 
@@ -36,6 +38,7 @@ class Collisions:
         self.mesh = mesh
         self.half_spaces = HalfSpaces(mesh, obstacles)
         self.dhat = dhat
+        self.floor = 0.0
         self._finder = CandidateFinder(mesh, REACH * dhat)
         self._set = ContactSet(mesh, dhat)
         self._x: NDArray[np.float64] | None = None
@@ -85,10 +88,37 @@ class Collisions:
         step, row = self.half_spaces.largest_step(points, way)
         pair = [] if row < 0 else self.half_spaces.tets[row, [3, 0]].tolist()
         if step > 0.0:
-            limit = largest_step_in_pieces(self._finder, points[:s], step * way[:s])
+            limit = largest_step_in_pieces(self._finder, points[:s], step * way[:s], self.floor)
             step *= limit.step
             pair = self._points_of(limit) if limit.kind else pair
         return step, pair
+
+    def along(self, way: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The ways (s + 3 h, 3) of all points, from those of the vertices (n, 3)."""
+        return self.half_spaces.points.positions(way)
+
+    def ahead(self, x: NDArray[np.float64], way: NDArray[np.float64], least: float) -> CollisionRows:
+        """Rows of the pairs that collide while points go from x (n, 3) along `way` (s + 3 h, 3).
+
+        least : gap [m] that a point keeps from a half-space, or it collides
+        """
+        points, s, mesh = self.points(x), len(self.mesh.points), self.mesh
+        longest = float(np.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)))
+        planes, _ = self.half_spaces.contacts(points, least + longest)
+        on_planes = CollisionRows(
+            planes.kinds,
+            planes.points,
+            planes.coefficients,
+            planes.vectors / planes.distances[:, None],
+            planes.distances,
+            planes.distances,
+        ).along(way)
+        found = self._finder.find(points[:s], points[:s] + way[:s])
+        pairs = mesh.triangles, mesh.edges, found.vertex_triangle, found.edge_edge
+        rows = CollisionRows.room(64)
+        while (count := write_collisions(points[:s], way[:s], *pairs, self.floor, rows)) > len(rows.kinds):
+            rows = CollisionRows.room(count)
+        return rows.where(slice(count)).joined(on_planes.where(on_planes.ends < least))
 
     def _points_of(self, limit: Limit) -> list[int]:
         mesh, (i, j) = self.mesh, limit.pair
@@ -110,26 +140,30 @@ class Collisions:
 
 @dataclass(frozen=True, eq=False)
 class Barrier(ContactPotential):
-    """Of the contacts that `collisions` finds; stiffness : kappa [Pa]."""
+    """Of the contacts that `collisions` finds.
+
+    stiffness : kappa [Pa]; soft : distance below which it is quadratic [m]
+    """
 
     collisions: Collisions
     stiffness: float
+    soft: float = 0.0
 
     def value(self, x: NDArray[np.float64]) -> float:
         contacts = self.collisions.at(x)
-        return barrier_energy(contacts, self.collisions.dhat, self.stiffness) if len(contacts.kinds) else 0.0
+        return barrier_energy(contacts, self.collisions.dhat, self.stiffness, self.soft) if len(contacts.kinds) else 0.0
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         contacts = self.collisions.at(x)
         if len(contacts.kinds):
             forces = np.zeros_like(self.collisions.points(x))
-            add_barrier_gradient(contacts, self.collisions.dhat, self.stiffness, forces)
+            add_barrier_gradient(contacts, self.collisions.dhat, self.stiffness, forces, self.soft)
             self.collisions.half_spaces.points.add_forces(forces, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         contacts, points = self.collisions.at(x), self.collisions.points(x)
         if len(contacts.kinds):
-            between = barrier_hessian(points, contacts, self.collisions.dhat, self.stiffness, project)
+            between = barrier_hessian(points, contacts, self.collisions.dhat, self.stiffness, project, self.soft)
             out.couplings.append(vertex_couplings(self.collisions.half_spaces.points, between))
 
     def add_model(

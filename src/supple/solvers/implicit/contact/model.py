@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from supple.contact.barrier.barrier_energy import barrier_forces
 from supple.contact.barrier.friction_energy import lagged_slips, sides
@@ -17,7 +20,7 @@ from supple.errors import SolverError
 from supple.model.stitched_points import stitched_state
 from supple.model.system import System, initial_state
 from supple.scene.contact_pairs import PairTable, pair_table
-from supple.solvers.implicit.contact.collisions import Collisions
+from supple.solvers.implicit.contact.collisions import Barrier, Collisions
 from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.contact.settings import IPCContact, Scales, largest_dhat, scales_of
 
@@ -48,28 +51,40 @@ class ContactModel:
 
     def frictions(
         self,
-        stiffness: float,
+        barrier: Barrier,
         lagged: NDArray[np.float64],
         start: NDArray[np.float64],
         duration: float,
     ) -> list[Friction]:
         """Friction with the normal forces at `lagged` (n, 3) of a barrier, of a step from `start`; empty without any.
 
-        Parameters
-        ----------
-        stiffness : of the barrier [Pa]; duration : of the step [s]
+        duration : of the step [s]
         """
         if not self.coefficients.any():
             return []
         points, contacts = self.collisions.half_spaces, self.collisions.at(lagged)
-        forces = barrier_forces(contacts, self.scales.dhat, stiffness)
+        forces = barrier_forces(contacts, self.scales.dhat, barrier.stiffness, barrier.soft)
         slips = lagged_slips(contacts, forces, points.points.positions(start), points.owner, self.coefficients)
         return [Friction(points.points, slips, self.scales.friction_velocity * duration)] if len(slips.forces) else []
 
-    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, str]:
-        """How far along `direction` (n, 3), at most 1, nothing touches, and the names of what would touch."""
-        step, pair = self.collisions.largest_step(x, direction)
-        return step, self._names(pair) if pair else ""
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:
+        """How far along `direction` (n, 3), at most 1, nothing touches, and two points of what would touch."""
+        return self.collisions.largest_step(x, direction)
+
+    def vertices(self, points: Sequence[int] | NDArray[np.int32]) -> NDArray[np.int32]:
+        """The vertices that points are combinations of."""
+        return self.collisions.half_spaces.points.taken(np.asarray(points)).vertices
+
+    def clusters(self, x: NDArray[np.float64], pieces: NDArray[np.int32]) -> NDArray[np.int32]:
+        """(n,) the same number for vertices of the `pieces` (n,) that touch each other at x (n, 3)."""
+        points, contacts = self.collisions.half_spaces, self.collisions.at(x)
+        one, other = sides(contacts.kinds, contacts.points)
+        between = np.maximum(points.owner[one], points.owner[other]) < self.mesh.body_count
+        piece = pieces[points.points.vertices[points.points.start[:-1]]]
+        count = int(pieces.max(initial=0)) + 1
+        ends = piece[one[between]], piece[other[between]]
+        touching = coo_array((np.ones(len(ends[0])), ends), shape=(count, count))
+        return connected_components(touching, directed=False)[1][pieces]
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every vertex is in front of every plane."""
@@ -107,9 +122,9 @@ class ContactModel:
             return "two surfaces"
         contacts = min(pairs, key=lambda c: c.distances.min())
         k = int(contacts.distances.argmin())
-        return self._names([int(side[k]) for side in sides(contacts.kinds, contacts.points)])
+        return self.names([int(side[k]) for side in sides(contacts.kinds, contacts.points)])
 
-    def _names(self, points: list[int]) -> str:
+    def names(self, points: Sequence[int]) -> str:
         """Of the owners of two points."""
         mesh, owners = self.mesh, sorted({int(self.collisions.half_spaces.owner[p]) for p in points})
         kinds = [f"{'body' if k < mesh.body_count else 'obstacle'} {mesh.names[k]!r}" for k in owners]

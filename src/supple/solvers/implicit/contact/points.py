@@ -39,7 +39,7 @@ def contact_points(
     place = collisions.half_spaces.points.positions(x)
     kinds, points, coefficients, vectors, distances, _ = contacts
     normals = vectors / distances[:, None]
-    forces = barrier_forces(contacts, collisions.dhat, barrier.stiffness)[:, None] * normals
+    forces = barrier_forces(contacts, collisions.dhat, barrier.stiffness, barrier.soft)[:, None] * normals
     friction = np.zeros_like(forces)
     for term in frictions:
         slips, pulls = term.slips, slip_forces(term.points.positions(x), term.slips, term.reach)

@@ -18,6 +18,7 @@ from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
 from supple.solvers.implicit.newton.linear_solver import LinearReport, LinearSolver
 from supple.solvers.implicit.newton.objective import Model, Objective
+from supple.solvers.implicit.newton.trace import NewtonRow
 from supple.solvers.implicit.timings import Clock
 
 # The relative tolerance of linear systems: 1e-2 at first, since a better solution of a poor model does not help; below
@@ -69,6 +70,32 @@ class Direction:
     tolerance: float
     projected: ProjectedTerms
     touching: bool
+
+
+def newton_row(
+    iteration: int, energy: float, found: Direction, taken: tuple[float, float, int], reason: str
+) -> NewtonRow:
+    """The record of a step along a direction.
+
+    Parameters
+    ----------
+    energy : at its end [J]; taken : what filters allowed, the length, and how often it was halved; reason : of filters
+    """
+    largest, step, cuts = taken
+    return NewtonRow(
+        iteration=iteration,
+        energy=energy,
+        force=found.force,
+        direction=found.length,
+        linear_solver=found.linear.method,
+        linear_iterations=found.linear.iterations,
+        linear_tolerance=found.tolerance,
+        filter=largest,
+        step=step,
+        cuts=cuts,
+        limit="; ".join(([reason] if reason else []) + (["energy"] if cuts else [])),
+        projected=found.projected is ProjectedTerms.ALL,
+    )
 
 
 @dataclass(eq=False)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from supple.model.state import Status
 from supple.runtime.interruption import interruption_point
-from supple.solvers.implicit.newton.direction import DirectionFinder, Tools
+from supple.solvers.implicit.newton.direction import DirectionFinder, Tools, newton_row
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
 from supple.solvers.implicit.newton.line_search import Jumps, extended, search
 from supple.solvers.implicit.newton.objective import Model, Objective
@@ -130,7 +130,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         last = convergence.is_short(found.length)
         rate = found.length / last_length if last_length > 0.0 else 0.0
         vector = found.vector
-        largest, _, reason = limits.largest_step(here.positions, vector)
+        largest, _, reason, _ = limits.largest_step(here.positions, vector)
         end, step, cuts = search(objective, here, vector, found.slope, largest, limits, jumps)
         # True Hessians do not need longer steps, and bodies with inverted tets recover in small ones.
         projected = found.projected is not ProjectedTerms.NONE and limits.guard.complete
@@ -143,26 +143,13 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         if step > 0.0:
             # A last step most often needs no Hessian at its end.
             here = objective.model(end, None if last else hessian, policy.now)
-        row = NewtonRow(
-            iteration=iteration,
-            energy=here.energy,
-            force=found.force,
-            direction=found.length,
-            linear_solver=found.linear.method,
-            linear_iterations=found.linear.iterations,
-            linear_tolerance=found.tolerance,
-            filter=largest,
-            step=step,
-            cuts=cuts,
-            limit="; ".join(([reason] if reason else []) + (["energy"] if cuts else [])),
-            projected=found.projected is ProjectedTerms.ALL,
-        )
+        row = newton_row(iteration, here.energy, found, (largest, step, cuts), reason)
         rows.append(row)
         settled = settled + 1 if step > 0.0 and abs(before - here.energy) <= _NOTHING * here.size else 0
         logger.debug("%s", row)
         limits.widen(here.positions)
         if last:
-            if step == 0.0 or _is_converged(problem, found.length, here, tools, found.touching):
+            if step == 0.0 or is_converged(problem, found.length, here, tools, found.touching):
                 return Outcome(Status.CONVERGED, here, "", rows)
             here = objective.model(here.positions, hessian, policy.now)
         elif found.touching and (
@@ -177,9 +164,9 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             return Outcome(Status.LINE_SEARCH_FAILED, here, text, rows)
         last_length = found.length
     text = (
-        f"Newton's method took {problem.max_iterations} iteration{'s' * (problem.max_iterations > 1)}; "
+        f"Newton's method took {problem.max_iterations} iterations; "
         f"its last step was {rows[-1].direction:.2e} m, the tolerance is {convergence.step:.2e} m; "
-        f"forces of {_free_norm(here.gradient, tools) / (problem.scale or 1.0):.2e} N remain"
+        f"forces of {free_norm(here.gradient, tools):.2e} N remain"
     )
     return Outcome(Status.ITERATION_LIMIT, here, text, rows)
 
@@ -188,22 +175,24 @@ def _is_outdated(problem: Problem, here: Model, tools: Tools) -> bool:
     """Whether the objective is due for a change before its minimum is reached: what is left would be lost work."""
     if problem.outdated is None:
         return False
-    contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
-    return _free_norm(here.gradient, tools) <= _NEARLY * contact and problem.outdated(here.positions)
+    contact = free_norm(problem.objective.contact_gradient(here.positions), tools)
+    return free_norm(here.gradient, tools) <= _NEARLY * contact and problem.outdated(here.positions)
 
 
 def _is_balanced(problem: Problem, here: Model, tools: Tools) -> bool:
-    contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
-    return _free_norm(here.gradient, tools) <= problem.convergence.force * contact
+    contact = free_norm(problem.objective.contact_gradient(here.positions), tools)
+    return free_norm(here.gradient, tools) <= problem.convergence.force * contact
 
 
-def _is_converged(problem: Problem, length: float, here: Model, tools: Tools, touching: bool) -> bool:
+def is_converged(problem: Problem, length: float, here: Model, tools: Tools, touching: bool) -> bool:
+    """Whether `here` is the minimum, after a whole step along a direction of this length; see `Convergence`."""
     contact = None
     if touching:
-        contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
+        contact = free_norm(problem.objective.contact_gradient(here.positions), tools)
     extent = float(np.abs(here.positions).max(initial=0.0))
-    return problem.convergence.is_reached(length, extent, _free_norm(here.gradient, tools), contact)
+    return problem.convergence.is_reached(length, extent, free_norm(here.gradient, tools), contact)
 
 
-def _free_norm(gradient: NDArray[np.float64], tools: Tools) -> float:
+def free_norm(gradient: NDArray[np.float64], tools: Tools) -> float:
+    """Of a gradient (n, 3) by the free vertices."""
     return float(np.linalg.norm(tools.freed(gradient)))

@@ -25,6 +25,11 @@ _TOO_NEAR = 1e-2
 _STIFFENING = 10.0
 _MOST_INCREASES = 6
 
+# Of dhat: below it, the barrier of one linearization is quadratic.
+_SOFT = 0.1
+# Of dhat: no step goes below this distance, which otherwise falls below round-off in some steps.
+_FLOOR = 0.01
+
 # What scripts press together stays together, however stiff the barrier is: an increase has to double the distance.
 _LEAST_GAIN = 2.0
 
@@ -40,6 +45,7 @@ class ContactStep:
 
     Attributes
     ----------
+    linearized : whether the step is a few linearizations
     stiffness : of the barrier now [Pa], the integrator's weight included
     stiffness_increases : their number; nearest : the smallest distance before the latest one [m]
     friction_updates : their number; normal_gradient : (n, 3) of the barrier at the latest one [N]
@@ -49,6 +55,7 @@ class ContactStep:
     start: NDArray[np.float64]
     times: tuple[float, float]
     weight: float
+    linearized: bool = False
     stiffness: float = field(init=False)
     stiffness_increases: int = 0
     nearest: float = 0.0
@@ -58,6 +65,8 @@ class ContactStep:
     normal_gradient: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
+        if self.model is not None:
+            self.model.collisions.floor = _FLOOR * self.model.scales.dhat if self.linearized else 0.0
         self.stiffness = self.model.scales.stiffness * self.weight if self.model is not None else 0.0
 
     def with_contact(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
@@ -67,8 +76,9 @@ class ContactStep:
         if self.barrier is None:
             # Weights stay during the step: with those of every minimum in turn, the minima can alternate.
             self.model.collisions.forget_weights()
-        self.barrier = Barrier(self.model.collisions, self.stiffness)
-        self.frictions = self.model.frictions(self.stiffness, x, self.start, self.times[1] - self.times[0])
+        soft = _SOFT * self.model.scales.dhat if self.linearized else 0.0
+        self.barrier = Barrier(self.model.collisions, self.stiffness, soft)
+        self.frictions = self.model.frictions(self.barrier, x, self.start, self.times[1] - self.times[0])
         if self.model.coefficients.any():
             self.normal_gradient = Objective([self.barrier]).gradient(x)
         return Objective([*objective.terms, self.barrier, *self.frictions], objective.clock)

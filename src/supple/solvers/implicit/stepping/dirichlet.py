@@ -73,7 +73,7 @@ def move_pins(
             return x, Outcome(Status.NOT_FINITE, here, text, rows)
         direction[pinned] = displacement[pinned]
         system.welding.follow(direction)
-        step, tet, reason = limits.largest_step(x, direction)
+        step, tet, reason, _ = limits.largest_step(x, direction)
         rows.append(
             NewtonRow(
                 iteration=iteration,

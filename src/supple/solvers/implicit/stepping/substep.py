@@ -22,6 +22,7 @@ from supple.solvers.implicit.energies.midpoint import ActingWithin
 from supple.solvers.implicit.energies.potential import Potential
 from supple.solvers.implicit.energies.stitch_damping import StitchDamping
 from supple.solvers.implicit.inversion_guard import InversionGuard
+from supple.solvers.implicit.newton.linearize import FEW, linearize
 from supple.solvers.implicit.newton.minimize import Convergence, Outcome, Problem, minimize
 from supple.solvers.implicit.newton.objective import Objective
 from supple.solvers.implicit.newton.trace import NewtonRow
@@ -45,6 +46,10 @@ _DHAT_SHARE = 0.1
 _FRICTION_SHARE = 1e-2
 
 
+# Each one takes nine tenths of the distance to what is ahead, until it is near enough to touch.
+_MOST_APPROACHES = 3
+
+
 @dataclass(frozen=True)
 class StepSettings:
     """The settings of a step; see `Implicit`."""
@@ -55,6 +60,11 @@ class StepSettings:
     max_iterations: int
     volume_kept: float
     barrier_onset: float
+
+    @property
+    def linearized(self) -> bool:
+        """Whether a step is a few linearizations, and not a minimization."""
+        return self.max_iterations <= FEW
 
     def shortest(self, workspace: Workspace, h: float) -> float:
         """The length of Newton's step [m] below which the minimum of a step of h [s] is reached."""
@@ -93,7 +103,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     """
     taken = _take(state, end, h, settings, workspace)
     method = settings.integrator.without_history
-    if method is None or state.memory is None or taken.outcome.status is not Status.CONVERGED:
+    if method is None or state.memory is None or taken.outcome.status not in (Status.CONVERGED, Status.LINEARIZED):
         return taken
     balance = taken.works, taken.residual, taken.actuators
     if not makes_energy(state, taken.state, *balance, settings.shortest(workspace, h) / h, workspace):
@@ -125,7 +135,7 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
     times = state.time, end
     joints = None if workspace.joints is None else JointStep.of(workspace.joints, state, times, plan.scale)
-    contact = ContactStep(workspace.contact, state.positions, times, plan.contact_weight)
+    contact = ContactStep(workspace.contact, state.positions, times, plan.contact_weight, settings.linearized)
     problem = Problem(
         contact.with_contact(_with_joints(base, joints), state.positions),
         plan.scale,
@@ -138,14 +148,18 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     x = state.positions
     rows: list[NewtonRow] = []
     if np.array_equal(targets, x[tools.pinned]):
-        x = _first_guess(system, problem, x, plan, forces, limits, tools.pinned)
+        ahead = _without_elasticity(system, x, plan, forces, tools.pinned)
+        if settings.linearized:
+            x = _linearized_at(x, ahead, plan.predicted, limits)
+        else:
+            x = _first_guess(problem, x, ahead, limits)
     else:
         x, moved = move_pins(system, problem, x, targets, limits, tools)
         rows = moved.rows
         if moved.status is not Status.CONVERGED:
             return Substep(state, moved, contact, joints)
     while True:
-        outcome = minimize(problem, x, limits, tools)
+        outcome = (linearize if settings.linearized else minimize)(problem, x, limits, tools)
         rows = rows + outcome.rows
         x = outcome.end.positions
         if outcome.status is not Status.CONVERGED:
@@ -214,23 +228,47 @@ def _objective(
     return Objective(terms, workspace.tools.clock)
 
 
-def _first_guess(
-    system: System,
-    problem: Problem,
-    x: NDArray[np.float64],
-    plan: Plan,
-    forces: NDArray[np.float64],
-    limits: StepLimits,
-    pinned: NDArray[np.int32],
+def _without_elasticity(
+    system: System, x: NDArray[np.float64], plan: Plan, forces: NDArray[np.float64], pinned: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """The positions without elasticity, with rigid bodies rigid, as far as the filters allow; x where that has less
-    energy."""
+    """The positions at the end without elasticity and contact, with rigid bodies rigid."""
     if plan.scale is None:
         return x
     ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
     ahead = with_rigid_bodies(system, ahead)
     ahead[pinned] = x[pinned]
     system.welding.follow(ahead)
+    return ahead
+
+
+def _linearized_at(
+    x: NDArray[np.float64], ahead: NDArray[np.float64], inertial: NDArray[np.float64], limits: StepLimits
+) -> NDArray[np.float64]:
+    """Where one linearization is best: `ahead`, each piece of bodies as far as the filters allow.
+
+    What touches goes on as it does, `inertial` (n, 3), and keeps half of its distance or more: forces would press it
+    onto what carries it, and contact is linearized where it acts.
+    """
+    contact, pieces = limits.contact, limits.guard.system.joined_components
+    place, share = x, np.ones((len(x), 1))
+    if contact is not None:
+        touching = contact.vertices(np.unique(contact.collisions.at(x).points))
+        share[np.isin(pieces, pieces[touching])] = 0.5
+        ahead = np.where(share == 1.0, ahead, inertial)
+    for _ in range(_MOST_APPROACHES):
+        way, limit = limits.shortened(place, ahead - place, share)
+        if not limits.allows(place + way):
+            break
+        place = place + way
+        if limit.step == 1.0 or contact is None or np.isfinite(contact.smallest_distance(place)):
+            break
+    return place
+
+
+def _first_guess(
+    problem: Problem, x: NDArray[np.float64], ahead: NDArray[np.float64], limits: StepLimits
+) -> NDArray[np.float64]:
+    """The positions `ahead` as far as the filters allow; x where that has less energy."""
     step = limits.largest_step(x, ahead - x).step
     if step < 1.0:
         ahead = x + step * (ahead - x)

@@ -1,0 +1,160 @@
+"""Collisions along a way, as linear rows: for pairs that would meet, the gap along the normal where they do.
+
+With the closest points and the unit normal n at the time of a collision, the gap of a pair is n . sum_i c_i x_i, linear
+in the positions. A row keeps it at `target`, with the energy stiffness / 2 (gap - target)^2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.barrier.barrier_energy import block_points, block_starts
+from supple.contact.ccd import edge_edge_time, is_clear, point_triangle_time
+from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
+from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle, combine
+from supple.numerics.mat3 import dot
+from supple.numerics.sparse.couplings import Couplings
+from supple.runtime.kernel_cache import njit
+
+
+class CollisionRows(NamedTuple):
+    """k rows.
+
+    Attributes
+    ----------
+    kinds, points, coefficients : (k,), (k, 4), (k, 4) as of `Contacts`
+    normals : (k, 3) unit vectors from the second side to the first
+    gaps : (k,) where the way begins [m]; ends : (k,) where it ends [m]
+    """
+
+    kinds: NDArray[np.int8]
+    points: NDArray[np.int32]
+    coefficients: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    gaps: NDArray[np.float64]
+    ends: NDArray[np.float64]
+
+    @classmethod
+    def room(cls, k: int) -> CollisionRows:
+        """Rows to be written."""
+        flat = np.zeros(k, dtype=np.int8), np.full((k, 4), -1, dtype=np.int32)
+        return cls(*flat, np.zeros((k, 4)), np.zeros((k, 3)), np.zeros(k), np.zeros(k))
+
+    def where(self, chosen: NDArray[np.bool_] | slice) -> CollisionRows:
+        """The chosen ones (k,)."""
+        arrays: list[Any] = [array[chosen] for array in self]
+        return CollisionRows(*arrays)
+
+    def joined(self, more: CollisionRows) -> CollisionRows:
+        """These rows, then others."""
+        arrays: list[Any] = [np.concatenate(both) for both in zip(self, more, strict=True)]
+        return CollisionRows(*arrays)
+
+    def along(self, way: NDArray[np.float64]) -> CollisionRows:
+        """The same rows, with the ends of another way (s, 3)."""
+        moved = np.einsum("ki,kij,kj->k", self.coefficients, way[self.points], self.normals)
+        return self._replace(ends=self.gaps + moved)
+
+
+@njit
+def _off(x, p, q):
+    """x_q - x_p."""
+    return (x[q, 0] - x[p, 0], x[q, 1] - x[p, 1], x[q, 2] - x[p, 2])
+
+
+@njit
+def _write(x, way, time, kind, points, rows, k):
+    """Write the row of a pair at `time` of its collision; all is relative to the first point, as round-off is."""
+    p, q, r, s = points
+    a, b, c = _off(x, p, q), _off(x, p, r), _off(x, p, s)
+    u, v, w = _off(way, p, q), _off(way, p, r), _off(way, p, s)
+    at = (_along(a, u, time), _along(b, v, time), _along(c, w, time))
+    if kind == VERTEX_TRIANGLE:
+        shares = closest_on_triangle((0.0, 0.0, 0.0), at[0], at[1], at[2])
+        weights = (-shares[0], -shares[1], -shares[2])
+    else:
+        one, other = closest_on_segments((0.0, 0.0, 0.0), at[0], at[1], at[2])
+        weights = (one, other - 1.0, -other)
+    n = combine(weights, at[0], at[1], at[2])
+    length = max(math.sqrt(dot(n, n)), 1e-300)
+    n = (n[0] / length, n[1] / length, n[2] / length)
+    rows.kinds[k] = kind
+    rows.gaps[k] = dot(n, combine(weights, a, b, c))
+    rows.ends[k] = rows.gaps[k] + dot(n, combine(weights, u, v, w))
+    rows.coefficients[k, 0] = -(weights[0] + weights[1] + weights[2])
+    for i in range(4):
+        rows.points[k, i] = points[i]
+        if i < 3:
+            rows.coefficients[k, i + 1] = weights[i]
+            rows.normals[k, i] = n[i]
+
+
+@njit
+def _along(a, u, time):
+    return (a[0] + time * u[0], a[1] + time * u[1], a[2] + time * u[2])
+
+
+@njit(cache=True)
+def write_collisions(x, way, triangles, edges, point_pairs, edge_pairs, floor, rows):
+    """Write the rows of all pairs that collide while points go from x (s, 3) along `way` (s, 3); returns their number.
+
+    floor : see `point_triangle_time`. Where `rows` has no room, only the first ones are written.
+    """
+    count = 0
+    for k in range(len(point_pairs)):
+        v, t = point_pairs[k, 0], point_pairs[k, 1]
+        if is_clear(x, way, v, triangles[t, 0], triangles[t, 1], triangles[t, 2], 1):
+            continue
+        time = point_triangle_time(x, way, v, triangles[t], 1.0, floor)
+        if time <= 1.0:
+            if count < len(rows.kinds):
+                points = (v, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+                _write(x, way, time, VERTEX_TRIANGLE, points, rows, count)
+            count += 1
+    for k in range(len(edge_pairs)):
+        e, f = edge_pairs[k, 0], edge_pairs[k, 1]
+        if is_clear(x, way, edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1], 2):
+            continue
+        time = edge_edge_time(x, way, edges[e], edges[f], 1.0, floor)
+        if time <= 1.0:
+            if count < len(rows.kinds):
+                points = (edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1])
+                _write(x, way, time, EDGE_EDGE, points, rows, count)
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def add_row_gradient(rows, stiffness, target, out):
+    """Add the gradient at the beginning of the way [N] to `out` (s, 3)."""
+    for k in range(len(rows.kinds)):
+        size = stiffness * (rows.gaps[k] - target)
+        for i in range(4):
+            for j in range(3):
+                out[rows.points[k, i], j] += size * rows.coefficients[k, i] * rows.normals[k, j]
+
+
+def row_hessian(rows: CollisionRows, stiffness: float) -> Couplings:
+    """The Hessian by the points [N/m]."""
+    start = block_starts(rows.kinds)
+    blocks = np.empty((start[-1], 3, 3))
+    _write_hessian(rows, stiffness, blocks)
+    first, second = block_points(rows.kinds, rows.points, start)
+    return Couplings(first, second, blocks)
+
+
+@njit(cache=True)
+def _write_hessian(rows, stiffness, out):
+    b = 0
+    for k in range(len(rows.kinds)):
+        for i in range(4):
+            for j in range(i, 4):
+                size = stiffness * rows.coefficients[k, i] * rows.coefficients[k, j]
+                for u in range(3):
+                    for v in range(3):
+                        out[b, u, v] = size * rows.normals[k, u] * rows.normals[k, v]
+                b += 1
