@@ -5,7 +5,7 @@ import pytest
 
 import supple as sp
 from supple.model.system import build_system
-from supple.solvers.xpbd.contact.response_rates import response_rates
+from supple.solvers.xpbd.response_rates import response_rates
 
 
 def test_rates_are_those_of_a_vertex_between_fixed_neighbours():

@@ -19,7 +19,6 @@ from supple.solvers.xpbd.contact.cuts import Cuts, keep_spin, share_motion
 from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows, loaded_rows
 from supple.solvers.xpbd.contact.memory import ContactMemory
 from supple.solvers.xpbd.contact.nodes import Nodes
-from supple.solvers.xpbd.contact.response_rates import response_rates
 from supple.solvers.xpbd.contact.row_solver import RESIDUAL, RowSolver
 from supple.solvers.xpbd.contact.rows import NIL, Rows, detect, is_last_shape, no_walls
 from supple.solvers.xpbd.contact.search.lists import Lists
@@ -29,6 +28,7 @@ from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.contact.shapes import RowShapes, Walls
 from supple.solvers.xpbd.contact.solve import keep_impulses, push_kept
 from supple.solvers.xpbd.contact.tets import Tets
+from supple.solvers.xpbd.response_rates import response_rates
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joint_rows import JointRows
 

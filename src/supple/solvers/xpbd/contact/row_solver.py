@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.cross_rows import cross_rows
-from supple.solvers.xpbd.contact.joined import solve_joined
+from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.levers import hold_bodies
 from supple.solvers.xpbd.contact.nodes import Nodes
 from supple.solvers.xpbd.contact.rows import Rows
 from supple.solvers.xpbd.contact.solve import solve
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
-from supple.solvers.xpbd.rigid.joint_rows import JointRows, solve_joints
+from supple.solvers.xpbd.rigid.joint_rows import JointRows, solve_joints, sweep_joints
 
 # Of the gap: what the last sweep over the rows may change; the most sweeps.
 RESIDUAL, MOST_SWEEPS = 0.02, 4
@@ -23,6 +23,10 @@ RESIDUAL, MOST_SWEEPS = 0.02, 4
 RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 10
 # With joints, and for each joint where that is more: what pulls at a chain has to go along it.
 MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT = 60, 10
+# The largest correction of joints, as a share of their size, after which sweeps end: a tenth of what is looked for.
+_SMALL = 1e-6
+# Sweeps over joints for one over contacts, at most: these take twenty times as long.
+_INNER = 20
 
 
 class RowSolver:
@@ -98,3 +102,30 @@ class RowSolver:
             v = nodes.v[control]
             nodes.move_bodies(h)
             nodes.impulses[control] += nodes.v[control] - v - (0.0 if of_joints is None else of_joints)
+
+
+@njit(cache=True)
+def solve_joined(points, bodies, begin, rows, count, joints, impulses, enough, tolerance, most):
+    """Sweep over joints and contacts in turn until both change little, at most this many times; see `solve`.
+
+    joints : their rows, with impulses (r,) [kg m], in place
+    enough : contacts are left alone if joints need smaller corrections, as shares of their size
+
+    Returns the largest correction of joints in the first turn, and what the last sweep over contacts changed [m].
+    """
+    first, residual = np.inf, 0.0
+    for turn in range(most):
+        largest = 0.0
+        for k in range(_INNER):
+            off = sweep_joints(joints, impulses, bodies.twists, k)
+            largest = max(largest, off)
+            if off <= _SMALL:
+                break
+        if turn == 0:
+            first = largest
+            if first <= enough:
+                break
+        _, residual = solve(points, bodies, begin, rows, count, tolerance, 1)
+        if largest <= _SMALL and residual <= tolerance:
+            break
+    return first, residual
