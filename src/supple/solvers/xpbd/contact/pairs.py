@@ -238,3 +238,16 @@ def near_pairs(x, v, pairs, time, reach, moved, out):
         out[count] = k
         count += pairs.near[k]
     return count
+
+
+def hand_on(old: Pairs, kept: NDArray[np.int64], new: Pairs) -> None:
+    """Give the impulses of loaded pairs that are not kept to the same pairs of a new list."""
+    held = np.setdiff1d(loaded_pairs(old.impulses), kept, assume_unique=True)
+    open_ = np.flatnonzero(new.near == UNKNOWN)
+    if not len(held) or not len(open_):
+        return
+    held = held[np.argsort(old.keys[held])]
+    place = np.minimum(np.searchsorted(old.keys[held], new.keys[open_]), len(held) - 1)
+    same = old.keys[held[place]] == new.keys[open_]
+    found, source = open_[same], held[place[same]]
+    new.impulses[found], new.normals[found] = old.impulses[source], old.normals[source]

@@ -58,7 +58,8 @@ class RowSolver:
     ) -> tuple[NDArray[np.float64], float]:
         """Solve the rows of contacts and of joints; the joints' impulses (r,) [kg m], and by how much joints were off.
 
-        The latter as a share of their size; contacts are left alone if that is `enough`.
+        The latter as a share of their size; contacts are left alone if that is `enough`. Without contacts it is half
+        the square of the largest turn: what the linear rows leave out.
         """
         nodes, impulses = self._nodes, np.zeros(len(joints.total))
         x = self._prepared(rows, count)
@@ -69,6 +70,7 @@ class RowSolver:
             self.left = residual / self._gap
         else:
             solve_joints(joints, impulses, nodes.bodies.twists, most)
+            off = 0.5 * float((nodes.bodies.twists[:, 3:] ** 2).sum(axis=1).max(initial=0.0))
         twists = np.zeros((len(self._rigid) + 1, 6))
         np.add.at(twists, joints.bodies, impulses[:, None, None] * joints.answers)
         of_joints = twists[:-1, None]

@@ -14,8 +14,8 @@ from supple.solvers.xpbd.frame.volumes import hold_volumes, restore
 from supple.solvers.xpbd.integration import first_lost, hold, predict
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
-# The rows of joints are linear in small turns of bodies. With contacts they are linearized again at the same places, at
-# most this many times, until none is off by more than this share of its joint's size.
+# The rows of joints are linear in small turns of bodies. They are linearized again at the same places, at most so many
+# times, until none is off by more than this share of its joint's size.
 MOST_LINEARIZATIONS, JOINT_EXACT = 20, 1e-5
 
 
@@ -86,7 +86,7 @@ def solve(ws: XPBDWorkspace, rows: int, end: float, h: float) -> None:
         contact.solve(rows)
         return
     joints.begin_substep(ws.previous, ws.origins, end, h)
-    for k in range(MOST_LINEARIZATIONS if rows else 1):
+    for k in range(MOST_LINEARIZATIONS):
         of_joints = joints.rows(ws.points, ws.previous, ws.origins, end, h, contact.nodes.bodies.J)
         impulses, off = contact.solve_joined(rows, of_joints, JOINT_EXACT if k else 0.0)
         joints.note(of_joints, impulses, ws.points[:, :3] + ws.origins, h)

@@ -67,3 +67,21 @@ def _deviating(x, begin, v, age, nodes, margin, left):
             x[i, 2] - begin[i, 2] - age * v[i, 2],
         )
         left[i] = not a * a + b * b + c * c <= margin * margin
+
+
+@njit(cache=True)
+def fastest_square(v, nodes, owner, owners):
+    """The square of the largest velocity of a node relative to the mean of its thing."""
+    means = np.zeros((owners, 4))
+    for i in nodes:
+        o = owner[i]
+        means[o, 3] += 1.0
+        for j in range(3):
+            means[o, j] += v[i, j]
+    most = 0.0
+    for i in nodes:
+        o = owner[i]
+        f = 1.0 / means[o, 3]
+        a, b, c = v[i, 0] - f * means[o, 0], v[i, 1] - f * means[o, 1], v[i, 2] - f * means[o, 2]
+        most = max(most, a * a + b * b + c * c, 0.02 * (v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2))
+    return most

@@ -17,15 +17,15 @@ from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.memory import ContactMemory, ListMemory
 from supple.solvers.xpbd.contact.pairs import (
     SHAPE,
-    UNKNOWN,
     Pairs,
     copy_pairs,
     describe_pairs,
+    hand_on,
     loaded_pairs,
     mean_square_speed,
     near_pairs,
 )
-from supple.solvers.xpbd.contact.search.expected import Expected
+from supple.solvers.xpbd.contact.search.expected import Expected, fastest_square
 from supple.solvers.xpbd.contact.search.overlaps import Overlaps
 from supple.solvers.xpbd.contact.search.surface import RowSurface
 from supple.solvers.xpbd.contact.shapes import RowShapes
@@ -229,7 +229,7 @@ class Lists:
         describe_pairs(d + len(stays[0]), points, nothing, s, 2.0 * self._gap, new)
         describe_pairs(first + len(stays[1]), nothing, edges, s, 2.0 * self._gap, new)
         self._describe_walls(new, first + len(self._edges), *self._on_walls.T)
-        _hand_on(old, kept, new)
+        hand_on(old, kept, new)
         self.pairs = new
 
     def _walls(
@@ -279,21 +279,8 @@ class Lists:
         """For how long to search ahead: while the fastest node, seen from its body, goes `WAY` edges or more."""
         s, pairs = self._surface.simplices, len(self._points) + len(self._edges)
         way = min(LONGEST, WAY * max(1.0, len(s.nodes) / max(1, pairs))) * self._edge
-        fastest = math.sqrt(max(_fastest(v, s.nodes, s.owner, len(s.collide)), mean_square_speed(v, self.pairs)))
+        fastest = math.sqrt(max(fastest_square(v, s.nodes, s.owner, len(s.collide)), mean_square_speed(v, self.pairs)))
         return max(h, way / max(fastest, way / (200.0 * h)))
-
-
-def _hand_on(old: Pairs, kept: NDArray[np.int64], new: Pairs) -> None:
-    """Give the impulses of loaded pairs that are not kept to the same pairs of a new list."""
-    held = np.setdiff1d(loaded_pairs(old.impulses), kept, assume_unique=True)
-    open_ = np.flatnonzero(new.near == UNKNOWN)
-    if not len(held) or not len(open_):
-        return
-    held = held[np.argsort(old.keys[held])]
-    place = np.minimum(np.searchsorted(old.keys[held], new.keys[open_]), len(held) - 1)
-    same = old.keys[held[place]] == new.keys[open_]
-    found, source = open_[same], held[place[same]]
-    new.impulses[found], new.normals[found] = old.impulses[source], old.normals[source]
 
 
 @njit(cache=True)
@@ -304,21 +291,3 @@ def _asked(left, corners):
         for k in range(corners.start[q], corners.start[q + 1]):
             out[q] = out[q] or left[corners.items[k]]
     return out
-
-
-@njit(cache=True)
-def _fastest(v, nodes, owner, owners):
-    """The square of the largest velocity of a node relative to the mean of its thing."""
-    means = np.zeros((owners, 4))
-    for i in nodes:
-        o = owner[i]
-        means[o, 3] += 1.0
-        for j in range(3):
-            means[o, j] += v[i, j]
-    most = 0.0
-    for i in nodes:
-        o = owner[i]
-        f = 1.0 / means[o, 3]
-        a, b, c = v[i, 0] - f * means[o, 0], v[i, 1] - f * means[o, 1], v[i, 2] - f * means[o, 2]
-        most = max(most, a * a + b * b + c * c, 0.02 * (v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2))
-    return most
