@@ -1,7 +1,7 @@
 """Hanging beam in Supple. Prints one JSON line, with times of the processor.
 
 usage: our_beam.py xpbd|xpbd_without_contact SCALE SUBSTEPS FRAMES [POSITIONS.npy]
-       our_beam.py implicit SCALE STEP INTEGRATOR TOLERANCE FRAMES [POSITIONS.npy]
+       our_beam.py implicit|linearized SCALE STEP INTEGRATOR TOLERANCE FRAMES [POSITIONS.npy]
 SCALE 1 -> 1,152 tets, 2 -> 9,216; frames are of 1/60 s, STEP in seconds; TOLERANCE 0 is the solver's own.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,7 +40,7 @@ def peak_megabytes() -> float | None:
 
 def main() -> None:
     kind, scale = sys.argv[1], int(sys.argv[2])
-    if kind != "implicit":
+    if kind not in ("implicit", "linearized"):
         substeps, frames, *rest = sys.argv[3:]
         contact = {"xpbd": sp.XPBD().contact, "xpbd_without_contact": None}[kind]
         solver: sp.XPBD | sp.Implicit = sp.XPBD(substeps=int(substeps), contact=contact)
@@ -47,6 +48,8 @@ def main() -> None:
     else:
         step, integrator, tolerance, frames, *rest = sys.argv[3:]
         solver = sp.Implicit(integrator=integrator, tolerance=float(tolerance) or None)
+        if kind == "linearized":
+            solver = replace(solver, max_iterations=1)
         dt = float(step)
     steps = round(int(frames) / 60 / dt)
     scene = beam_scene(scale)

@@ -81,6 +81,8 @@ def families(scale: int, quick: bool, threads: int | None) -> list[Family]:
             {
                 "backward Euler, 1/60 s": implicit(1, "backward_euler"),
                 "backward Euler, 1/240 s": implicit(4, "backward_euler"),
+                "backward Euler, one linearization, 1/60 s": ours("linearized", scale, 1 / 60, "backward_euler", 0),
+                "backward Euler, one linearization, 1/240 s": ours("linearized", scale, 1 / 240, "backward_euler", 0),
                 "BDF2, 1/60 s": implicit(1, "bdf2"),
                 "BDF2, 1/240 s": implicit(4, "bdf2"),
                 "Newmark, 1/60 s": implicit(1, "newmark"),

@@ -18,6 +18,7 @@ _UNITS = {
     "cable_tension": "N", "cable_length": "m", "kinetic_energy": "J", "elastic_energy": "J", "potential_energy": "J",
     "stitch_energy": "J", "energy_residual": "J", "cavity_work": "J", "cable_work": "J", "reaction_forces": "N",
     "contact_forces": "N", "friction_forces": "N", "joint_forces": "N", "joint_torques": "N m",
+    "time_error": "m", "unbalanced_force": "N",
     "linear_momentum": "kg m/s", "angular_momentum": "kg m²/s", "wall_seconds": "s", "von_mises": "Pa",
 }  # fmt: skip
 

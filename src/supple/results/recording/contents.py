@@ -151,6 +151,11 @@ class RecordedContents(RecordedScene):
         """All frames' values of a series of the group `supple/frames`, such as "index" or "details/contacts"."""
         return self._values(f"supple/frames/{name}")
 
+    def largest(self, name: str) -> float:
+        """The largest number of a series as of `frame_values`; NaN where the solver has none."""
+        values = self.frame_values(name) if f"supple/frames/{name}" in self._series else np.zeros(0)
+        return float(np.max(values[np.isfinite(values)], initial=-np.inf)) if np.isfinite(values).any() else np.nan
+
     def close(self) -> None:
         """Close the file; frames that were not read before can then not be read."""
         self._file.close()

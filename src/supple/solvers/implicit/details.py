@@ -36,6 +36,8 @@ class ImplicitDetails(SolverDetails):
     reaction_forces : of the pins on their bodies, by label of the pin, (3,) [N]
     orthogonality_errors : |F^T F - 1| of the rigid bodies, by name [-]
     weld_forces : of the rigid bodies on the soft ones that are welded to them, by name of the weld, (3,) [N]
+    time_error : estimate of the error of the positions that the integrator added in the step, the root mean square over
+        the mass [m]: of backward Euler half a step times the change of velocity, of BDF2 the next order; else None
     unbalanced_force : norm of what Newton's method has left on all free vertices [N]
     seconds : of wall time, by part of the step; see `supple.solvers.implicit.timings`
     reaction_forces_by_vertex : by label of the pin, (k, 3) [N]
@@ -56,6 +58,7 @@ class ImplicitDetails(SolverDetails):
     reaction_forces: Forces = field(default_factory=dict)
     orthogonality_errors: Mapping[str, float] = field(default_factory=dict)
     weld_forces: Forces = field(default_factory=dict)
+    time_error: float | None = None
     unbalanced_force: float = 0.0
     seconds: Mapping[str, float] = field(default_factory=dict)
     reaction_forces_by_vertex: Forces = field(default_factory=dict, compare=False)

@@ -233,6 +233,7 @@ class Implicit(Solver):
         forces, parts, works = start_of(system)
         parts = [each.parts(now.positions) for each in system.actuators]
         energy, residual = no_works(system), 0.0
+        time_errors: list[float] = []
         while not substepping.over:
             # For a small scene all at once: changing the number of threads takes longer than its kernels.
             with threads_for(len(system.tets), SERIAL_TETS):
@@ -253,12 +254,15 @@ class Implicit(Solver):
             works = [w + Q * (s - t) for w, Q, s, t in zip(works, forces, parts, before, strict=True)]
             add_works(energy, taken.works)
             residual += taken.residual
+            time_errors += [] if taken.time_error is None else [taken.time_error]
             substeps += 1
             substepping.advance()
         add_works(energy, works_of_actuators(system, works))
+        time_error = sum(time_errors) if time_errors else None
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
         workspace.checked = now
         details = replace(ImplicitDetails.of_rows(rows, substeps), work=energy, energy_residual=residual)
+        details = replace(details, time_error=time_error)
         nearest, contacts = None, None
         if last is not None:
             gradient = last.outcome.end.gradient / last.contact.weight

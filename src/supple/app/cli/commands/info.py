@@ -331,6 +331,7 @@ def _recording(file: Path) -> None:
             ("mass", f"{recording.masses.sum():.6g} kg"),
             ("solver", recording.solver or "unknown"),
             ("smallest J", f"{J.min():.6g} at t = {recording.times[int(np.argmin(J))]:.6g} s"),
+            ("time error", f"at most {recording.largest('details/time_error'):.3g} m (RMS) in a step"),
             ("ended", str(recording.statuses[-1])),
             ("scene file", "inside" if recording.scene_text else "none"),
             ("written by", f"supple {recording.supple_version}"),

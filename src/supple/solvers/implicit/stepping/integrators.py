@@ -92,6 +92,10 @@ class Integrator(ABC):
         """Why the method cannot simulate a system; None where it can."""
         return None
 
+    def position_error(self, before: State, end: State) -> NDArray[np.float64] | None:
+        """(n, 3) the leading error of the positions that a step from `before` adds [m]; None where it is not known."""
+        return None
+
     @abstractmethod
     def plan(self, system: System, state: State, h: float) -> Plan:
         """A step of length h [s] from `state`."""
@@ -113,6 +117,10 @@ class BackwardEuler(Integrator):
     """x = x_n + h v, v = v_n + h a. First order, stable for every step, loses energy."""
 
     name = "backward_euler"
+
+    def position_error(self, before: State, end: State) -> NDArray[np.float64] | None:
+        """h (v - v_n) / 2: what the second order, as BDF2 has it from the same history, adds."""
+        return 0.5 * (end.time - before.time) * (end.velocities - before.velocities)
 
     def plan(self, system: System, state: State, h: float) -> Plan:
         x, v = state.positions, state.velocities
@@ -138,6 +146,16 @@ class BDF2(Integrator):
     @property
     def without_history(self) -> Integrator:
         return BackwardEuler()
+
+    def position_error(self, before: State, end: State) -> NDArray[np.float64] | None:
+        """2/9 h^3 of the third derivative of x, for equal steps, from the velocities of three times."""
+        past, h = before.memory, end.time - before.time
+        if not isinstance(past, History) or h > 2.0 * past.step or past.positions.shape != before.positions.shape:
+            return BackwardEuler().position_error(before, end)
+        w = h / past.step
+        now, then = (end.velocities - before.velocities) / h, (before.velocities - past.velocities) / past.step
+        third = 2.0 * (now - then) / (h + past.step)
+        return (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)) * h**3 * third
 
     def plan(self, system: System, state: State, h: float) -> Plan:
         past = state.memory

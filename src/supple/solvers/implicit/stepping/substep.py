@@ -85,6 +85,7 @@ class Substep:
     """The result of a step: the state at its end, the course of Newton's method, contact and joints at the end.
 
     actuators : generalized forces of each actuator, as they acted in the step; works, residual : see `works_of_step`
+    time_error : see `ImplicitDetails`
     """
 
     state: State
@@ -94,6 +95,7 @@ class Substep:
     actuators: tuple[NDArray[np.float64], ...] = ()
     works: dict[str, float] = field(default_factory=dict)
     residual: float = 0.0
+    time_error: float | None = None
 
 
 def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
@@ -185,7 +187,16 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     acted = state.positions + plan.place * (x - state.positions)
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
     works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, end, workspace)
-    return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual)
+    error = _time_error(system, workspace.bodies_end, settings.integrator.position_error(state, after))
+    return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual, error)
+
+
+def _time_error(system: System, n: int, error: NDArray[np.float64] | None) -> float | None:
+    """The root mean square over the mass of the bodies' n vertices [m]."""
+    if error is None:
+        return None
+    masses = system.masses[:n]
+    return float(np.sqrt(masses @ np.einsum("ij,ij->i", error[:n], error[:n]) / masses.sum()))
 
 
 def _with_joints(objective: Objective, joints: JointStep | None) -> Objective:
