@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dis
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -120,6 +121,15 @@ class KernelCompiler(compiler.Compiler):
         for environment in result._find_referenced_environments():
             result.codegen.set_env(environment.env_name, environment)
         return result
+
+
+def inlined_size(function: FunctionType) -> int:
+    """Bytes of the bytecode of a function, with those of the inner functions that are inlined where it calls them."""
+    called = (
+        function.__globals__.get(step.argval) for step in dis.get_instructions(function) if step.opname == "LOAD_GLOBAL"
+    )
+    inlined = [each for each in called if isinstance(each, InnerFunction) and each.targetoptions["forceinline"]]
+    return len(function.__code__.co_code) + sum(inlined_size(each.py_func) for each in inlined)
 
 
 class InnerFunction(CPUDispatcher):

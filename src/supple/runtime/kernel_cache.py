@@ -32,7 +32,7 @@ from numba.np.numpy_support import numpy_version
 from numpy.typing import NDArray
 
 from supple.runtime import inner_function, kernel_folder
-from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly
+from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly, inlined_size
 from supple.runtime.kernel_watchers import WATCHERS
 from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
@@ -40,6 +40,11 @@ from supple.runtime.reached_code import code_of_module, reached_code
 
 # Below this many rows, a loop ends before a second thread has started.
 ROWS = 2_000
+# Bytes of bytecode, those of inlined calls included, up to which an inner function is always inlined. A call that remains
+# passes the arrays of a tuple one by one and counts their references: a sweep over rows of contacts takes four times as
+# long. Functions with exact sums, which nothing calls often, have `forceinline=False`: their code is long, and exact
+# tests of triangles would take minutes to compile.
+INLINED = 4_000
 # What decides on machine code besides the kernel, its signature and the processor.
 _SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "USING_SVML")
 _COMPILER = (
@@ -105,10 +110,8 @@ def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> A
     if "__signature__" not in vars(function):  # Numba asks for it twice, which is half the time to make a kernel
         vars(function)["__signature__"] = inspect.signature(function)
     if not cache:
-        # A call that remains passes the arrays of a tuple one by one and counts their references: a sweep over rows of
-        # contacts takes four times as long. Compilation takes 3 % more time.
-        options = {**options, "nopython": True, "boundscheck": None, "forceinline": True}
-        return InnerFunction(function, {}, options)
+        options = {**options, "nopython": True, "boundscheck": None}
+        return InnerFunction(function, {}, {"forceinline": inlined_size(function) <= INLINED, **options})
     compiled: Any = numba.njit(**options, pipeline_class=KernelCompiler)(function)
     compare_quickly(compiled)
     compiled._cache = kept = KernelCache(compiled)

@@ -7,14 +7,14 @@ for Double-Double and Quad-Double Arithmetic" (2007).
 from supple.runtime.kernel_cache import njit
 
 
-@njit
+@njit(forceinline=False)
 def sum_error(x, y, total):
     """x + y - total, exactly, for total = x + y rounded."""
     z = total - x
     return (x - (total - z)) + (y - z)
 
 
-@njit
+@njit(forceinline=False)
 def product_error(x, y, product):
     """x y - product, exactly, for product = x y rounded."""
     p = 134217729.0 * x
@@ -26,27 +26,27 @@ def product_error(x, y, product):
     return x_low * y_low - (((product - x_high * y_high) - x_low * y_high) - x_high * y_low)
 
 
-@njit
+@njit(forceinline=False)
 def two_sum(x, y):
     """x + y of two floats, exactly."""
     total = x + y
     return total, sum_error(x, y, total)
 
 
-@njit
+@njit(forceinline=False)
 def two_product(x, y):
     """x y of two floats, exactly."""
     product = x * y
     return product, product_error(x, y, product)
 
 
-@njit
+@njit(forceinline=False)
 def difference(x, y):
     """x - y of two floats, exactly."""
     return two_sum(x, -y)
 
 
-@njit
+@njit(forceinline=False)
 def add(a, b):
     high, low = two_sum(a[0], b[0])
     tail, tail_low = two_sum(a[1], b[1])
@@ -57,12 +57,12 @@ def add(a, b):
     return (high, low - (high - total))
 
 
-@njit
+@njit(forceinline=False)
 def subtract(a, b):
     return add(a, (-b[0], -b[1]))
 
 
-@njit
+@njit(forceinline=False)
 def multiply(a, b):
     product, error = two_product(a[0], b[0])
     low = error + (a[0] * b[1] + a[1] * b[0])
@@ -70,7 +70,7 @@ def multiply(a, b):
     return (total, low - (total - product))
 
 
-@njit
+@njit(forceinline=False)
 def triple_product(a, b, c):
     """(a x b) . c of vectors of double-double numbers."""
     x = multiply(subtract(multiply(a[1], b[2]), multiply(a[2], b[1])), c[0])

@@ -16,7 +16,7 @@ _ERROR = (7.0 + 56.0 * 2.0**-53) * 2.0**-53
 _PARTS = 192
 
 
-@njit
+@njit(forceinline=False)
 def _add(parts, n, value):
     """Add a number to a sum of n numbers that do not overlap, exactly; returns the new n."""
     kept = 0
@@ -31,7 +31,7 @@ def _add(parts, n, value):
     return kept
 
 
-@njit
+@njit(forceinline=False)
 def _exact_sign(a, b, c, d):
     """Sign of det[b - a, c - a, d - a]."""
     high, low = np.empty((3, 3)), np.empty((3, 3))
@@ -58,7 +58,7 @@ def _exact_sign(a, b, c, d):
     return 1 if parts[n - 1] > 0.0 else -1
 
 
-@njit
+@njit(forceinline=False)
 def side_of_plane(a, b, c, d):
     """Sign of det[b - a, c - a, d - a]: 1 where a, b, c are counter-clockwise seen from d, 0 in the plane."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -77,7 +77,7 @@ def side_of_plane(a, b, c, d):
     return _exact_sign(a, b, c, d)
 
 
-@njit
+@njit(forceinline=False)
 def side_of_line(a, b, c):
     """Sign of det[b - a, c - a] in the plane: 1 where a, b, c are counter-clockwise."""
     flat = (a[0], a[1], 0.0)

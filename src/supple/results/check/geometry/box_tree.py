@@ -61,7 +61,7 @@ def build_tree(low, high):
     return order, nodes[:used], node_low[:used], node_high[:used]
 
 
-@njit
+@njit(forceinline=False)
 def boxes_meet(low_a, high_a, low_b, high_b, i, j):
     """Whether two closed boxes meet."""
     return (
@@ -74,7 +74,7 @@ def boxes_meet(low_a, high_a, low_b, high_b, i, j):
     )
 
 
-@njit
+@njit(forceinline=False)
 def boxes_apart(low_a, high_a, low_b, high_b, i, j):
     """Squared distance of two boxes."""
     total = 0.0

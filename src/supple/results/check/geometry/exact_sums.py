@@ -15,7 +15,7 @@ _SPLITTER = 134217729.0  # 2^27 + 1
 SMALLEST, LARGEST = 2.0**-300, 2.0**300
 
 
-@njit
+@njit(forceinline=False)
 def two_sum(a, b):
     """a + b as the rounded sum and its error (theorem 7)."""
     s = a + b
@@ -23,7 +23,7 @@ def two_sum(a, b):
     return s, (a - (s - bb)) + (b - bb)
 
 
-@njit
+@njit(forceinline=False)
 def two_product(a, b):
     """a b as the rounded product and its error (theorem 18)."""
     p = a * b
@@ -36,7 +36,7 @@ def two_product(a, b):
     return p, al * bl - (((p - ah * bh) - al * bh) - ah * bl)
 
 
-@njit
+@njit(forceinline=False)
 def grow(h, n, b):
     """Add b to the expansion h[:n] in place, without zeros; the new length (theorem 10)."""
     if b == 0.0:
@@ -54,7 +54,7 @@ def grow(h, n, b):
     return k
 
 
-@njit
+@njit(forceinline=False)
 def add_product2(h, n, sign, x, y):
     """Add sign x y to the expansion, for x, y given as pairs of floats."""
     for i in range(2):
@@ -66,7 +66,7 @@ def add_product2(h, n, sign, x, y):
     return n
 
 
-@njit
+@njit(forceinline=False)
 def add_product3(h, n, sign, x, y, z):
     """Add sign x y z to the expansion, for x, y, z given as pairs of floats."""
     for i in range(2):
@@ -87,7 +87,7 @@ def add_product3(h, n, sign, x, y, z):
     return n
 
 
-@njit
+@njit(forceinline=False)
 def sign_of(h, n):
     """-1, 0 or 1."""
     if n == 0:
@@ -95,7 +95,7 @@ def sign_of(h, n):
     return 1 if h[n - 1] > 0.0 else -1
 
 
-@njit
+@njit(forceinline=False)
 def in_range(a):
     """Whether a coordinate is one that is computed with exactly."""
     return a == 0.0 or SMALLEST <= abs(a) <= LARGEST

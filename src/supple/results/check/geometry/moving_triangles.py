@@ -19,17 +19,17 @@ _DEPTH, _MOST_STEPS = 30, 400
 _EPSILON, _NEAR = 2.0**-52, 1e-8
 
 
-@njit
+@njit(forceinline=False)
 def _cross(u, v):
     return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
 
 
-@njit
+@njit(forceinline=False)
 def _dot(u, v):
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@njit
+@njit(forceinline=False)
 def _between(x0, x1, a, b, t):
     """x_b - x_a at time t."""
     s = 1.0 - t
@@ -40,14 +40,14 @@ def _between(x0, x1, a, b, t):
     )
 
 
-@njit
+@njit(forceinline=False)
 def _normal(u0, v0, u1, v1):
     """Coefficients of u x v for u, v that are linear in time."""
     m, n = _cross(u0, v1), _cross(u1, v0)
     return _cross(u0, v0), (0.5 * (m[0] + n[0]), 0.5 * (m[1] + n[1]), 0.5 * (m[2] + n[2])), _cross(u1, v1)
 
 
-@njit
+@njit(forceinline=False)
 def _range(m, n):
     """Smallest and largest coefficient of m . n, both of second degree."""
     a = _dot(m[0], n[0])
@@ -58,12 +58,12 @@ def _range(m, n):
     return min(a, b, c, d, e), max(a, b, c, d, e)
 
 
-@njit
+@njit(forceinline=False)
 def _size(u0, u1):
     return max(abs(u0[0]), abs(u0[1]), abs(u0[2]), abs(u1[0]), abs(u1[1]), abs(u1[2]))
 
 
-@njit
+@njit(forceinline=False)
 def _minus(m, n):
     return (
         (m[0][0] - n[0][0], m[0][1] - n[0][1], m[0][2] - n[0][2]),
@@ -72,7 +72,7 @@ def _minus(m, n):
     )
 
 
-@njit
+@njit(forceinline=False)
 def _state(x0, x1, four, sides, begin, end, largest):
     """Of one interval: 0 where nothing passes, 1 where something does, 2 where that is not known, 3 where it is not
     known and the four points turn over.
@@ -120,13 +120,13 @@ def _state(x0, x1, four, sides, begin, end, largest):
     return 3 if over else 2
 
 
-@njit
+@njit(forceinline=False)
 def _at(x0, x1, a, t):
     s = 1.0 - t
     return (s * x0[a, 0] + t * x1[a, 0], s * x0[a, 1] + t * x1[a, 1], s * x0[a, 2] + t * x1[a, 2])
 
 
-@njit
+@njit(forceinline=False)
 def _apart(x0, x1, four, sides, t):
     """Squared distance of the corner and the triangle, or of the two sides, at time t."""
     a, b = _at(x0, x1, four[0], t), _at(x0, x1, four[1], t)
@@ -134,7 +134,7 @@ def _apart(x0, x1, four, sides, t):
     return segment_segment(a, b, c, d) if sides else point_triangle(a, b, c, d)
 
 
-@njit
+@njit(forceinline=False)
 def points_pass(x0, x1, four, sides):
     """Whether a corner (the first of four rows) passes through a triangle, or a side (two rows) through another."""
     largest = 0.0
@@ -167,12 +167,12 @@ def points_pass(x0, x1, four, sides):
     return False
 
 
-@njit
+@njit(forceinline=False)
 def _is_in(row, t):
     return row == t[0] or row == t[1] or row == t[2]
 
 
-@njit
+@njit(forceinline=False)
 def triangles_pass(x0, x1, s, t):
     """Whether two triangles, three rows each, pass through each other between x0 and x1, where they do not meet."""
     passing = False

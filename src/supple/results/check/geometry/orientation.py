@@ -49,7 +49,7 @@ def volume_sign(x, a, b, c, d):
     return _exact_volume_sign(x, a, b, c, d)
 
 
-@njit(nogil=False)
+@njit(nogil=False, forceinline=False)
 def _exact_volume_sign(x, a, b, c, d):
     for k in range(3):
         if not (in_range(x[a, k]) and in_range(x[b, k]) and in_range(x[c, k]) and in_range(x[d, k])):
@@ -91,7 +91,7 @@ def area_sign(x, a, b, c, i, j):
     return sign_of(h, n)
 
 
-@njit(nogil=False)
+@njit(nogil=False, forceinline=False)
 def plane_side(x, a, point, normal):
     """Sign of (x_a - point) . normal: 1 on the side that the normal points to."""
     dot = size = 0.0

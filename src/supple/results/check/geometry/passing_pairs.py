@@ -8,7 +8,7 @@ from supple.results.check.geometry.surface_pairs import counts, push_children
 from supple.runtime.kernel_cache import njit
 
 
-@njit
+@njit(forceinline=False)
 def boxes_of_nodes(low, high, order, nodes):
     """The boxes (n, 3) of the nodes of a tree, around boxes (t, 3) at another time than it was built for."""
     node_low, node_high = np.empty((len(nodes), 3)), np.empty((len(nodes), 3))
@@ -26,7 +26,7 @@ def boxes_of_nodes(low, high, order, nodes):
     return node_low, node_high
 
 
-@njit
+@njit(forceinline=False)
 def _moving_boxes_meet(low0, high0, low1, high1, i, j):
     """Whether two boxes, whose sides move from their places at the first time to those at the second, ever meet."""
     begin, end = 0.0, 1.0

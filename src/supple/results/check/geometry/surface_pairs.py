@@ -8,7 +8,7 @@ from supple.results.check.geometry.triangle_pairs import triangles_meet
 from supple.runtime.kernel_cache import njit
 
 
-@njit
+@njit(forceinline=False)
 def counts(a, b, owners, allowed, ignored, total):
     """Whether a pair of triangles is looked at: its owners may touch each other, and it is not ignored itself."""
     if not allowed[owners[a], owners[b]]:
@@ -20,7 +20,7 @@ def counts(a, b, owners, allowed, ignored, total):
     return not (k < len(ignored) and ignored[k] == key)
 
 
-@njit
+@njit(forceinline=False)
 def push(stack, top, i, j):
     if top == len(stack):
         larger = np.empty((2 * len(stack), 2), dtype=np.int64)
@@ -30,7 +30,7 @@ def push(stack, top, i, j):
     return stack, top + 1
 
 
-@njit
+@njit(forceinline=False)
 def push_children(stack, top, nodes, i, j):
     """Put the pairs below a pair of nodes of a tree, not both leaves, on a stack; returns the stack and its top."""
     leaf_i, leaf_j = nodes[i, 2] < 0, nodes[j, 2] < 0
@@ -126,7 +126,7 @@ def closest_pair(x, triangles, owners, allowed, ignored, low, high, order, nodes
     return best, first, second
 
 
-@njit
+@njit(forceinline=False)
 def _neighbours(s, t):
     for i in range(3):
         for j in range(3):

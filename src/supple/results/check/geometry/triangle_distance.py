@@ -5,28 +5,28 @@ import numpy as np
 from supple.runtime.kernel_cache import njit
 
 
-@njit
+@njit(forceinline=False)
 def _dot(u, v):
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-@njit
+@njit(forceinline=False)
 def _minus(u, v):
     return (u[0] - v[0], u[1] - v[1], u[2] - v[2])
 
 
-@njit
+@njit(forceinline=False)
 def _cross(u, v):
     return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
 
 
-@njit
+@njit(forceinline=False)
 def _along(p, a, ab, t):
     d = (a[0] + t * ab[0] - p[0], a[1] + t * ab[1] - p[1], a[2] + t * ab[2] - p[2])
     return _dot(d, d)
 
 
-@njit
+@njit(forceinline=False)
 def point_segment(p, a, b):
     """Squared distance of a point and a segment."""
     ab, ap = _minus(b, a), _minus(p, a)
@@ -35,7 +35,7 @@ def point_segment(p, a, b):
     return _along(p, a, ab, t)
 
 
-@njit
+@njit(forceinline=False)
 def point_triangle(p, a, b, c):
     """Squared distance of a point and a triangle."""
     ab, ac, ap = _minus(b, a), _minus(c, a), _minus(p, a)
@@ -55,7 +55,7 @@ def point_triangle(p, a, b, c):
     return best
 
 
-@njit
+@njit(forceinline=False)
 def segment_segment(p, q, a, b):
     """Squared distance of two segments."""
     u, v, r = _minus(q, p), _minus(b, a), _minus(a, p)
@@ -71,7 +71,7 @@ def segment_segment(p, q, a, b):
     return best
 
 
-@njit
+@njit(forceinline=False)
 def _corners(x, t):
     return (
         (x[t[0], 0], x[t[0], 1], x[t[0], 2]),

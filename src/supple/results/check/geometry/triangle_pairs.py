@@ -12,7 +12,7 @@ from supple.results.check.geometry.orientation import area_sign, volume_sign
 from supple.runtime.kernel_cache import njit
 
 
-@njit
+@njit(forceinline=False)
 def _visible_axes(x, a, b, c):
     """Two coordinates in which the triangle has area, and the sign of that area; (-1, -1, 0) where there are none."""
     for i, j in ((0, 1), (1, 2), (2, 0)):
@@ -22,7 +22,7 @@ def _visible_axes(x, a, b, c):
     return -1, -1, 0
 
 
-@njit
+@njit(forceinline=False)
 def _point_in_flat_triangle(x, p, a, b, c, i, j, sign):
     return (
         area_sign(x, a, b, p, i, j) * sign >= 0
@@ -31,7 +31,7 @@ def _point_in_flat_triangle(x, p, a, b, c, i, j, sign):
     )
 
 
-@njit
+@njit(forceinline=False)
 def _flat_segments_meet(x, p, q, a, b, i, j):
     """Whether two segments in a plane have a point in common, one that no end decides: collinear ones do not count,
     as an end of one lies in the other then."""
@@ -42,7 +42,7 @@ def _flat_segments_meet(x, p, q, a, b, i, j):
     )
 
 
-@njit
+@njit(forceinline=False)
 def segment_meets_triangle(x, p, q, a, b, c):
     """Whether the closed segment and the closed triangle have a point in common."""
     at_p, at_q = volume_sign(x, a, b, c, p), volume_sign(x, a, b, c, q)
@@ -67,14 +67,14 @@ def segment_meets_triangle(x, p, q, a, b, c):
     return first * third >= 0 and second * third >= 0
 
 
-@njit
+@njit(forceinline=False)
 def _one_side(x, a, b, c, p, q, r):
     """Whether p, q, r are all strictly on one side of the plane of a, b, c."""
     sign = volume_sign(x, a, b, c, p)
     return sign != 0 and volume_sign(x, a, b, c, q) == sign and volume_sign(x, a, b, c, r) == sign
 
 
-@njit
+@njit(forceinline=False)
 def _strangers_meet(x, a, b, c, p, q, r):
     if _one_side(x, a, b, c, p, q, r) or _one_side(x, p, q, r, a, b, c):
         return False
@@ -88,7 +88,7 @@ def _strangers_meet(x, a, b, c, p, q, r):
     )
 
 
-@njit
+@njit(forceinline=False)
 def _common_corner(s, t):
     """Of two triangles with one common corner: that one, and the opposite sides (c, a, b, p, q)."""
     for i in range(3):
@@ -98,7 +98,7 @@ def _common_corner(s, t):
     return s[0], s[1], s[2], t[1], t[2]
 
 
-@njit
+@njit(forceinline=False)
 def _folded(x, s, t):
     """Whether two triangles with a common side lie on each other."""
     k = 0  # the corner of s that is not common
@@ -114,7 +114,7 @@ def _folded(x, s, t):
     return sign != 0 and area_sign(x, a, b, t[m], i, j) == sign
 
 
-@njit
+@njit(forceinline=False)
 def triangles_meet(x, s, t):
     """Whether two triangles, three rows of x each, have more in common than the corners and sides that they share."""
     shared = 0
