@@ -40,10 +40,10 @@ from supple.runtime.reached_code import code_of_module, reached_code
 
 # Below this many rows, a loop ends before a second thread has started.
 ROWS = 2_000
-# Bytes of bytecode, those of inlined calls included, up to which an inner function is always inlined. A call that remains
+# Bytes of bytecode, with those of inlined calls, up to which an inner function is always inlined. A call that remains
 # passes the arrays of a tuple one by one and counts their references: a sweep over rows of contacts takes four times as
-# long. Functions with exact sums, which nothing calls often, have `forceinline=False`: their code is long, and exact
-# tests of triangles would take minutes to compile.
+# long. Functions with exact sums have `forceinline=False`: their code is long, and exact tests of triangles would take
+# minutes to compile.
 INLINED = 4_000
 # What decides on machine code besides the kernel, its signature and the processor.
 _SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "USING_SVML")
