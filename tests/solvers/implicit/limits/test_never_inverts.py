@@ -218,7 +218,7 @@ def test_invalid_parameters_are_errors(change, message):
 
 def test_an_iteration_limit_is_reported_and_the_run_continues():
     body, left, right = bar(rubber())
-    pull = sp.Keyframes(times=[0, 0.05], displacements=[[0, 0, 0], [0.5, 0.2, 0]])
+    pull = sp.Keyframes(times=[0, 0.05], displacements=[[0, 0, 0], [1.5, 0.6, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, pull)])
     frames = list(sp.simulate(scene, Implicit(contact=None, max_iterations=4, max_substeps=1), 1 / 60, 3))
     assert len(frames) == 3

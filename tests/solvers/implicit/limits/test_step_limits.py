@@ -29,7 +29,7 @@ def limits() -> tuple[StepLimits, np.ndarray]:
 
 
 def test_a_whole_step_has_no_reason(limits):
-    step, tet, reason = limits[0].largest_step(limits[1], np.zeros_like(limits[1]))
+    step, tet, reason, _ = limits[0].largest_step(limits[1], np.zeros_like(limits[1]))
     assert (step, tet, reason) == (1.0, -1, "")
 
 
@@ -39,7 +39,7 @@ def test_the_tet_that_would_invert_is_named_by_its_body(limits):
     second = guard.guard.system.bodies[1]
     corner = second.vertices.start
     direction[corner] = 3.0 * (x[second.vertices].mean(axis=0) - x[corner])
-    step, tet, reason = guard.largest_step(x, direction)
+    step, tet, reason, _ = guard.largest_step(x, direction)
     assert 0.0 < step < 1.0
     assert corner in guard.guard.system.tets[tet]
     assert reason == f"inversion of tet {tet - second.tets.start} of body 'upper'"
