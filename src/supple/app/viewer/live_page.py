@@ -97,7 +97,7 @@ class LivePage:
         with self._frame_rate.sending():
             self._displayed = snapshot
             self.stage.show(self._moment_builder.moment(snapshot))
-            self.panel.views.move_cameras()
+            self.panel.views.cameras.move()
             self.panel.record.note(self.stage.moment)
             self.panel.show(snapshot)
 

@@ -71,7 +71,7 @@ class Panel:
         send = self._controller.send
         add_keys(
             gui,
-            stage,
+            self.views.cameras,
             {
                 "space": ("Play or pause", self.time.toggle),
                 "N": ("One frame", lambda client: send(client, Step)),

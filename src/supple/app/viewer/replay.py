@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from supple.app.viewer.controls.view.cameras import NOTHING
 from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.controls.view.record_controls import RecordControls
 from supple.app.viewer.controls.view.view_controls import ViewControls, add_keys
@@ -69,11 +70,11 @@ class Replay:
                 "Export as page (HTML)", hint="One file with all frames in this view, for any browser"
             )
         self.overlay = Overlay(gui)
-        self.controls = ViewControls(server, self.stage, self.overlay)
+        self.controls = ViewControls(server, self.stage, self.overlay, followed=NOTHING)
         self.record = RecordControls(server, self.stage)
         add_keys(
             gui,
-            self.stage,
+            self.controls.cameras,
             {
                 "space": ("Play or pause", lambda client: self._toggle()),
                 "N": ("One frame", lambda client: self._go_to(self.frame_at(self._time) + 1)),
@@ -122,7 +123,7 @@ class Replay:
         moment = self.moment(frame)
         if moment is not self.stage.moment:
             self.stage.show(moment)
-            self.controls.move_cameras()
+            self.controls.cameras.move()
             self.record.note(moment)
             self.controls.refresh()
             self.message.content = self._facts(frame)

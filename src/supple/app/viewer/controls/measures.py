@@ -59,7 +59,7 @@ class Measures:
             rows = np.nan_to_num(np.array(self._rows, dtype=np.float64), posinf=0.0, neginf=0.0)
         shown(self.energy, rows, (1, 2))
         shown(self.spin, rows, (3,))
-        lines = sparkline(rows[:, 4], "energy") + sparkline(rows[:, 5], "smallest")
+        lines = sparkline(rows[:, 4], "energy") + sparkline(rows[:, 5], "smallest") if len(rows) > 1 else ""
         now = f'energy {written(rows[-1, 4], "J", 3)}</span><span class="smallest">smallest J {rows[-1, 5]:.3f}'
         self._overlay.show("state", f'{lines}<div class="row"><span class="energy">{now}</span></div>')
 
@@ -89,7 +89,7 @@ def shown(handle: Any, rows: NDArray[np.float64], columns: Sequence[int]) -> Non
 def sparkline(values: NDArray[np.float64], kind: str) -> str:
     """A small plot of values (k,), as SVG in the color of a class; a line in the middle where they do not change."""
     low, high = float(values.min()), float(values.max())
-    across = np.linspace(1.0, 149.0, len(values)) if len(values) > 1 else np.array([1.0])
+    across = np.linspace(1.0, 149.0, len(values))
     up = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
     points = " ".join(f"{x:.0f},{y:.1f}" for x, y in zip(across, 22.0 - 20.0 * up, strict=True))
     return f'<svg class="{kind}" viewBox="0 0 150 24"><polyline points="{points}"/></svg>'

@@ -286,7 +286,7 @@ def test_simultaneous_view_options_all_take_effect(live, visitor, until):
 def test_the_whole_scene_is_visible_from_camera_presets(live, server, visitor, until, preset, ahead):
     view, camera = live.stage.model.view, next(iter(server.get_clients().values())).camera
     before = np.array(camera.position)
-    visitor.set(live.panel.views.camera, preset)
+    visitor.set(live.panel.views.cameras.presets, preset)
 
     def axis():
         """The viewing direction of the camera."""

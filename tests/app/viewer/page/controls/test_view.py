@@ -3,6 +3,7 @@
 import numpy as np
 
 from supple.app.viewer.protocol.commands import Pin, Unpin
+from supple.app.viewer.protocol.snapshots import GrabState
 
 
 def test_the_range_of_the_colors_is_chosen(live, fake, visitor, until):
@@ -66,10 +67,30 @@ def test_two_clicks_fit_the_picture_to_a_body_and_pin_nothing(live, fake, server
 def test_the_camera_follows_a_body(live, fake, server, visitor, until):
     camera = next(iter(server.get_clients().values())).camera
     body = live.stage.model.bodies[1]
-    visitor.set(live.panel.views.follow, "body 1")
+    visitor.set(live.panel.views.cameras.follow, "body 1")
     middle = lambda: live.stage.moment.positions[body.vertices].mean(axis=0)  # noqa: E731
     until(lambda: np.allclose(camera.look_at, middle()))
     away = np.asarray(camera.position) - np.asarray(camera.look_at)
     fake.show(positions=fake.snapshot.positions + np.array([0.0, 3.0, 0.0]))
     until(lambda: np.allclose(camera.look_at, middle()) and middle()[1] > 2.0)
     np.testing.assert_allclose(np.asarray(camera.position) - np.asarray(camera.look_at), away, atol=1e-9)
+
+
+def test_the_camera_stays_with_bodies_that_leave_the_picture(live, fake, server, visitor, until):
+    camera, radius = next(iter(server.get_clients().values())).camera, live.stage.model.view.radius
+    start, x = np.asarray(camera.look_at), fake.snapshot.positions
+    fake.show(positions=x + np.array([0.3 * radius, 0.0, 0.0]))
+    until(lambda: np.allclose(live.stage.moment.positions, fake.snapshot.positions))
+    np.testing.assert_allclose(camera.look_at, start)
+    pulled = GrabState(1, "body 0", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    fake.show(positions=x + np.array([2.0 * radius, 0.0, 0.0]), grabs=(pulled,))
+    until(lambda: live.stage.moment.springs)
+    np.testing.assert_allclose(camera.look_at, start)  # it stands still while a body is pulled
+
+    def moved(way: float) -> bool:
+        fake.show(grabs=())
+        return bool(np.allclose(camera.look_at, start + np.array([way * radius, 0.0, 0.0]), atol=0.01 * radius))
+
+    until(lambda: moved(1.65))
+    fake.show(positions=x)
+    until(lambda: moved(0.0))

@@ -37,6 +37,16 @@ _STYLE = """
 .mantine-Slider-markWrapper:last-child .mantine-Slider-markLabel {
   transform: translate(calc(4px - 100%), .05rem) !important; }
 .mantine-Notifications-root[data-position="top-left"] { top: 172px !important; }
+@media (max-width: 36em) {  /* the panel is below the picture, not above its lower right corner */
+  div:has(> .mantine-Paper-root[style*="max-height"]) { flex-direction: column; }
+  div:has(> .mantine-Paper-root[style*="max-height"]) > :first-child { min-height: 0; }
+  .mantine-Paper-root[style*="max-height"] { position: relative !important; width: 100% !important;
+    max-height: 45% !important; flex-shrink: 0; }
+  .mantine-Paper-root[style*="max-height"] .mantine-ScrollArea-content > div { width: 100% !important; }
+  #supple-start { bottom: 47%; left: 50%; transform: translateX(-50%); }
+  #supple-legend { bottom: calc(45% + 12px); }
+  #supple-arrows { bottom: calc(45% + 84px); }
+}
 """
 
 

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.viewer.controls.controller import sequential
+from supple.app.viewer.controls.view.cameras import ALL, Cameras
 from supple.app.viewer.controls.view.color_scale import ColorRange, arrows_html, bar_html
 from supple.app.viewer.controls.view.overlay import Overlay, set_theme
 from supple.app.viewer.protocol.quantities import written
-from supple.results.view.camera import PRESETS, fit, follow, look_from, stay_above
+from supple.results.view.camera import PRESETS
 from supple.results.view.fields import FIELDS
-from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.results.view.stage import Stage
 
@@ -65,7 +65,7 @@ class Probe:
 Actions = Mapping[str, tuple[str, Callable[[Any], object]]]
 
 
-def add_keys(gui: Any, stage: Stage, actions: Actions) -> None:
+def add_keys(gui: Any, cameras: Cameras, actions: Actions) -> None:
     """Add keys for the camera, and others.
 
     Parameters
@@ -73,20 +73,16 @@ def add_keys(gui: Any, stage: Stage, actions: Actions) -> None:
     actions : by key, the name of an action, and what it does for a visitor
     """
     views: dict[str, tuple[str, Callable[[Any], object]]] = {
-        "F": ("Fit the picture to the bodies", lambda client: fit(client, stage.moment.finite_positions)),
+        "F": ("Fit the picture to the bodies", cameras.fit),
     }
     for number, preset in enumerate(PRESETS, start=1):
-        views[str(number)] = (
-            f"View from: {preset}",
-            lambda client, preset=preset: look_from(client, preset, stage.model.view),
-        )
+        views[str(number)] = (f"View from: {preset}", lambda client, preset=preset: cameras.look(client, preset))
     for key, (name, act) in (*actions.items(), *views.items()):
         command = gui.add_command(name, hotkey=key)
         command.on_trigger(sequential(lambda event, act=act: event.client is not None and act(event.client)))
 
 
 _AXES = ("x", "y", "z")
-_NOTHING = "nothing"
 
 
 class ViewControls:
@@ -96,6 +92,7 @@ class ViewControls:
     ----------
     server : of viser; stage : draws with the options; overlay : has the legend
     changed : called with every change, before it is drawn
+    followed : by the cameras, see `Cameras`
     """
 
     def __init__(
@@ -104,10 +101,10 @@ class ViewControls:
         stage: Stage,
         overlay: Overlay,
         changed: Callable[[ViewOptions], None] = lambda options: None,
+        followed: str = ALL,
     ) -> None:
         self._server, self._stage, self._overlay, self._changed = server, stage, overlay, changed
         self._lock = threading.RLock()
-        self._center: NDArray[np.float64] | None = None
         gui, options = server.gui, stage.options
         with gui.add_folder("View"):
             self.surface = gui.add_dropdown(
@@ -137,21 +134,12 @@ class ViewControls:
             )
             self.dark = gui.add_checkbox("Dark", initial_value=False, hint="A dark page, for all who look at it")
             self._message = gui.add_markdown("", visible=False)
-            self.camera = gui.add_button_group("Camera", PRESETS, hint="Keys 1 to 5; F fits the picture to the bodies")
-            self.follow = gui.add_dropdown(
-                "Follow",
-                self._bodies(),
-                initial_value=_NOTHING,
-                hint="The camera moves with a body; a double click on a body fits the picture to it",
-            )
+            self.cameras = Cameras(server, stage, followed)
         self.probe = Probe(server, stage)
         shape = self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place
         for handle in (*shape, self.velocities, self.contacts, self.stitches):
             handle.on_update(lambda _: self.apply())
         self.dark.on_update(lambda _: self._theme())
-        self.camera.on_click(self._look)
-        server.on_client_connect(self._welcome)
-        self.follow.on_update(lambda _: self._begin_to_follow())
 
     def apply(self) -> None:
         """Draw with the options of the panel."""
@@ -194,62 +182,7 @@ class ViewControls:
         forces = "" if full is not None or not found_some(found) else " Their forces are not known."
         self._message.content = f"Contacts: {'not known' if found is None else len(found)}.{forces}"
         self._message.visible = stage.options.contacts
-        names = self._bodies()
-        if self.follow.options != names:
-            if self.follow.value not in names:
-                self.follow.value = _NOTHING
-            self.follow.options = names
-
-    def move_cameras(self) -> None:
-        """Called with every drawn moment: the cameras of all visitors move with the body that they follow."""
-        center = self._followed()
-        with self._lock:
-            before = self._center
-            if before is None or center is None:
-                return
-            way = center - before
-            if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
-                return
-            self._center = center
-        for client in self._server.get_clients().values():
-            follow(client, way)
-
-    def _bodies(self) -> tuple[str, ...]:
-        return _NOTHING, *(body.name for body in self._stage.model.bodies)
-
-    def _followed(self) -> NDArray[np.float64] | None:
-        """(3,) the center of the body that is followed [m], or None."""
-        moment = self._stage.moment
-        rows = (body.vertices for body in moment.model.bodies if body.name == self.follow.value)
-        chosen = next(rows, None) if self.follow.value != _NOTHING else None
-        return None if chosen is None else moment.finite_positions[chosen].mean(axis=0)
-
-    def _begin_to_follow(self) -> None:
-        center = self._followed()
-        with self._lock:
-            self._center = center
-        if center is not None:
-            for client in self._server.get_clients().values():
-                follow(client, center - np.asarray(client.camera.look_at))
-
-    def _welcome(self, client: Any) -> None:
-        """In a narrow picture, the camera is farther away than in the one that all get at first."""
-        if client.camera.aspect < 1.0:
-            look_from(client, PRESETS[0], self._stage.model.view)
-        was_above = False
-
-        def keep_above(_: Any) -> None:
-            """A camera under the floor would see nothing."""
-            nonlocal was_above
-            floor = floor_shadow(self._stage.model, 1)
-            if floor is not None:
-                was_above = stay_above(client, floor.disc[0], self._stage.model.view, was_above=was_above)
-
-        client.camera.on_update(keep_above)
-
-    def _look(self, event: Any) -> None:
-        if event.client is not None:
-            look_from(event.client, self.camera.value, self._stage.model.view)
+        self.cameras.refresh()
 
 
 def found_some(points: NDArray[np.float64] | None) -> bool:

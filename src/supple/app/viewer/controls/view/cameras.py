@@ -1,0 +1,129 @@
+"""The cameras of all visitors: presets, and bodies that they follow."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.results.view.bounds import View
+from supple.results.view.camera import PRESETS, fit, follow, look_from, stay_above
+from supple.results.view.floor_shadow import floor_shadow
+from supple.results.view.stage import Stage
+
+ALL, NOTHING = "all bodies", "nothing"
+# The center of all bodies may move so far from its start, as a share of the radius of the scene, without the cameras.
+_FREE = 0.35
+_SHARE = 0.15  # of the way to all bodies that cameras go with one picture
+
+
+class Cameras:
+    """Inputs for the cameras.
+
+    Parameters
+    ----------
+    server : of viser; stage : has the bodies; followed : `ALL` or `NOTHING` at first
+    """
+
+    def __init__(self, server: Any, stage: Stage, followed: str) -> None:
+        self._server, self._stage = server, stage
+        self._lock = threading.RLock()
+        self._start = stage.moment.finite_positions.mean(axis=0)
+        self._center: NDArray[np.float64] | None = self._start if followed == ALL else None
+        self.presets = server.gui.add_button_group(
+            "Camera", PRESETS, hint="Keys 1 to 5; F fits the picture to the bodies"
+        )
+        self.follow = server.gui.add_dropdown(
+            "Follow",
+            self._names(),
+            initial_value=followed,
+            hint="The camera moves with a body, or with all bodies where they leave the middle of the picture; a "
+            "double click on a body fits the picture to it",
+        )
+        self.presets.on_click(lambda event: event.client is not None and self.look(event.client, self.presets.value))
+        self.follow.on_update(lambda _: self._begin())
+        server.on_client_connect(self._welcome)
+
+    def refresh(self) -> None:
+        """Offer the bodies that there are."""
+        names = self._names()
+        if self.follow.options != names:
+            if self.follow.value not in names:
+                self.follow.value = NOTHING
+            self.follow.options = names
+
+    def move(self) -> None:
+        """Called with every drawn moment: the cameras of all visitors move with what they follow."""
+        moment, center = self._stage.moment, self._followed()
+        with self._lock:
+            if self._center is None or center is None:
+                return
+            way = center - self._center
+            if self.follow.value == ALL:
+                if moment.springs or moment.pusher is not None:  # a camera that moves would move the mouse's target
+                    return
+                way *= _SHARE
+            if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
+                return
+            self._center = self._center + way
+        for client in self._server.get_clients().values():
+            follow(client, way)
+
+    def fit(self, client: Any) -> None:
+        """Show one visitor all bodies as they are."""
+        fit(client, self._stage.moment.finite_positions)
+
+    def look(self, client: Any, preset: str) -> None:
+        """Move the camera of one visitor to a preset."""
+        look_from(client, preset, self._view())
+
+    def _view(self) -> View:
+        """The view of the scene, moved as far as the cameras were moved with all bodies."""
+        view = self._stage.model.view
+        if self._center is None or self.follow.value != ALL:
+            return view
+        way = self._center - self._start
+        if not way.any():
+            return view
+        return replace(view, low=view.low + way, high=view.high + way, outline=view.outline + way)
+
+    def _names(self) -> tuple[str, ...]:
+        return ALL, NOTHING, *(body.name for body in self._stage.model.bodies)
+
+    def _followed(self) -> NDArray[np.float64] | None:
+        """(3,) the center of the body that is followed [m], that of all bodies beyond where it is free, or None."""
+        x, chosen = self._stage.moment.finite_positions, self.follow.value
+        if chosen == ALL:
+            way = x.mean(axis=0) - self._start
+            free = _FREE * self._stage.model.view.radius
+            return self._start + max(0.0, 1.0 - free / max(float(np.linalg.norm(way)), free)) * way
+        rows = (body.vertices for body in self._stage.model.bodies if body.name == chosen)
+        of_body = next(rows, None) if chosen != NOTHING else None
+        return None if of_body is None else x[of_body].mean(axis=0)
+
+    def _begin(self) -> None:
+        center = self._followed()
+        with self._lock:
+            self._center = center
+        if center is not None and self.follow.value != ALL:
+            for client in self._server.get_clients().values():
+                follow(client, center - np.asarray(client.camera.look_at))
+
+    def _welcome(self, client: Any) -> None:
+        """In a narrow picture, the camera is farther away than in the one that all get at first."""
+        view = self._view()
+        if client.camera.aspect < 1.0 or view is not self._stage.model.view:
+            look_from(client, PRESETS[0], view)
+        was_above = False
+
+        def keep_above(_: Any) -> None:
+            """A camera under the floor would see nothing."""
+            nonlocal was_above
+            floor = floor_shadow(self._stage.model, 1)
+            if floor is not None:
+                was_above = stay_above(client, floor.disc[0], self._stage.model.view, was_above=was_above)
+
+        client.camera.on_update(keep_above)
