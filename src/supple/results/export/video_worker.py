@@ -23,6 +23,7 @@ from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.look import Color, Look, background, floor_disc, theme
 from supple.results.view.model import Model, Moment
+from supple.results.view.occlusion import occlusion
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
@@ -49,6 +50,7 @@ class Studio:
         self._add_lights(pyvista)
         self._field = COLORS.get(film.color)
         self._meshes: list[tuple[Any, SoftSurface | RigidSurface]] = []
+        self._shaded = film.shadows
         ends = self._ends(moments)
         self._legend = None if self._field is None or ends is None else legend(self._field, ends, film.size, shown)
         for flat in surfaces_of(model, skins=film.surface == "skin"):
@@ -61,6 +63,9 @@ class Studio:
                 mesh.point_data["field"] = np.zeros(mesh.n_points)
                 colors = {"cmap": color_map(self._field), "clim": ends, "show_scalar_bar": False}
                 look = _FIELD | {"scalars": "field"} | colors
+            elif self._shaded:
+                mesh.point_data["color"] = np.tile(np.array(surface.color, dtype=np.uint8), (mesh.n_points, 1))
+                look = _phong(surface.look) | {"scalars": "color", "rgb": True}
             room = surface.room
             opacity = 1.0 if room else surface.opacity
             # Sides that cannot be seen are not drawn: a third of the time of a renderer on a processor.
@@ -102,16 +107,19 @@ class Studio:
 
     def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
         """(height, width, 3) of a moment, at a share of the film's length."""
-        points = []
+        points, normals = [], []
         nodal = None if self._field is None else nodal_values(moment, self._field.values(moment))
         for mesh, surface in self._meshes:
             x = surface.at(moment)
             points.append(x)
             mesh.points = x.astype(np.float32)
-            mesh.point_data["Normals"] = vertex_normals(x, surface.triangles).astype(np.float32)
+            normals.append(vertex_normals(x, surface.triangles))
+            mesh.point_data["Normals"] = normals[-1].astype(np.float32)
             mesh.GetPointData().SetActiveNormals("Normals")
             if nodal is not None and "field" in mesh.point_data and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = surface.of(np.repeat(nodal[:, None], 3, axis=1))[:, 0]
+        if self._shaded:
+            self._shade(points, normals)
         if self._shadow is not None:
             drawn = zip(points, (surface for _, surface in self._meshes), strict=True)
             cast = [(x, surface.triangles) for x, surface in drawn if surface.casts_shadow]
@@ -123,6 +131,16 @@ class Studio:
             return image
         colors, opaque = self._legend
         return np.round(image * (1.0 - opaque) + colors * opaque).astype(np.uint8)
+
+    def _shade(self, points: list[NDArray[np.float64]], normals: list[NDArray[np.float64]]) -> None:
+        """Darken what little light reaches."""
+        surfaces = [surface for _, surface in self._meshes]
+        facing = [-n if surface.room else n for n, surface in zip(normals, surfaces, strict=True)]
+        drawn = [(x, surface.triangles, n) for x, surface, n in zip(points, surfaces, facing, strict=True)]
+        for (mesh, surface), dark in zip(self._meshes, occlusion(drawn, self._bodies), strict=True):
+            if "color" in mesh.point_data:
+                light = (1.0 - dark)[:, None] * np.array(surface.color)
+                mesh.point_data["color"] = light.astype(np.uint8)
 
     def _aim(self, points: NDArray[np.float64], share: float) -> None:
         center, away, distance = placed(self._film, self._view, points, share)
