@@ -127,7 +127,7 @@ def _run_decimation(vertices: Any, triangles: Any, options: dict[str, Any], note
 
     # The library collapses all edges below an error that grows the faster, the more aggressive it is: with its default
     # alone, a box of 1,584 triangles that lies at an angle loses a third of its volume on the way to 100.
-    for aggressiveness in range(1, 10):
+    for aggressiveness in range(options["first"], 10):
         if len(triangles) <= options["triangles"]:
             break
         reduced = fast_simplification.simplify(
