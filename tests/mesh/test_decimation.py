@@ -114,3 +114,21 @@ def test_new_faults_are_refused() -> None:
 def test_another_volume_is_refused() -> None:
     with pytest.raises(MeshingError, match=r"to 12 triangles: the volume changes from 0.519\d* to .* m\^3"):
         decimate_surface(BALL, 12)
+
+
+def test_a_knot_is_reduced_without_folds():
+    """The first order of collapses folds it at this number of triangles."""
+    t, turn = np.linspace(0.0, 2.0 * np.pi, 241)[:-1, None], np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
+    center = np.hstack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)])
+    ahead = np.roll(center, -1, axis=0) - np.roll(center, 1, axis=0)
+    side = np.cross(ahead, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side, axis=1)[:, None]
+    across = np.cross(ahead, side)
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    ring = np.cos(turn)[None, :, None] * side[:, None] + np.sin(turn)[None, :, None] * across[:, None]
+    i, j = (each.ravel() for each in np.meshgrid(np.arange(240), np.arange(16), indexing="ij"))
+    a, b, c, d = ((i + p) % 240 * 16 + (j + q) % 16 for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    triangles = np.concatenate([np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)])
+    knot = sp.SurfaceMesh((center[:, None] + 0.588 * ring).reshape(-1, 3) / 30.0, triangles)
+    assert knot.check().ok
+    assert decimate_surface(knot, 332).check().ok

@@ -18,8 +18,8 @@ _LEAST = 4
 # Of the volume: beyond it the shape is another one.
 _LARGEST_CHANGE = 0.1
 
-# How aggressive the collapses are at first: the order of collapses decides by chance whether thin parts get folds, and a
-# knot that got some with the first number got none with one of the others.
+# How aggressive the collapses are at first: their order decides by chance whether thin parts get folds, and a knot that
+# got some with the first number got none with one of the others.
 _FIRST = (1, 4, 5)
 
 # By 60 degrees about (1, 1, 1).
