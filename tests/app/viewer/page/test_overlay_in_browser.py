@@ -58,6 +58,19 @@ def fresh(page):
     assert page.screen.errors == []
 
 
+def test_in_a_narrow_window_the_panel_is_below_the_picture(fresh):
+    fresh.tab.set_viewport_size({"width": 400, "height": 800})
+    panel = fresh.tab.locator('.mantine-Paper-root[style*="max-height"]')
+    box = lambda part: part.first.bounding_box()  # noqa: E731
+    fresh.screen.wait(
+        lambda: panel.count() == 1 and box(panel)["width"] == 400 and box(fresh.tab.locator("canvas"))["height"] < 500,
+        "the panel below the picture",
+    )
+    canvas, start = box(fresh.tab.locator("canvas")), box(fresh.tab.locator("#supple-start label"))
+    assert canvas["y"] + canvas["height"] <= box(panel)["y"] + 1.0
+    assert start["y"] + start["height"] < box(panel)["y"]
+
+
 def test_the_panel_has_the_title_of_the_scene(fresh):
     assert fresh.tab.get_by_text("boxes & <more>").count() == 1
 
