@@ -33,6 +33,7 @@ class Cameras:
         self._lock = threading.RLock()
         self._start = stage.moment.finite_positions.mean(axis=0)
         self._center: NDArray[np.float64] | None = self._start if followed == ALL else None
+        self._time = stage.moment.time  # at which the cameras have moved last
         self.presets = server.gui.add_button_group(
             "Camera", PRESETS, hint="Keys 1 to 5; F fits the picture to the bodies"
         )
@@ -65,10 +66,10 @@ class Cameras:
             if self.follow.value == ALL:
                 if moment.springs or moment.pusher is not None:  # a camera that moves would move the mouse's target
                     return
-                way *= _SHARE
+                way *= _SHARE if moment.time >= self._time else 1.0  # back at the start, nothing moves any more
             if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
                 return
-            self._center = self._center + way
+            self._center, self._time = self._center + way, moment.time
         for client in self._server.get_clients().values():
             follow(client, way)
 
