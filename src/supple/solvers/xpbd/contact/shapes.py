@@ -122,7 +122,7 @@ def _walls_of(x, points, shapes, wanted, parameters, begin, end, gaps, normals, 
 def kernel_of(function: Callable[..., Any]) -> Callable[..., Any]:
     """`_walls_of` with `contact` replaced, compiled; its name contains a digest, by which Numba's cache tells it."""
     copy = FunctionType(_walls_of.__code__, {**_walls_of.__globals__, "contact": function}, _walls_of.__name__)
-    copy.__qualname__ = f"{_walls_of.__qualname__}_{reached_code(copy).hex()[:14]}"
+    copy.__qualname__ = f"{_walls_of.__qualname__}.{reached_code(copy).hex()[:14]}"
     copy.__module__ = _walls_of.__module__
     return njit(cache=True)(copy)
 
