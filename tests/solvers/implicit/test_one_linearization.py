@@ -7,6 +7,7 @@ import pytest
 
 import supple as sp
 from supple.mesh import shapes
+from supple.runtime.threads import numba_threads
 from supple.solvers.xpbd.assessment.surfaces import SurfaceCheck, crossings
 from supple.solvers.xpbd.contact.contact import mean_edge_length
 
@@ -105,3 +106,16 @@ def test_a_drop_comes_to_rest_at_the_height_of_the_whole_method():
     ends = [last(sp.Scene([box], FLOOR), most, 60) for most in (120, 1)]
     assert ends[1].report.kinetic_energy < 1e-6
     assert ends[1].positions["box"][:, 1].mean() == pytest.approx(ends[0].positions["box"][:, 1].mean(), abs=2e-5)
+
+
+def test_threads_and_a_start_from_a_state_do_not_change_a_bit():
+    def states(steps: int, threads: int | None, start: sp.State | None = None) -> list[sp.State]:
+        with numba_threads(threads):
+            solver = sp.Implicit(max_iterations=1)
+            return [frame.state for frame in sp.simulate(tower(), solver, 1 / 60, steps, start=start)]
+
+    alone, together = states(16, 1), states(16, None)
+    continued = states(8, 1, alone[7])
+    for other in (together[-1], continued[-1]):
+        np.testing.assert_array_equal(other.positions, alone[-1].positions)
+        np.testing.assert_array_equal(other.velocities, alone[-1].velocities)
