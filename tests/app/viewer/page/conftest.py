@@ -145,16 +145,19 @@ class Visitor:
         if reads:
             threading.Thread(target=self._read, daemon=True).start()
         # The server counts a visitor after it has sent its camera.
+        self.report_camera(position=(0.0, 0.0, -5.0), look_at=(0.0, 0.0, 0.0))
+
+    def report_camera(self, position, look_at) -> None:
         self.send(
             "ViewerCameraMessage",
             wxyz=(1.0, 0.0, 0.0, 0.0),
-            position=(0.0, 0.0, -5.0),
+            position=_plain(position),
             fov=0.6,
             near=0.01,
             far=100.0,
             image_height=480,
             image_width=640,
-            look_at=(0.0, 0.0, 0.0),
+            look_at=_plain(look_at),
             up_direction=(0.0, -1.0, 0.0),
         )
 

@@ -94,3 +94,24 @@ def test_the_camera_stays_with_bodies_that_leave_the_picture(live, fake, server,
     until(lambda: moved(1.65))
     fake.show(positions=x)
     until(lambda: moved(0.0))
+
+
+def test_a_late_report_of_the_browser_does_not_move_the_camera_away(live, fake, server, visitor, until):
+    camera, radius = next(iter(server.get_clients().values())).camera, live.stage.model.view.radius
+    start, eye, x = np.asarray(camera.look_at), np.asarray(camera.position), fake.snapshot.positions
+    wished = start + np.array([1.65 * radius, 0.0, 0.0])
+
+    def there() -> bool:
+        fake.show(positions=x + np.array([2.0 * radius, 0.0, 0.0]))
+        return bool(np.allclose(camera.look_at, wished, atol=0.01 * radius))
+
+    near = lambda place: bool(np.allclose(camera.look_at, place, atol=0.05 * radius))  # noqa: E731 - it still glides
+    until(there)
+    reports = []
+    camera.on_update(lambda _: reports.append(1))
+    visitor.report_camera(position=eye, look_at=start)  # sent before the moves came
+    until(lambda: reports and near(wished))
+    np.testing.assert_allclose(np.asarray(camera.position) - np.asarray(camera.look_at), eye - start, atol=1e-9)
+    visitor.report_camera(position=eye + 7.0 * radius, look_at=start + 7.0 * radius)  # the visitor moves it
+    until(lambda: len(reports) == 2)
+    until(lambda: near(start + 7.0 * radius))

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.app.viewer.controls.view.carried_camera import CarriedCamera
 from supple.results.view.bounds import View
-from supple.results.view.camera import PRESETS, fit, follow, look_from, stay_above
+from supple.results.view.camera import PRESETS, fit, look_from, stay_above
 from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.stage import Stage
 
@@ -31,6 +33,7 @@ class Cameras:
     def __init__(self, server: Any, stage: Stage, followed: str) -> None:
         self._server, self._stage = server, stage
         self._lock = threading.RLock()
+        self._carried: dict[int, CarriedCamera] = {}  # by the number of the visitor
         self._start = stage.moment.finite_positions.mean(axis=0)
         self._center: NDArray[np.float64] | None = self._start if followed == ALL else None
         self._time = stage.moment.time  # at which the cameras have moved last
@@ -47,6 +50,7 @@ class Cameras:
         self.presets.on_click(lambda event: event.client is not None and self.look(event.client, self.presets.value))
         self.follow.on_update(lambda _: self._begin())
         server.on_client_connect(self._welcome)
+        server.on_client_disconnect(lambda client: self._carried.pop(client.client_id, None))
 
     def refresh(self) -> None:
         """Offer the bodies that there are."""
@@ -70,16 +74,22 @@ class Cameras:
             if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
                 return
             self._center, self._time = self._center + way, moment.time
-        for client in self._server.get_clients().values():
-            follow(client, way)
+        self._carry(lambda client: way)
 
     def fit(self, client: Any) -> None:
         """Show one visitor all bodies as they are."""
+        self._carried[client.client_id].forget()
         fit(client, self._stage.moment.finite_positions)
 
     def look(self, client: Any, preset: str) -> None:
         """Move the camera of one visitor to a preset."""
+        self._carried[client.client_id].forget()
         look_from(client, preset, self._view())
+
+    def _carry(self, way_of: Callable[[Any], NDArray[np.float64]]) -> None:
+        for client in self._server.get_clients().values():
+            if client.client_id in self._carried:
+                self._carried[client.client_id].carry(way_of(client))
 
     def _view(self) -> View:
         """The view of the scene, moved as far as the cameras were moved with all bodies."""
@@ -110,14 +120,15 @@ class Cameras:
         with self._lock:
             self._center = center
         if center is not None and self.follow.value != ALL:
-            for client in self._server.get_clients().values():
-                follow(client, center - np.asarray(client.camera.look_at))
+            self._carry(lambda client: center - np.asarray(client.camera.look_at))
 
     def _welcome(self, client: Any) -> None:
         """In a narrow picture, the camera is farther away than in the one that all get at first."""
         view = self._view()
         if client.camera.aspect < 1.0 or view is not self._stage.model.view:
             look_from(client, PRESETS[0], view)
+        carried = self._carried[client.client_id] = CarriedCamera(client, self._stage.model.view.radius)
+        client.camera.on_update(lambda _: carried.keep())
         was_above = False
 
         def keep_above(_: Any) -> None:
