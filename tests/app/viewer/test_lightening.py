@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.engine.scene.lightening import lightened
+from supple.app.viewer.engine.scene.lightening import lighter, linearized
 from supple.app.viewer.engine.scene.live_scene import LiveScene
+from supple.app.viewer.engine.simulation_process import _in_time
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.mesh.meshing.coarser import coarser
 
@@ -31,50 +32,63 @@ def slow() -> LiveScene:
 
 
 def test_bodies_of_a_slow_scene_get_fewer_tets_and_keep_their_surface(slow):
-    [(source, line)] = lightened(slow)
+    source, line = lighter(slow, 0.0)
     before, after = slow.source.scene.bodies[0], source.scene.bodies[0]
     assert len(after.mesh.tets) < 0.8 * len(before.mesh.tets)
     np.testing.assert_allclose(after.skin.volume, before.mesh.surface.volume, rtol=1e-12)
     assert after.mesh is source.scene.bodies[1].mesh  # equal bodies share their mesh
     assert f"{2 * len(after.mesh.tets):,} tets instead of {2 * len(before.mesh.tets):,}" in line
+    assert linearized(slow, 20.0) is None  # bodies that touch each other
 
 
 def test_a_scene_that_keeps_up_with_time_stays_as_it_is(slow):
     slow.source, source = replace(slow.source, dt=10.0), slow.source
     try:
-        assert list(lightened(slow)) == []
-        assert next(lightened(slow, measured=20.0))[1].startswith("the page simulates ")
+        assert lighter(slow, 0.0) is None
+        assert lighter(slow, 20.0)[1].startswith("simulates ")
     finally:
         slow.source = source
 
 
-def test_a_body_alone_gets_fewer_tets():
-    scene = sp.Scene([sp.Body("ball", sp.shapes.sphere(0.1, 0.03), JELLY)])
-    live = LiveScene(LiveSource("ball", scene, sp.XPBD(substeps=10), 1e-4))
-    live.step()
-    [(source, _)] = lightened(live)
-    assert len(source.scene.bodies[0].mesh.tets) < 0.8 * len(live.system.tets)
-
-
 def test_bodies_that_something_refers_to_keep_their_meshes():
-    [(source, _)] = lightened(stepped(pins=[sp.Pin("ball 0", vertices=[0])]))
+    source, _ = lighter(stepped(pins=[sp.Pin("ball 0", vertices=[0])]), 0.0)
     pinned, free = source.scene.bodies
     assert pinned.skin is None
     assert len(free.mesh.tets) < len(pinned.mesh.tets)
 
 
-def test_a_stiff_body_alone_is_simulated_with_the_implicit_solver():
-    stiff = sp.StableNeoHookean(youngs=1e8, poisson=0.4)
-    scene = sp.Scene([sp.Body("ball", sp.shapes.sphere(0.1, 0.05), stiff)])
-    live = LiveScene(LiveSource("ball", scene, sp.XPBD(substeps=101), 1e-3))
+def alone(solver, edge=0.05) -> LiveScene:
+    scene = sp.Scene([sp.Body("ball", sp.shapes.sphere(0.1, edge), replace(JELLY, youngs=1e8))])
+    live = LiveScene(LiveSource("ball", scene, solver, 1e-3, real_time=True))
     live.step()
-    (source, line), (lighter, _) = lightened(live)
-    assert isinstance(source.solver, sp.Implicit)
-    assert source.scene is scene
-    assert "takes 101 substeps" in line
-    assert isinstance(lighter.solver, sp.XPBD)
+    return live
+
+
+def test_a_slow_body_alone_is_simulated_with_one_linearization():
+    live = alone(sp.XPBD(substeps=101))
+    source, line = linearized(live, 20.0)
+    assert source.solver.max_iterations == 1
+    assert source.scene is live.source.scene
+    assert "instead of XPBD with 101 substeps" in line
     live.source = replace(live.source, solver_given=True)
-    assert [type(source.solver) for source, _ in lightened(live)] == [sp.XPBD]
+    assert linearized(live, 20.0) is None
+    slow = alone(sp.Implicit(tolerance=1e-2))
+    assert linearized(slow, 20.0)[0].solver == sp.Implicit(tolerance=1e-2, max_iterations=1)
+    assert linearized(slow, 0.0) is None
+    assert linearized(alone(sp.Implicit(max_iterations=2)), 20.0) is None
+    assert linearized(alone(sp.Implicit(integrator="newmark")), 20.0) is None
+
+
+def test_the_page_takes_what_is_fastest_and_says_so(monkeypatch):
+    live, seconds = alone(sp.XPBD(substeps=101), 0.03), {sp.XPBD: 3.0, sp.Implicit: 2.0}
+    tets = len(live.system.tets)
+    monkeypatch.setattr(LiveScene, "warm_up", lambda self, steps=1: seconds[type(self.setup.solver)])
+    chosen, line = _in_time(live)
+    assert chosen.setup.solver.max_iterations == 1
+    assert line.startswith("to keep up with real time, the page solves one linearization of each step")
+    assert len(chosen.system.tets) == tets  # fewer took as long
+    seconds[sp.Implicit] = 4.0
+    assert _in_time(live) == (live, "")
 
 
 def test_frames_are_repeated_with_at_most_twice_the_usual_substeps(monkeypatch):

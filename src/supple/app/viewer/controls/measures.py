@@ -108,7 +108,9 @@ def measures_text(snapshot: Snapshot) -> str:
     lines += [_joint_text(name, joint) for name, joint in readings[:_MOST_JOINTS]]
     if len(readings) > _MOST_JOINTS:
         lines.append(f"and {len(readings) - _MOST_JOINTS} more joints")
-    if measures.status != "converged":
+    if measures.status == "linearized":  # as was chosen
+        lines.append(f"{plain(measures.status)}: {plain(measures.message)}")
+    elif measures.status != "converged":
         lines.append(f'<span style="color: #d92b2b">{plain(measures.status)}: {plain(measures.message)}</span>')
     return "  \n".join(lines)
 

@@ -7,8 +7,6 @@ import logging
 import os
 import signal
 import threading
-import time
-from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
@@ -64,29 +62,32 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
     loop.run()
 
 
+_STEPS = 3  # of which the fastest counts: the first ones allocate memory
+
+
 def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
-    """The live scene, or where it is slower than real time one that is faster; and one line about it."""
-    from supple.app.viewer.engine.scene.lightening import lightened
+    """The live scene, or where it is slower than real time one that is faster; and what was chosen."""
+    from supple.app.viewer.engine.scene.lightening import lighter, linearized
     from supple.app.viewer.engine.scene.live_scene import LiveScene
 
     if not live.source.real_time:
         return live, ""
-    for source, line in lightened(live, min(_seconds(live.warm_up) for _ in range(2))):
+    seconds, chosen = live.warm_up(_STEPS), []
+    for choice in (linearized, lighter):
+        found = choice(live, seconds)
+        if found is None:
+            continue
         try:
-            lighter = LiveScene(source)
-            lighter.warm_up()
+            other = LiveScene(found[0])
+            other.warm_up()
         except SuppleError:  # its surfaces are others, and may intersect at the start; or the solver lacks something
             continue
-        if lighter.report.status.can_go_on:
-            return lighter, line
-    return live, ""
-
-
-def _seconds(call: Callable[[], object]) -> float:
-    """How long a call takes; of a process that shares its core, only its own part [s]."""
-    began, own = time.perf_counter(), time.process_time()
-    call()
-    return min(time.perf_counter() - began, time.process_time() - own)
+        taken = other.warm_up(_STEPS)
+        if other.report.status.can_go_on and taken < seconds:
+            live, seconds = other, taken
+            chosen.append(found[1])
+    line = f"to keep up with real time, the page {' and '.join(chosen)}; supple view --full keeps the scene as it is"
+    return live, line if chosen else ""
 
 
 def _read(commands: Connection, inbox: CommandQueue) -> None:

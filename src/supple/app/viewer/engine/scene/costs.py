@@ -1,4 +1,4 @@
-"""What a frame of XPBD takes on one core: for choices that keep a page as fast as real time."""
+"""What a frame takes on one core: for choices that keep a page as fast as real time."""
 
 from __future__ import annotations
 
@@ -14,14 +14,19 @@ _FRAME, _BODY, _TET_ALONE, _TET_IN_PILE = 1e-3, 5e-4, 1.3e-7, 3e-7
 _SHARE = 0.9  # of the time of a frame that the solver may take
 
 
-def in_substeps(system: System, substeps: int) -> float:
-    """The time of the substeps of a frame without contact of a body with itself, about [s]."""
-    return substeps * len(system.tets) * (_TET_ALONE if len(system.bodies) == 1 else _TET_IN_PILE)
+def taken(system: System, substeps: int, measured: float) -> float:
+    """The time of a frame without what each body costs [s]: as measured, or what substeps will take in a pile."""
+    each = substeps * len(system.tets) * (_TET_ALONE if len(system.bodies) == 1 else _TET_IN_PILE)
+    return max(each, measured - _fixed(system))
 
 
 def allowed(system: System, dt: float) -> float:
-    """The time that the substeps of a frame of `dt` [s] may take [s]."""
-    return max(_SHARE * dt - _FRAME - _BODY * len(system.bodies), 0.1 * dt)
+    """The time, without what each body costs, that a frame of `dt` [s] may take [s]."""
+    return max(_SHARE * dt - _fixed(system), 0.1 * dt)
+
+
+def _fixed(system: System) -> float:
+    return _FRAME + _BODY * len(system.bodies)
 
 
 def without_long_repetitions(solver: Solver, system: System, dt: float, usual: int) -> Solver:

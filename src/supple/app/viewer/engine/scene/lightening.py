@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import fields, replace
 
 import numpy as np
 
-from supple.app.viewer.engine.scene.costs import allowed, in_substeps
+from supple.app.viewer.engine.scene.costs import allowed, taken
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.scene.solvers import SOLVERS, kind_of
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -18,39 +17,48 @@ from supple.mesh.tetmesh import TetMesh
 from supple.mesh.topology import without_unused
 from supple.scene.body import Body
 from supple.scene.scene import Scene
+from supple.solvers.implicit.solver import Implicit
 
 _FEWEST = 60  # tets of a body: fewer do not bend
-_LEAST_GAIN = 0.8  # what is not lighter than this is not worth another shape
-# So many substeps for the stiffness of one body take longer than the two to five iterations of `Implicit`.
-_STIFF = 100
+_LEAST_GAIN = 0.8  # what is not faster, or lighter, than this is not worth another method or shape
 
 
-def lightened(live: LiveScene, measured: float = 0.0) -> Iterator[tuple[LiveSource, str]]:
-    """Sources that keep up with real time, or nearly, and one line about each, the best one first.
+def linearized(live: LiveScene, measured: float) -> tuple[LiveSource, str] | None:
+    """The source with one linearization of the implicit step where it is too slow, and what the page does then.
 
-    There is none where the scene keeps up with real time, or no source is faster. One stiff body gets the solver
-    `Implicit`.
+    For one body whose solver nobody has chosen for the page. With many bodies XPBD is faster.
+
+    Parameters
+    ----------
+    live : after a step; measured : what that took [s]
+    """
+    source, before = live.source, kind_of(live.source.solver)
+    if len(source.scene.bodies) > 1 or source.solver_given or _slowness(live, measured) <= 1.0:
+        return None
+    solver = source.solver if before == "implicit" else SOLVERS["implicit"]()
+    if not isinstance(solver, Implicit) or solver.max_iterations <= 3 or solver.integrator in ("static", "newmark"):
+        return None
+    whole = "all its iterations" if before == "implicit" else f"XPBD with {live.report.iterations} substeps"
+    line = f"solves one linearization of each step (status linearized) instead of {whole}"
+    return replace(source, solver=replace(solver, max_iterations=1)), line
+
+
+def lighter(live: LiveScene, measured: float) -> tuple[LiveSource, str] | None:
+    """The source with fewer tets where it is too slow, and what the page does then; None where no mesh is lighter.
 
     Bodies that something refers to, such as a pin or a stitch, keep their meshes, and so do bodies with several
     materials, with quadratic tets or with a deformed start. Skins stay; a body without one is drawn with its surface.
 
     Parameters
     ----------
-    live : after a step, which tells the number of substeps; measured : what a step takes [s], where that is known
+    live : after a step; measured : what that took [s]
     """
-    source, scene, substeps = live.source, live.source.scene, live.report.iterations
-    tets, bodies = len(live.system.tets), len(scene.bodies)
-    taken, may_take = max(in_substeps(live.system, substeps), measured), allowed(live.system, source.dt)
-    if kind_of(source.solver) != "xpbd" or taken <= may_take:
-        return
-    if bodies == 1 and substeps > _STIFF and not source.solver_given:
-        line = (
-            f"the page simulates with Implicit: XPBD takes {substeps} substeps a frame for so stiff a body, and more "
-            "time; supple view --full keeps the solver"
-        )
-        yield replace(source, solver=SOLVERS["implicit"]()), line
-    # The number of substeps falls with the length of edges: with the third root of the number of tets.
-    share = (may_take / taken) ** 0.75
+    source, scene, tets = live.source, live.source.scene, len(live.system.tets)
+    slowness = _slowness(live, measured)
+    if slowness <= 1.0:
+        return None
+    # The substeps of XPBD fall with the length of edges: with the third root of the number of tets.
+    share = slowness ** (-0.75 if kind_of(source.solver) == "xpbd" else -1.0)
     made: dict[int, TetMesh | None] = {}
     changed = []
     for body in scene.bodies:
@@ -64,12 +72,15 @@ def lightened(live: LiveScene, measured: float = 0.0) -> Iterator[tuple[LiveSour
         changed.append(body)
     fewer = sum(len(body.mesh.tets) for body in changed)
     if fewer > _LEAST_GAIN * tets:
-        return
-    line = (
-        f"the page simulates {fewer:,} tets instead of {tets:,}, with the same skins, to keep up with real time; "
-        "supple view --full keeps the meshes"
-    )
-    yield replace(source, scene=replace(scene, bodies=changed)), line
+        return None
+    line = f"simulates {fewer:,} tets instead of {tets:,}, with the same skins"
+    return replace(source, scene=replace(scene, bodies=changed)), line
+
+
+def _slowness(live: LiveScene, measured: float) -> float:
+    """The time of a frame as a share of what keeps up with real time."""
+    substeps = live.report.iterations if kind_of(live.source.solver) == "xpbd" else 0
+    return taken(live.system, substeps, measured) / allowed(live.system, live.source.dt)
 
 
 def _is_free(body: Body, source: LiveSource) -> bool:
