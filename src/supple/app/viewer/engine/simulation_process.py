@@ -72,8 +72,8 @@ def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
 
     if not live.source.real_time:
         return live, ""
-    seconds, chosen = live.warm_up(_STEPS), []
-    for choice in (linearized, lighter):
+    seconds, chosen = live.warm_up(_STEPS), {}
+    for choice in (linearized, linearized, lighter):
         found = choice(live, seconds)
         if found is None:
             continue
@@ -85,8 +85,9 @@ def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
         taken = other.warm_up(_STEPS)
         if other.report.status.can_go_on and taken < seconds:
             live, seconds = other, taken
-            chosen.append(found[1])
-    line = f"to keep up with real time, the page {' and '.join(chosen)}; supple view --full keeps the scene as it is"
+            chosen[choice] = found[1]
+    does = " and ".join(chosen.values())
+    line = f"to keep up with real time, the page {does}; supple view --full keeps the scene as it is"
     return live, line if chosen else ""
 
 
