@@ -119,7 +119,9 @@ class FrameForces:
 
     def pairs(self) -> NDArray[np.int64]:
         """(k, 2) the pairs of bodies and obstacles (counted after the bodies) that push each other."""
-        return np.unique(self._rows().owners, axis=0)
+        owners = np.concatenate([rows.owners for rows in (*self.substeps, self.standing)])
+        numbers = np.unique(owners[:, 0] * len(self.names) + owners[:, 1])
+        return np.column_stack(np.divmod(numbers, len(self.names)))
 
     def keep_standing(self, standing: LoadedRows, asleep: NDArray[np.bool_]) -> None:
         """Set `standing` to the contacts of an earlier frame, as far as the bodies (b,) still sleep."""

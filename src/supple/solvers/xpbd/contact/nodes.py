@@ -34,6 +34,7 @@ class Nodes:
         self._embedded = (count - len(surface.embedded[0]), *surface.embedded)
         self.bodies = Bodies.of(surface.body, len(rigid))
         on_bodies = np.flatnonzero(surface.body >= 0)
+        self._on_bodies = on_bodies, surface.body[on_bodies]
         self.movers = Movers(self.bodies, adjacency(surface.body[on_bodies], on_bodies, len(rigid)))
 
     def begin_frame(self, time: float, origin: NDArray[np.float64]) -> None:
@@ -106,6 +107,6 @@ class Nodes:
         if len(rigid):
             self.follow()
             turns = h * rigid.spins(self.begin[:n], self.v[:n])
-            mine, body = self._surface.body >= 0, self._surface.body
+            mine, body = self._on_bodies
             arms = np.linalg.norm(self.bodies.arms[mine], axis=1)
-            self.bodies.bends[mine] = arms * (1.0 - np.cos(0.5 * np.minimum(turns[body[mine]], np.pi)))
+            self.bodies.bends[mine] = arms * (1.0 - np.cos(0.5 * np.minimum(turns, np.pi)))[body]

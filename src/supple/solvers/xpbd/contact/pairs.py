@@ -242,7 +242,11 @@ def near_pairs(x, v, pairs, time, reach, moved, out):
 
 def hand_on(old: Pairs, kept: NDArray[np.int64], new: Pairs) -> None:
     """Give the impulses of loaded pairs that are not kept to the same pairs of a new list."""
-    held = np.setdiff1d(loaded_pairs(old.impulses), kept, assume_unique=True)
+    held = loaded_pairs(old.impulses)
+    if len(held):
+        left = np.ones(len(old.keys), dtype=np.bool_)
+        left[kept] = False
+        held = held[left[held]]
     open_ = np.flatnonzero(new.near == UNKNOWN)
     if not len(held) or not len(open_):
         return

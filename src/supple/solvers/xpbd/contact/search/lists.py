@@ -213,8 +213,9 @@ class Lists:
         s, deep, p, old = self._surface.simplices, self._deep, self._surface.patches, self.pairs
         stays = [np.zeros(0, dtype=np.int64)] * 2
         if asked is not None:
-            parts = (self._points, p.of_point, p.of_triangle), (self._edges, p.of_edge, p.of_edge)
-            stays = [np.flatnonzero(~(asked[one[of[:, 0]]] | asked[other[of[:, 1]]])) for of, one, other in parts]
+            points_asked, triangles_asked, edges_asked = asked[p.of_point], asked[p.of_triangle], asked[p.of_edge]
+            parts = (self._points, points_asked, triangles_asked), (self._edges, edges_asked, edges_asked)
+            stays = [np.flatnonzero(~(one[of[:, 0]] | other[of[:, 1]])) for of, one, other in parts]
         d, listed = len(deep.normals), len(self._points)
         self._points = np.concatenate([self._points[stays[0]], points])
         self._edges = np.concatenate([self._edges[stays[1]], edges])
