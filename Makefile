@@ -25,7 +25,7 @@ demo: .venv/.base
 	@$(BIN)/supple demo squash --overwrite --output out/squash >out/squash.log 2>&1 & squash=$$!; \
 	  $(BIN)/supple demo bears --overwrite --output out/bears; bears=$$?; \
 	  wait $$squash; result=$$?; cat out/squash.log; exit $$((bears + result))
-	-$(BIN)/supple picture out/bears --camera follow
+	-$(BIN)/supple picture out/bears
 	-$(BIN)/supple export out/bears --to mp4 --output out/bears/film.mp4
 
 # Three processes on two cores: tests of the page and of other processes wait much of their time.

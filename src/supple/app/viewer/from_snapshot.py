@@ -65,6 +65,7 @@ class MomentBuilder:
                 i,
                 body.material == RIGID,
                 body.look,
+                body.touches_with_skin,
             )
             for i, body in enumerate(scene.bodies)
         )

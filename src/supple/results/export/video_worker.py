@@ -53,7 +53,7 @@ class Studio:
         self._shaded = film.shadows
         ends = self._ends(moments)
         self._legend = None if self._field is None or ends is None else legend(self._field, ends, film.size, shown)
-        for flat in surfaces_of(model, skins=film.surface == "skin"):
+        for flat in surfaces_of(model, skins=film.surface == "skin", dark=film.dark):
             if flat.is_floor:
                 continue
             surface = flat.creased(model)

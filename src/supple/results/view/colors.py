@@ -14,7 +14,6 @@ BODY_COLORS = (
     (120, 200, 235),
     (160, 120, 80),
 )
-OBSTACLE_COLOR = (196, 201, 210)
 
 
 def body_color(number: int) -> tuple[int, int, int]:

@@ -15,7 +15,17 @@ from supple.results.view.model import Model, ModelBody, Moment
 def model_of_recording(recording: Recording) -> Model:
     """The constant data of a recording."""
     bodies = tuple(
-        ModelBody(body.name, body.vertices, body.tets, body.triangles, body.skin, i, body.rigid, body.look)
+        ModelBody(
+            body.name,
+            body.vertices,
+            body.tets,
+            body.triangles,
+            body.skin,
+            i,
+            body.rigid,
+            body.look,
+            body.touches_with_skin,
+        )
         for i, body in enumerate(recording.bodies)
     )
     tets = np.ascontiguousarray(recording.tets, dtype=np.int32)

@@ -21,6 +21,7 @@ from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
 from supple.results.view.bounds import View
 from supple.results.view.colors import body_color
 from supple.results.view.look import LOOKS, Look
+from supple.results.view.skin_contact import beyond_tets
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,7 @@ class ModelBody:
     number : place among the bodies, which selects the color
     rigid : whether its vertices are the control points of a rigid body, whose surface is the skin
     look_name : one of `LOOKS`
+    touches_with_skin : whether contact acts on the skin
     """
 
     name: str
@@ -46,6 +48,7 @@ class ModelBody:
     number: int
     rigid: bool = False
     look_name: str = "rubber"
+    touches_with_skin: bool = False
 
     @property
     def look(self) -> Look:
@@ -85,6 +88,15 @@ class Model:
         """(k,) vertices on the boundaries of all bodies, ascending."""
         parts = [np.unique(body.triangles) + body.vertices.start for body in self.bodies]
         return np.concatenate(parts).astype(np.int64)
+
+    @cached_property
+    def beyond_tets(self) -> dict[str, tuple[NDArray[np.bool_], float]]:
+        """By body: which vertices of a skin that nothing touches are outside of tets, and how far at most [m]."""
+        return {
+            body.name: beyond_tets(body.skin, self.rest_positions[body.vertices])
+            for body in self.bodies
+            if body.skin is not None and not body.touches_with_skin and body.skin.corners.shape[1] == 4
+        }
 
     @cached_property
     def facets(self) -> Facets:

@@ -116,7 +116,7 @@ class Stage:
         self._layers = [
             self._bodies,
             Ground(scene, moment, options.dark),
-            ObstacleView(scene, moment),
+            ObstacleView(scene, moment, options.dark),
             SpringView(scene, moment),
         ]
         self._layers.append(ShadowView(scene, moment))

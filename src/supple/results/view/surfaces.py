@@ -13,9 +13,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from supple.mesh.closed_surfaces import is_closed
-from supple.results.view.colors import OBSTACLE_COLOR
-from supple.results.view.look import OBSTACLE, Look
+from supple.results.view.look import OBSTACLE, Look, theme
 from supple.results.view.model import Model, ModelBody, Moment
+from supple.results.view.skin_contact import kept_out
 from supple.runtime.kernel_cache import njit
 
 # A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
@@ -85,7 +85,11 @@ class SoftSurface(Surface):
         return (self.body.skin.positions(own) if self.skin and self.body.skin is not None else own)[self.rows]
 
     def at(self, moment: Moment) -> NDArray[np.float64]:
-        return self.of(moment.finite_positions)
+        x, kept = self.of(moment.finite_positions), moment.model.beyond_tets.get(self.name)
+        if kept is None or not self.skin:
+            return x
+        outside, reach = kept
+        return kept_out(x, np.flatnonzero(outside[self.rows]), 2.0 * reach, moment)  # which bodies stretch
 
     def at_rest(self, model: Model) -> NDArray[np.float64]:
         return self.of(model.rest_positions)
@@ -126,9 +130,9 @@ class RigidSurface(Surface):
         return replace(self, vertices=self.vertices[rows], triangles=triangles)
 
 
-def surfaces_of(model: Model, *, skins: bool = True) -> list[SoftSurface | RigidSurface]:
+def surfaces_of(model: Model, *, skins: bool = True, dark: bool = False) -> list[SoftSurface | RigidSurface]:
     """Those of all bodies, then those of all obstacles."""
-    return [*(body_surface(model, body, skins=skins) for body in model.bodies), *obstacle_surfaces(model)]
+    return [*(body_surface(model, body, skins=skins) for body in model.bodies), *obstacle_surfaces(model, dark)]
 
 
 def body_surface(model: Model, body: ModelBody, *, skins: bool = True) -> SoftSurface | RigidSurface:
@@ -158,13 +162,13 @@ def boundary_surface(body: ModelBody) -> SoftSurface:
     return SoftSurface(body.name, triangles, body.color, body.look, body, False, used.astype(np.int64))
 
 
-def obstacle_surfaces(model: Model) -> list[RigidSurface]:
-    """Those of the obstacles; a half-space is drawn as a square about the bodies.
+def obstacle_surfaces(model: Model, dark: bool = False) -> list[RigidSurface]:
+    """Those of the obstacles before a bright or `dark` background; a half-space is drawn as a square about the bodies.
 
     Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not a floor. Of a room the
     lower half is drawn, so that it looks like a bowl.
     """
-    made, view = [], model.view
+    made, view, color = [], model.view, theme(dark).obstacle
     for number, recorded in enumerate(model.obstacles):
         obstacle = recorded.obstacle
         vertices, triangles = obstacle.drawn(view.center, 2.5 * view.radius)
@@ -180,7 +184,7 @@ def obstacle_surfaces(model: Model) -> list[RigidSurface]:
             RigidSurface(
                 recorded.name,
                 triangles,
-                OBSTACLE_COLOR,
+                color,
                 OBSTACLE,
                 vertices,
                 pose,
@@ -192,7 +196,7 @@ def obstacle_surfaces(model: Model) -> list[RigidSurface]:
         )
         rim = rim_of(vertices, triangles, view.up, _RIM * view.radius) if obstacle.is_room else None
         if rim is not None:
-            made.append(RigidSurface(f"{recorded.name}, rim", rim[1], OBSTACLE_COLOR, OBSTACLE, rim[0], pose))
+            made.append(RigidSurface(f"{recorded.name}, rim", rim[1], color, OBSTACLE, rim[0], pose))
     return made
 
 

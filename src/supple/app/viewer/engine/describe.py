@@ -64,6 +64,7 @@ def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -
         mass=float(masses[part.vertices].sum()),
         added=body.name in added,
         look=body.drawn_look,
+        touches_with_skin=bool(body.touches_with_skin),
     )
 
 

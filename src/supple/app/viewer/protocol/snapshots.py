@@ -33,6 +33,7 @@ class BodyDescription:
     mass : [kg]
     added : whether it was added on the page
     look : how it is drawn
+    touches_with_skin : whether contact acts on the skin
     """
 
     name: str
@@ -47,6 +48,7 @@ class BodyDescription:
     mass: float
     added: bool = False
     look: str = "rubber"
+    touches_with_skin: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,53 @@
+"""Keeps drawn skins out of obstacles.
+
+A solver keeps the tets of a body out of an obstacle. Its skin reaches beyond them where the tets are coarse, and would
+pass through a floor or the wall of a bowl on which the body lies. Pictures move these points, and only these, onto the
+obstacle: a point within the tets is drawn where it is, so that a penetration of the simulation stays visible.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.results.recording.scene import SkinnedSurface
+
+if TYPE_CHECKING:
+    from supple.results.view.model import Moment
+
+# Above the obstacle, as a share of the scene's radius: a round wall is drawn as flat triangles within it.
+_GAP = 2e-3
+
+
+def beyond_tets(skin: SkinnedSurface, rest: NDArray[np.float64]) -> tuple[NDArray[np.bool_], float]:
+    """Which vertices (k,) of a skin are outside of the tets that carry them, and how far at most it reaches there [m].
+
+    Parameters
+    ----------
+    rest : (n, 3) positions of the body at rest [m]
+    """
+    within = np.maximum(skin.weights[:, :4], 0.0)
+    outside = within.sum(axis=1) > 1.0 + 1e-6
+    within = within[outside] / within[outside].sum(axis=1)[:, None]
+    nearest = np.einsum("kw,kwi->ki", within, rest[skin.corners[outside, :4]])
+    return outside, float(np.linalg.norm(skin.positions(rest)[outside] - nearest, axis=1).max(initial=0.0))
+
+
+def kept_out(x: NDArray[np.float64], outside: NDArray[np.int64], reach: float, moment: Moment) -> NDArray[np.float64]:
+    """Points (k, 3), of which the rows `outside` are moved out of the obstacles of a moment, by at most `reach` [m].
+
+    Obstacles of triangles are left out: whether a point is in one is not a question of the nearest triangle alone.
+    """
+    if not len(outside):
+        return x
+    for recorded, pose in zip(moment.model.obstacles, moment.poses, strict=False):
+        obstacle = recorded.obstacle
+        if obstacle.checked_by_triangles:
+            continue
+        distances, normals = obstacle.signed_distance((x[outside] - pose[:, 3]) @ pose[:, :3])
+        missing = _GAP * moment.model.view.radius - distances
+        moved = (missing > 0.0) & (missing < reach)
+        x[outside[moved]] += (missing[moved, None] * normals[moved]) @ pose[:, :3].T
+    return x
