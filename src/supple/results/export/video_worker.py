@@ -230,6 +230,10 @@ def _chosen(recording: Recording, film: Film, kind: str) -> tuple[list[int], flo
     return [int(k) for k in nearest], max((count - 1) / duration, 1.0)
 
 
+# Thresholds of ordered dithering, from -6 to 6.
+_PATTERN = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]], dtype=np.int16) * 12 // 15 - 6
+
+
 def palette_of(image: Any, dark: bool) -> Any:
     """A palette for a picture: 64 colors of the background, which fades, and 192 of what is before it."""
     from PIL import Image
@@ -245,12 +249,18 @@ def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, f
     from PIL import Image
 
     pages = [Image.fromarray(image) for image in images]
+    page_columns, page_rows = pages[0].size
     some = [pages[i] for i in evenly(len(pages), 6)]
     sheet = Image.new("RGB", (some[0].width, some[0].height * len(some)))
     for k, page in enumerate(some):
         sheet.paste(page, (0, k * page.height))
     palette = palette_of(sheet, film.dark)
-    drawn = [page.quantize(palette=palette, dither=Image.Dither.NONE) for page in pages]
+    # A pattern that stands still hides the steps between colors; errors that spread would flicker.
+    pattern = np.tile(_PATTERN, (page_rows // 4 + 1, page_columns // 4 + 1))[:page_rows, :page_columns, None]
+    drawn = []
+    for page in pages:
+        dithered = np.clip(np.asarray(page).astype(np.int16) + pattern, 0, 255).astype(np.uint8)
+        drawn.append(Image.fromarray(dithered).quantize(palette=palette, dither=Image.Dither.NONE))
     # GIF has a time unit of a hundredth of a second.
     duration = max(20, round(100.0 / rate) * 10)
     drawn[0].save(output, format="GIF", save_all=True, append_images=drawn[1:], duration=duration, loop=0)
