@@ -14,9 +14,10 @@ from supple.app.cli.app import main
 from supple.errors import OutputError
 from supple.results.export import video
 from supple.results.export.exporter import export
+from supple.results.export.video_worker import Studio
 from supple.results.view.fields import nodal_values
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
-from supple.results.view.surfaces import body_surface
+from supple.results.view.surfaces import body_surface, surfaces_of
 
 
 @pytest.mark.usefixtures("own_interpreters")
@@ -191,3 +192,16 @@ def test_a_crash_of_the_drawing_process_is_an_error_of_one_line(tmp_path, record
         export(recorded[0], "gif", tmp_path / "x.gif")
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_is_drawn_again_only_where_something_has_moved(recording, monkeypatch):
+    model = model_of_recording(recording)
+    first, later = (moment_of_frame(model, recording[k]) for k in (0, 9))
+    studio = object.__new__(Studio)
+    vars(studio).update(_meshes=[(None, one) for one in surfaces_of(model)], _bodies=2, _field=None)
+    vars(studio).update(_image=None, _seen=[])
+    monkeypatch.setattr(Studio, "_aim", lambda self, points, share: np.array([share]))
+    monkeypatch.setattr(Studio, "_drawn", lambda self, points, nodal: np.zeros((1, 1, 3), np.uint8))
+    shown = [studio.picture(*one) for one in ((first, 0.0), (first, 0.0), (later, 0.0), (later, 0.5))]
+    assert shown[0] is shown[1]
+    assert len({id(one) for one in shown}) == 3  # bodies moved, and then the camera

@@ -43,6 +43,8 @@ class Studio:
         import pyvista
 
         self._film, self._view, self._distance = film, model.view, 0.0
+        self._image: NDArray[np.uint8] | None = None
+        self._seen: list[NDArray[np.float64]] = []
         self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
         shown = theme(film.dark)
         plotter.set_background(_share(shown.bottom), top=_share(shown.top))  # pyright: ignore[reportArgumentType]
@@ -107,11 +109,19 @@ class Studio:
 
     def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
         """(height, width, 3) of a moment, at a share of the film's length."""
-        points, normals = [], []
+        points = [surface.at(moment) for _, surface in self._meshes]
         nodal = None if self._field is None else nodal_values(moment, self._field.values(moment))
-        for mesh, surface in self._meshes:
-            x = surface.at(moment)
-            points.append(x)
+        camera = self._aim(np.concatenate(points[: self._bodies]), share)
+        seen = [*points, camera, np.zeros(0) if nodal is None else nodal]
+        # Where everything rests, the picture stays.
+        if self._image is None or not all(map(np.array_equal, seen, self._seen)):
+            self._seen, self._image = seen, self._drawn(points, nodal)
+        return self._image
+
+    def _drawn(self, points: list[NDArray[np.float64]], nodal: NDArray[np.float64] | None) -> NDArray[np.uint8]:
+        """(height, width, 3) with these points of the surfaces and values of vertices."""
+        normals = []
+        for (mesh, surface), x in zip(self._meshes, points, strict=True):
             mesh.points = x.astype(np.float32)
             normals.append(vertex_normals(x, surface.triangles))
             mesh.point_data["Normals"] = normals[-1].astype(np.float32)
@@ -124,7 +134,7 @@ class Studio:
             drawn = zip(points, (surface for _, surface in self._meshes), strict=True)
             cast = [(x, surface.triangles) for x, surface in drawn if surface.casts_shadow]
             self._floor.texture = _texture(self._shadow.picture(cast))
-        self._aim(np.concatenate(points[: self._bodies]), share)
+        self._plotter.reset_camera_clipping_range()
         self._plotter.render()
         image = np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
         if self._legend is None:
@@ -142,14 +152,15 @@ class Studio:
                 light = (1.0 - dark)[:, None] * np.array(surface.color)
                 mesh.point_data["color"] = light.astype(np.uint8)
 
-    def _aim(self, points: NDArray[np.float64], share: float) -> None:
+    def _aim(self, points: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+        """Place the camera; what determines its place."""
         center, away, distance = placed(self._film, self._view, points, share)
         # The largest so far, so that the size of the picture does not vary.
         self._distance = max(self._distance, distance)
         camera = self._plotter.camera
         camera.position, camera.focal_point = tuple(center + self._distance * away), tuple(center)
         camera.up, camera.view_angle = tuple(upright(self._view.up, away)), _ANGLE
-        self._plotter.reset_camera_clipping_range()
+        return np.array([*center, *away, self._distance])
 
 
 _Vector = NDArray[np.float64]
