@@ -16,7 +16,7 @@ from supple.errors import OutputError
 from supple.results.curves import write_curves
 from supple.results.recording.details import RecordedSensor
 from supple.results.recording.reader import Recording, opened
-from supple.results.view.colors import body_color
+from supple.results.view.look import body_color
 from supple.runtime.figures import MOST_ENTRIES, legend_below, paper_figure, spans_decades
 
 STITCH_LINE = "#c77700"

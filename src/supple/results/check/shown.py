@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from supple.results.check.checks.tunnelling import passing_between
 from supple.results.check.report import CheckReport, CheckResult
 from supple.results.check.snapshot import Scene
-from supple.results.view.colors import body_color
+from supple.results.view.look import body_color
 from supple.runtime.figures import paper_figure
 from supple.runtime.replacing import whole_file
 

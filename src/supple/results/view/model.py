@@ -19,8 +19,7 @@ from supple.numerics.deformation import deformation_gradients
 from supple.results.recording.actions import RecordedJoint, RecordedStitches, no_stitches
 from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
 from supple.results.view.bounds import View
-from supple.results.view.colors import body_color
-from supple.results.view.look import LOOKS, Look
+from supple.results.view.look import LOOKS, Look, body_color
 from supple.results.view.skin_contact import beyond_tets
 
 

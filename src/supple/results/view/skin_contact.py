@@ -7,18 +7,12 @@ obstacle: a point within the tets is drawn where it is, so that a penetration of
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.recording.scene import SkinnedSurface
-
-if TYPE_CHECKING:
-    from supple.results.view.model import Moment
-
-# Above the obstacle, as a share of the scene's radius: a round wall is drawn as flat triangles within it.
-_GAP = 2e-3
+from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
 
 
 def beyond_tets(skin: SkinnedSurface, rest: NDArray[np.float64]) -> tuple[NDArray[np.bool_], float]:
@@ -35,19 +29,30 @@ def beyond_tets(skin: SkinnedSurface, rest: NDArray[np.float64]) -> tuple[NDArra
     return outside, float(np.linalg.norm(skin.positions(rest)[outside] - nearest, axis=1).max(initial=0.0))
 
 
-def kept_out(x: NDArray[np.float64], outside: NDArray[np.int64], reach: float, moment: Moment) -> NDArray[np.float64]:
-    """Points (k, 3), of which the rows `outside` are moved out of the obstacles of a moment, by at most `reach` [m].
+def kept_out(
+    x: NDArray[np.float64],
+    outside: NDArray[np.int64],
+    reach: float,
+    obstacles: Sequence[RecordedObstacle],
+    poses: NDArray[np.float64],
+    gap: float,
+) -> NDArray[np.float64]:
+    """Points (k, 3), of which the rows `outside` are moved out of obstacles at `poses`, by at most `reach` [m].
 
     Obstacles of triangles are left out: whether a point is in one is not a question of the nearest triangle alone.
+
+    Parameters
+    ----------
+    gap : distance from obstacles to which they are moved [m]
     """
     if not len(outside):
         return x
-    for recorded, pose in zip(moment.model.obstacles, moment.poses, strict=False):
+    for recorded, pose in zip(obstacles, poses, strict=False):
         obstacle = recorded.obstacle
         if obstacle.checked_by_triangles:
             continue
         distances, normals = obstacle.signed_distance((x[outside] - pose[:, 3]) @ pose[:, :3])
-        missing = _GAP * moment.model.view.radius - distances
+        missing = gap - distances
         moved = (missing > 0.0) & (missing < reach)
         x[outside[moved]] += (missing[moved, None] * normals[moved]) @ pose[:, :3].T
     return x

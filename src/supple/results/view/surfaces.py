@@ -20,6 +20,9 @@ from supple.runtime.kernel_cache import njit
 
 # A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
 ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
+# Between a skin and an obstacle, as a share of the scene's radius: a round wall is drawn as flat triangles within it.
+_SKIN_GAP = 2e-3
+_STRETCH = 2.0  # of the part of a skin that reaches beyond tets, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,8 @@ class SoftSurface(Surface):
         if kept is None or not self.skin:
             return x
         outside, reach = kept
-        return kept_out(x, np.flatnonzero(outside[self.rows]), 2.0 * reach, moment)  # which bodies stretch
+        rows, gap = np.flatnonzero(outside[self.rows]), _SKIN_GAP * moment.model.view.radius
+        return kept_out(x, rows, _STRETCH * reach, moment.model.obstacles, moment.poses, gap)
 
     def at_rest(self, model: Model) -> NDArray[np.float64]:
         return self.of(model.rest_positions)

@@ -14,7 +14,7 @@ from supple.app.viewer.controls.view.overlay import Overlay, plain
 from supple.app.viewer.protocol.quantities import written
 from supple.app.viewer.protocol.snapshots import Snapshot
 from supple.results.readings.frame_readings import JointReading
-from supple.results.view.colors import body_color
+from supple.results.view.look import body_color
 
 _SECONDS = 10.0  # of simulated time in a plot
 _MOST_JOINTS = 12  # in the text

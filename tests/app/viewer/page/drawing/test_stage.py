@@ -8,12 +8,11 @@ import pytest
 from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.results.recording.actions import no_stitches
 from supple.results.recording.scene import RecordedObstacle
-from supple.results.view.colors import body_color
 from supple.results.view.fields import FIELDS
 from supple.results.view.layers.connections import length_text
 from supple.results.view.layers.section import Cut, surface
 from supple.results.view.layers.tets import exploded_facets
-from supple.results.view.look import background, floor_disc
+from supple.results.view.look import background, body_color, floor_disc
 from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.results.view.stage import Stage
 
