@@ -17,7 +17,7 @@ from supple.results.export.exporter import export
 from supple.results.export.video_worker import Studio
 from supple.results.view.fields import nodal_values
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
-from supple.results.view.surfaces import body_surface, surfaces_of
+from supple.results.view.surfaces import SoftSurface, body_surface, surfaces_of
 
 
 @pytest.mark.usefixtures("own_interpreters")
@@ -139,7 +139,9 @@ def test_a_field_of_quadratic_tets_has_values_at_middle_nodes(tmp_path):
         model = model_of_recording(recording)
         moment = moment_of_frame(model, recording[-1])
         values = np.repeat(nodal_values(moment, np.linspace(2.0, 3.0, len(model.tets)))[:, None], 3, axis=1)
-        drawn = body_surface(model, model.bodies[0]).of(values)
+        surface = body_surface(model, model.bodies[0])
+        assert isinstance(surface, SoftSurface)
+        drawn = surface.of(values)
     assert len(drawn) > len(np.unique(mesh.tets))
     assert 2.0 <= drawn.min() < drawn.max() <= 3.0
 

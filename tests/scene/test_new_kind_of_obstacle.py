@@ -149,7 +149,7 @@ def test_pages_draw_it(recorded):
         model = model_of_recording(recording)
         begins, ends = (moment_of_frame(model, recording[k]) for k in (0, 20))
         stage = Stage()
-        view = ObstacleView(stage, begins, dark=False)
+        view = ObstacleView(stage, begins)
         assert stage.name == "/obstacles/0 RoundedCube 1"
         assert np.abs(stage.vertices).max() == pytest.approx(0.5, abs=1e-3)
         handle, *_ = view.nodes

@@ -37,7 +37,7 @@ class SkinView(Layer):
 class ObstacleView(Layer):
     """One mesh for each obstacle."""
 
-    def __init__(self, scene: Any, moment: Moment, dark: bool) -> None:
+    def __init__(self, scene: Any, moment: Moment, dark: bool = False) -> None:
         self._parts = []
         for number, flat in enumerate(obstacle_surfaces(moment.model, dark)):
             if flat.is_floor:  # it is drawn as a disc
