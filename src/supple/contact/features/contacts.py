@@ -4,7 +4,7 @@ A weight depends on directions, and its derivatives are not forces. While the mi
 keep the weights with which the search first met them: the energy is then a function of the positions. Weights may grow
 where the search goes on, so that a force acts on everything that comes near; their growth is bounded. A vertex that
 counts with the plane of a triangle beside an outline keeps the triangle, too: another one would have another plane.
-Where it goes over the face, or too far away from the outline to count, the plane loses the weight.
+Where it goes over that face, or too far away from the outline to count, the plane loses the weight.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ def write_vertex_contacts(
         first, last = starts[g, 1], starts[g + 1, 1]
         offset = PARTS * starts[g, 0] - first
         full = 0.5 * areas[v]
-        best = saddles[v]
+        best, nearest = saddles[v], np.inf
         for k in range(first, last):
             sign = signs[offset + k]
             _write_contact(x, v, codes[offset + k], sign == 0, triangles, edges, kinds, points, coefficients, k)
@@ -69,11 +69,12 @@ def write_vertex_contacts(
             r = row(vectors, k)
             distances[k] = math.sqrt(dot(r, r))
             if sign > 0:
+                nearest = min(nearest, distances[k])
                 side = 1.0
                 if kinds[k] != VERTEX_TRIANGLE:
                     side = _own_side(x, near_start, near_items, v, points[k, 1], points[k, 2], r, distances[k], height)
                 best = max(best, side * full)
-        beside = last == first + 2 and signs[offset + first + 1] == 0
+        beside = last > first and signs[offset + last - 1] == 0
         last -= beside
         # Of the vertex and the owner of the other side: the same for all.
         key = np.int64(v) * len(x) + owner[points[first, 1]]
@@ -92,23 +93,25 @@ def write_vertex_contacts(
                 weights[k] = signs[offset + k] * (best if before < 0.0 else before)
             continue
         keys[last], planes[last], grown[last] = beyond(key, len(x)), codes[offset + last], -1.0
-        side = math.sqrt(max(0.0, distances[first] ** 2 - distances[last] ** 2))
+        side = math.sqrt(max(0.0, nearest**2 - distances[last] ** 2))
         share = shares[g] * (1.0 - share_between(side / dhat, _FULL, _NONE))
         other = of_plane >= 0 and known.triangles[of_plane] != planes[last]
         if face >= 0.0 and (other or outside <= 0.0):
             # The vertex was over the face, or beside another one: its weight stays as a whole.
-            weights[first], weights[last] = (1.0 - share) * face, share * face
+            on_outline, weights[last] = (1.0 - share) * face, share * face
             if share > 0.0 or outside > 0.0:
-                grown[first], grown[last] = weights[first], weights[last]
-            continue
-        now = (1.0 - share) * best
-        weights[first] = now if face < 0.0 else face
-        if has_grown(face, now, full):
-            grown[first] = now
-        now = min(share * full, max(0.0, full - weights[first]))
-        weights[last] = now if outside < 0.0 else outside
-        if has_grown(outside, now, full):
-            grown[last] = now
+                grown[first], grown[last] = on_outline, weights[last]
+        else:
+            now = (1.0 - share) * best
+            on_outline = now if face < 0.0 else face
+            if has_grown(face, now, full):
+                grown[first] = now
+            now = min(share * full, max(0.0, full - on_outline))
+            weights[last] = now if outside < 0.0 else outside
+            if has_grown(outside, now, full):
+                grown[last] = now
+        for k in range(first, last):
+            weights[k] = signs[offset + k] * on_outline
 
 
 @njit

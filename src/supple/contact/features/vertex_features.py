@@ -132,8 +132,8 @@ def _owner(pairs, k, triangles, owner):
 def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reach):
     """The features that are left of each vertex's alternating sum, and how often each counts.
 
-    Where only edges and vertices of an outline are left, the nearest one remains and a triangle at it follows, with the
-    number 0, if one of the vertex's own lies flat on it: its plane may count instead. A known one stays.
+    Where only edges and vertices of an outline are left, a triangle at the nearest one follows, with the number 0, if
+    one of the vertex's own lies flat on it: its plane may count instead. A known one stays.
 
     Parameters
     ----------
@@ -155,32 +155,40 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reac
         counts[g] = _alternating_sum(
             x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, reach, codes, signs
         )
-        on_outlines = counts[g] > 0
+        if counts[g] == 0:
+            continue
+        on_outlines, nearest = True, begin
         for k in range(first, first + counts[g]):
             on_outlines = on_outlines and codes[k] >= len(triangles)
-        if not on_outlines:
-            continue
-        # Along an outline that is nearly straight, the nearest feature stands for all.
-        nearest = begin
         for k in range(begin, end):
             if squares[rows[k]] < squares[rows[nearest]]:
                 nearest = k
         v, other = pairs[rows[begin], 0], _owner(pairs, rows[begin], triangles, owner)
         kept = known_row(known, beyond(np.int64(v) * len(x) + other, len(x)))
-        stays, facing, flattest, least = -1, -1, _LEANING, _BENT
+        stays = -1
+        if kept >= 0 and known.weights[kept] > 0.0:
+            for k in range(begin, end):
+                if pairs[rows[k], 1] == known.triangles[kept]:
+                    stays = known.triangles[kept]
+        over = features[rows[nearest]]
+        if stays >= 0:
+            # It ends where the vertex comes over this face, and not where some other triangle begins to count.
+            ends = over < len(triangles) and dot(_normal(x, triangles, over), _normal(x, triangles, stays)) > _FLAT
+        else:
+            ends = not on_outlines
+        if ends:
+            continue
+        facing, flattest, least = -1, _LEANING, _BENT
         for k in range(begin, end):
-            t = pairs[rows[k], 1]
-            if kept >= 0 and known.weights[kept] > 0.0 and known.triangles[kept] == t:
-                stays = t
-            if features[rows[k]] == features[rows[nearest]]:
+            if features[rows[k]] == over:
+                t = pairs[rows[k], 1]
                 cosine = _facing_cosine(x, v, triangles, t, own_start, own_items)
                 least = min(least, cosine)
                 if cosine > flattest and facing < 0:  # triangles of one face are nearly in one plane
                     facing, flattest = t, cosine
         if stays >= 0 or (facing >= 0 and least < _BENT):
-            codes[first], signs[first] = features[rows[nearest]], 1
-            codes[first + 1], signs[first + 1] = stays if stays >= 0 else facing, 0
-            counts[g] = 2
+            codes[first + counts[g]], signs[first + counts[g]] = stays if stays >= 0 else facing, 0
+            counts[g] += 1
             shares[g] = share_between(flattest, _LEANING, _FLAT) * (1.0 - share_between(least, _SHARP, _BENT))
     return codes, signs, counts, shares
 

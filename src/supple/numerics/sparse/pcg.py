@@ -66,12 +66,12 @@ def conjugate_gradients(
     order = preconditioner.order
     solution = np.zeros_like(x)
     inverse = (
-        (order.groups, order.group_start, order.color_start),
+        (order.color_start, order.group_start, order.cluster_start, order.dense_start),
         (order.lower.start, order.lower.columns, order.lower.blocks),
         (order.upper.start, order.upper.columns, order.upper.blocks),
         preconditioner.diagonal,
         preconditioner.inverse_diagonal,
-        preconditioner.fields,
+        (preconditioner.coarse_of, preconditioner.places, preconditioner.group_start, preconditioner.fields),
         preconditioner.first,
         preconditioner.coarse,
     )
@@ -127,45 +127,45 @@ def _coarse_solution(restricted, coarse, first, coefficients):
 
 
 @njit(cache=True)
-def _prepare(order, lower, upper, diagonal, inverse, fields, first, coarse, low, W, Y, UY, S_inverse):
+def _prepare(clusters, lower, upper, diagonal, inverse, coarse_groups, first, coarse, low, W, Y, UY, S_inverse):
     """(M + G G^T)^-1 = M^-1 - Y S^-1 Y^T with Y = M^-1 G and S = 1 + G^T Y. W = (D + L)^-1 G."""
-    groups, start, colors = order
-    sums = np.zeros(len(groups))
-    restricted = np.zeros(12 * len(groups))
+    sums = np.zeros(len(clusters[1]) - 1)
+    restricted = np.zeros(12 * len(first))
     coefficients = np.zeros(len(restricted))
     r, s, t, p = np.zeros_like(low[0]), np.zeros_like(low[0]), np.zeros_like(low[0]), np.zeros_like(low[0])
     Up, Ap, x = np.zeros_like(low[0]), np.zeros_like(low[0]), np.zeros_like(low[0])
     S = S_inverse.copy()
     for m in range(len(low)):
         # With p = 0 the sweep forward takes its right side from Ut: Ap becomes g and w becomes (D + L)^-1 g.
-        forward(colors, 0.0, start, *lower, diagonal, inverse, t, low[m], p, Up, Ap, W[m], sums)
+        forward(0.0, clusters, lower, diagonal, inverse, t, low[m], p, Up, Ap, W[m], sums)
         copy_elements(low[m], r)
-        update(0.0, groups, start, fields, p, Ap, W[m], x, r, s, restricted)
+        update(0.0, coarse_groups, p, Ap, W[m], x, r, s, restricted)
         _coarse_solution(restricted, coarse, first, coefficients)
-        backward(colors, groups, start, *upper, inverse, fields, coefficients, r, W[m], s, Y[m], UY[m], sums)
+        backward(clusters, upper, inverse, coarse_groups, coefficients, r, W[m], s, Y[m], UY[m], sums)
         for n in range(len(low)):
             S[n, m] += _inner(low[n], Y[m])
     _invert(S, S_inverse)
 
 
 @njit(cache=True)
-def _solve(order, lower, upper, diagonal, inverse, fields, first, coarse, rhs, x, tolerance, max_iterations, more):
-    groups, start, colors = order
+def _solve(
+    clusters, lower, upper, diagonal, inverse, coarse_groups, first, coarse, rhs, x, tolerance, max_iterations, more
+):
     low, W, Y, UY, S_inverse = more
-    sums = np.zeros(len(groups))
-    restricted = np.zeros(12 * len(groups))
+    sums = np.zeros(len(clusters[1]) - 1)
+    restricted = np.zeros(12 * len(first))
     coefficients = np.zeros(len(restricted))
     r, y, s, t, Ut = np.zeros_like(rhs), np.zeros_like(rhs), np.zeros_like(rhs), np.zeros_like(rhs), rhs
     p, Up, Ap, w = np.zeros_like(rhs), np.zeros_like(rhs), np.zeros_like(rhs), np.zeros_like(rhs)
     weights = np.zeros(len(low))
     first_norm = old = rz = beta = 0.0
     for iteration in range(max_iterations + 1):
-        forward(colors, beta, start, *lower, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
+        forward(beta, clusters, lower, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
         # At first p is zero and Ap the right side, of which this update makes r.
         alpha = -1.0
         if iteration > 0:
             curvature = 0.0
-            for g in range(len(groups)):
+            for g in range(len(sums)):
                 curvature += sums[g]
             for m in range(len(low)):
                 along = _inner(low[m], p)
@@ -175,11 +175,11 @@ def _solve(order, lower, upper, diagonal, inverse, fields, first, coarse, rhs, x
             if not curvature > 0.0:
                 return iteration - 1, False, True, first_norm
             alpha = rz / curvature
-        update(alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
+        update(alpha, coarse_groups, p, Ap, w, x, r, y, restricted)
         _coarse_solution(restricted, coarse, first, coefficients)
-        backward(colors, groups, start, *upper, inverse, fields, coefficients, r, y, s, t, Ut, sums)
+        backward(clusters, upper, inverse, coarse_groups, coefficients, r, y, s, t, Ut, sums)
         rz = 0.0
-        for g in range(len(groups)):
+        for g in range(len(sums)):
             rz += sums[g]
         for k in range(len(restricted)):
             rz += restricted[k] * coefficients[k]

@@ -1,9 +1,10 @@
 """The order of a Gauss-Seidel sweep over the rows of a 3x3-block matrix, and the matrix in that order.
 
 Groups of rows have colors, so that no two of one color are coupled: those of one color are swept at the same time, with
-the same bits on any number of threads. A sweep forward reads the blocks left of the diagonal, one backward those right
-of it. Both are stored in the order in which they are read, the right ones from the last row to the first: read in
-descending order from beyond the cache, they take five times as long.
+the same bits on any number of threads. Within a group, the rows of a cluster follow each other; the blocks within a
+cluster are its diagonal. A sweep forward reads the blocks left of the diagonal, one backward those right of it. Both
+are stored in the order in which they are read, the right ones from the last row to the first: read in descending order
+from beyond the cache, they take five times as long.
 """
 
 from __future__ import annotations
@@ -45,38 +46,59 @@ class SweepOrder:
 
     Attributes
     ----------
-    rows : (n,) row at each place; diagonal_source : (n,) where its diagonal block is in the matrix
-    groups : (g,) group at each place; group_start : (g + 1,) first place of its rows
-    color_start : (c + 1,) first group of each color
+    rows : (n,) row at each place; color_start : (c + 1,) first group of each color
+    group_start : (g + 1,) first cluster of each group, in the order of the sweep
+    cluster_start : (k + 1,) first place of each cluster
+    dense_start : (k + 1,) first number of each cluster's matrix, row after row, where all are written one after another
+    dense_source : where each 3x3 block of these is in the matrix, -1 for zero; cluster after cluster, row after row
     lower : from the first place to the last; upper : from the last place to the first
     """
 
     rows: NDArray[np.int32]
-    diagonal_source: NDArray[np.int32]
-    groups: NDArray[np.int32]
-    group_start: NDArray[np.int32]
     color_start: NDArray[np.int32]
+    group_start: NDArray[np.int32]
+    cluster_start: NDArray[np.int32]
+    dense_start: NDArray[np.int32]
+    dense_source: NDArray[np.int32]
     lower: Triangle
     upper: Triangle
 
     @classmethod
-    def of(cls, pattern: BlockRows, group_start: NDArray[np.int32], group_of: NDArray[np.int32]) -> SweepOrder:
-        """Color the groups of a pattern.
+    def of(cls, pattern: BlockRows, group_of: NDArray[np.int32], cluster_of: NDArray[np.int32]) -> SweepOrder:
+        """Color the groups of a pattern. A cluster belongs to the group of its lowest row.
 
         Parameters
         ----------
-        group_start : (g + 1,) first row of each group; group_of : (n,) group of each row
+        group_of : (n,) group of each row; cluster_of : (n,) lowest row of each row's cluster
         """
-        colors = _colors(pattern.row_start, pattern.columns, group_start, group_of)
-        groups = np.argsort(colors, kind="stable").astype(np.int32)
-        color_start = np.append(0, np.cumsum(np.bincount(colors))).astype(np.int32)
-        begin, end = group_start[groups], group_start[groups + 1]
-        start = np.append(0, np.cumsum(end - begin)).astype(np.int32)
-        rows = _ranges(begin, end).astype(np.int32)
+        n = pattern.rows
+        group = group_of[cluster_of]
+        by_group = np.lexsort((cluster_of, group)).astype(np.int32)
+        groups = int(group_of.max(initial=-1)) + 1
+        begin = np.append(0, np.cumsum(np.bincount(group, minlength=groups))).astype(np.int32)
+        colors = _colors(pattern.row_start, pattern.columns, by_group, begin, group)
+        sequence = np.argsort(colors, kind="stable").astype(np.int32)
+        rows = by_group[_ranges(begin[sequence], begin[sequence + 1])]
         place = np.empty_like(rows)
-        place[rows] = np.arange(len(rows))
-        lower, upper = _triangle(pattern, rows, place, 1), _triangle(pattern, rows[::-1], place, -1)
-        return cls(rows, pattern.diagonal[rows], groups, start, color_start, lower, upper)
+        place[rows] = np.arange(n)
+        cluster = np.cumsum(np.append(True, np.diff(cluster_of[rows]) != 0)[:n]) - 1  # of each place
+        cluster_start = np.append(0, np.cumsum(np.bincount(cluster))).astype(np.int32)
+        sizes = np.diff(cluster_start).astype(np.int64)
+        places_of_groups = np.append(0, np.cumsum(np.diff(begin)[sequence]))
+        dense = np.append(0, np.cumsum(sizes**2)).astype(np.int32)
+        dense_source, lower, upper = _parts(
+            pattern.row_start, pattern.columns, rows, place, cluster, cluster_start, dense
+        )
+        return cls(
+            rows,
+            np.append(0, np.cumsum(np.bincount(colors))).astype(np.int32),
+            np.searchsorted(cluster_start, places_of_groups).astype(np.int32),
+            cluster_start,
+            9 * dense,
+            dense_source,
+            Triangle.of(*lower),
+            Triangle.of(*upper),
+        )
 
     def take(self, data: NDArray[np.float64]) -> None:
         """Copy the blocks (b, 3, 3) of a matrix beside the diagonal."""
@@ -86,17 +108,17 @@ class SweepOrder:
 
 
 @njit(cache=True)
-def _colors(row_start, columns, group_start, group_of):
+def _colors(row_start, columns, rows, group_start, group):
     """(g,) for each group in turn the first color that no group has that it is coupled with."""
     groups = len(group_start) - 1
     colors = np.full(groups, -1, dtype=np.int32)
     taken = np.full(groups + 1, -1, dtype=np.int32)
     for g in range(groups):
-        for i in range(group_start[g], group_start[g + 1]):
+        for k in range(group_start[g], group_start[g + 1]):
+            i = rows[k]
             for q in range(row_start[i], row_start[i + 1]):
-                if columns[q] >= group_start[g]:
-                    break
-                taken[colors[group_of[columns[q]]]] = g
+                if group[columns[q]] < g:
+                    taken[colors[group[columns[q]]]] = g
         color = 0
         while taken[color] == g:
             color += 1
@@ -110,14 +132,40 @@ def _ranges(begin: NDArray[np.int32], end: NDArray[np.int32]) -> NDArray[np.int6
     return np.repeat(begin - (np.cumsum(lengths) - lengths), lengths) + np.arange(lengths.sum())
 
 
-def _triangle(pattern: BlockRows, rows: NDArray[np.int32], place: NDArray[np.int32], sign: int) -> Triangle:
-    """The blocks whose columns have lower places (sign 1) or higher ones (sign -1) than their rows, row after row."""
-    begin, end = pattern.row_start[rows], pattern.row_start[rows + 1]
-    source, of = _ranges(begin, end), np.repeat(np.arange(len(rows)), end - begin)
-    columns = place[pattern.columns[source]]
-    beside = sign * columns < sign * place[rows][of]
-    start = np.append(0, np.cumsum(np.bincount(of[beside], minlength=len(rows)))).astype(np.int32)
-    return Triangle.of(start, columns[beside], source[beside].astype(np.int32))
+@njit(cache=True)
+def _parts(row_start, columns, rows, place, cluster, cluster_start, dense_start):
+    """The sources of the clusters' matrices, and of both triangles starts, columns and sources."""
+    n = len(rows)
+    dense_source = np.full(dense_start[-1], -1, dtype=np.int32)
+    lower_start, upper_start = np.zeros(n + 1, dtype=np.int32), np.zeros(n + 1, dtype=np.int32)
+    for i in range(n):
+        k = cluster[i]
+        for q in range(row_start[rows[i]], row_start[rows[i] + 1]):
+            j = place[columns[q]]
+            if j < cluster_start[k]:
+                lower_start[i + 1] += 1
+            elif j >= cluster_start[k + 1]:
+                upper_start[n - i] += 1
+            else:
+                size = cluster_start[k + 1] - cluster_start[k]
+                dense_source[dense_start[k] + (i - cluster_start[k]) * size + j - cluster_start[k]] = q
+    for i in range(n):
+        lower_start[i + 1] += lower_start[i]
+        upper_start[i + 1] += upper_start[i]
+    lower, lower_source = np.empty(lower_start[n], dtype=np.int32), np.empty(lower_start[n], dtype=np.int32)
+    upper, upper_source = np.empty(upper_start[n], dtype=np.int32), np.empty(upper_start[n], dtype=np.int32)
+    for i in range(n):
+        k = cluster[i]
+        at, to = lower_start[i], upper_start[n - 1 - i]
+        for q in range(row_start[rows[i]], row_start[rows[i] + 1]):
+            j = place[columns[q]]
+            if j < cluster_start[k]:
+                lower[at], lower_source[at] = j, q
+                at += 1
+            elif j >= cluster_start[k + 1]:
+                upper[to], upper_source[to] = j, q
+                to += 1
+    return dense_source, (lower_start, lower, lower_source), (upper_start, upper, upper_source)
 
 
 @njit(cache=True, parallel=True)

@@ -306,6 +306,48 @@ def test_known_vertices_cross_an_outline_without_a_jump_or_a_force_along_the_fac
     assert np.abs(np.diff(energies) - work).max() < 3e-9 * max(energies)
 
 
+def beside_another_part():
+    """Vertices beside an outline come before the side of another part, out of contact's reach."""
+    part = sp.shapes.box((SIDE, SIDE, 1.5 * SIDE), (1, 1, 1))
+    away = np.array([SIDE + 1.25 * DHAT, 0.9 * DHAT, 0.0])
+    lower = cube(1)
+    both = sp.TetMesh(
+        np.concatenate([lower.vertices, part.vertices + away]), np.concatenate([lower.tets, part.tets + 8])
+    )
+    return both, np.array([0.2, 0.4, 0.0]) * DHAT, np.array([0.0, -1.0, 0.0])
+
+
+def beside_a_corner():
+    """A vertex is beside two edges of an L, and comes nearer to one of them."""
+    block = sp.shapes.box((2 * SIDE, SIDE, 2 * SIDE), (2, 1, 2))
+    kept = (block.vertices[block.tets].mean(axis=1)[:, [0, 2]] < 0.0).any(axis=1)
+    corner = np.array([0.4 * DHAT - 0.5 * SIDE, 0.2 * DHAT, 0.4 * DHAT - 0.5 * SIDE])
+    return sp.TetMesh.dropping_unused(block.vertices, block.tets[kept]), corner, np.array([1.0, 0.0, -1.0])
+
+
+@pytest.mark.parametrize("place", [beside_another_part, beside_a_corner])
+def test_nothing_jumps_where_another_feature_is_the_nearest_or_begins_to_count(place):
+    lower, shift, way = place()
+    model, x, rows = boxes(lower, cube(1))
+    barrier = Barrier(model.collisions, KAPPA)
+    x[rows] += shift
+    energies, forces = [], []
+    over = x.copy()
+    over[rows] -= DHAT * np.array([1.0, 0.0, 1.0])
+    model.collisions.keep_weights(over)
+    for step in (-1e-9, 1e-9):
+        moved = x.copy()
+        moved[rows] += step * way
+        model.collisions.keep_weights(moved)
+        gradient = np.zeros_like(x)
+        barrier.add_gradient(moved, gradient)
+        energies.append(barrier.value(moved))
+        forces.append(gradient[rows])
+    assert min(energies) > 0.0
+    assert abs(np.diff(energies)[0]) < 1e-3 * max(energies)
+    assert np.abs(forces[1] - forces[0]).max() < 1e-3 * np.abs(forces[0]).max()
+
+
 def test_a_vertex_on_a_diagonal_counts_once_whatever_the_round_off():
     """The closest point may have a barycentric coordinate that is a rounding error below zero."""
     floor = sp.obstacles.Box(center=(0, -0.05, 0), size=(0.2, 0.1, 0.2))

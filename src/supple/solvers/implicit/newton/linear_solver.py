@@ -128,16 +128,18 @@ class LinearSolver:
     ) -> None:
         """Assemble with couplings of vertices that no element joins, on a new pattern where one has no block yet."""
         places = self.joint.places(couplings) if self.joint is not None else None
+        renewed = self.joint is None or places is None
         if self.joint is None or places is None:
             self.joint = JointPattern.of(self.pattern, couplings, self.row_of)
             places = self.joint.places(couplings)
             assert places is not None
-            before = self.preconditioner.first
-            self.preconditioner = self.elements_only.on(self.joint.pattern)
-            if not np.array_equal(before, self.preconditioner.first):
-                self.age = -1
             self.matrix = np.empty((self.joint.pattern.blocks, 3, 3))
         self.joint.assemble(elements, diagonal, couplings.blocks, places, self.matrix)
+        if renewed or self.age < 0:
+            before = self.preconditioner.first
+            self.preconditioner = self.elements_only.on(self.joint.pattern, self.matrix)
+            if not np.array_equal(before, self.preconditioner.first):
+                self.age = -1
 
     def solve(
         self, force: NDArray[np.float64], tolerance: float, convex: bool = True
