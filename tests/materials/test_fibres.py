@@ -98,5 +98,3 @@ def test_bad_parameters_are_one_clear_line():
         tissue([[0, 0, 0]])
     with pytest.raises(SceneError, match="directions has 2 rows for 5 tets; give one per tet"):
         tissue(np.ones((2, 1, 3))).per_tet(5)
-    with pytest.raises(SceneError, match="fibres are not averaged over patches"):
-        sp.HolzapfelGasserOgden(c10=C10, bulk=BULK, k1=K1, k2=K2, directions=[[1, 0, 0]], integration="patches")

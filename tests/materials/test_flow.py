@@ -215,9 +215,9 @@ def test_what_cannot_be_is_one_clear_line():
         sp.J2Plastic(youngs=1e5, poisson=0.3, yield_stress=2e3, saturation_stress=1e3)
 
 
-def test_a_series_on_patches_is_in_equilibrium_with_its_stress(tmp_path):
-    mesh = sp.shapes.box((0.3, 0.2, 0.2), (3, 2, 2))
-    rubber = sp.MooneyRivlin(c10=8e4, c01=2e4, bulk=1e7, integration="patches")
+def test_a_series_in_nearly_incompressible_quadratic_tets_has_the_energy_of_the_report(tmp_path):
+    mesh = sp.shapes.box((0.3, 0.2, 0.2), (3, 2, 2), order=2)
+    rubber = sp.MooneyRivlin(c10=8e4, c01=2e4, bulk=1e7)
     x = mesh.vertices[:, 0]
     ends = [(x == x.min()).nonzero()[0], (x == x.max()).nonzero()[0]]
     pins = [sp.Pin("bar", ends[0]), sp.Pin("bar", ends[1], motion=lambda t: (min(t, 0.1), 0, 0))]
@@ -226,13 +226,7 @@ def test_a_series_on_patches_is_in_equilibrium_with_its_stress(tmp_path):
     scene = sp.Scene([body], pins=pins, gravity=(0, 0, 0))
     *_, frame = sp.simulate(scene, STATIC, dt=0.05, steps=4, sinks=[sink])
     assert frame.report.status == "converged"
-    system, P = frame.system, frame.first_piola["bar"]
-    forces = np.einsum("e,eij,ekj->eki", -system.rest_volumes, P, system.rest_shape_inverse)
-    total = np.zeros_like(frame.positions["bar"])
-    np.add.at(total, mesh.tets[:, 1:], forces)
-    np.add.at(total, mesh.tets[:, 0], -forces.sum(axis=1))
-    free = np.setdiff1d(np.arange(len(x)), np.concatenate(ends))
-    assert np.abs(total[free]).max() < 1e-9 * np.abs(total).max()
+    system = frame.system
     with sp.read_recording(sink.path) as recording:
         np.testing.assert_array_equal(recording[-1].stress["bar"], frame.stress["bar"])
         state = frame.state

@@ -121,9 +121,9 @@ def test_there_is_no_energy_where_the_volume_is_not_positive():
     assert np.isnan(MOONEY.first_piola(np.diag([1.0, 1.0, -1.0]))).all()
 
 
-def bodies(integration):
+def bodies():
     """A mesh of all three materials, with a parameter per tet."""
-    rubber = {"bulk": 4e6, "integration": integration}
+    rubber = {"bulk": 4e6}
     c10 = np.linspace(1e5, 2e5, len(MESH.tets))
     parts = [
         sp.MooneyRivlin(c10=c10, c01=3e4, **rubber),
@@ -133,9 +133,8 @@ def bodies(integration):
     return sp.Regions(materials=parts, index=np.repeat([0, 1, 2], [4, 4, len(MESH.tets) - 8]))
 
 
-@pytest.mark.parametrize("integration", ["tets", "patches"])
-def test_energies_of_bodies_have_slope_two(integration):
-    system = build_system(sp.Scene([sp.Body("block", MESH, bodies(integration))]))
+def test_energies_of_bodies_have_slope_two():
+    system = build_system(sp.Scene([sp.Body("block", MESH, bodies())]))
     energy = elasticity_of(system)
     rng = np.random.default_rng(3)
     x = MESH.vertices @ (np.eye(3) + 0.2 * rng.normal(size=(3, 3))).T + 0.01 * rng.normal(size=MESH.vertices.shape)
@@ -147,12 +146,11 @@ def test_energies_of_bodies_have_slope_two(integration):
     assert order(lambda h: differences(energy, x, d, h)[1], exact, 1e-4) == pytest.approx(2.0, abs=0.1)
 
 
-@pytest.mark.parametrize("integration", ["tets", "patches"])
-def test_a_body_in_equilibrium_is_recorded_with_its_laws(integration, tmp_path):
+def test_a_body_in_equilibrium_is_recorded_with_its_laws(tmp_path):
     x = MESH.vertices[:, 0]
     ends = [(x == x.min()).nonzero()[0], (x == x.max()).nonzero()[0]]
     pins = [sp.Pin("bar", ends[0]), sp.Pin("bar", ends[1], motion=lambda t: (0.1 * t, 0.02 * t, 0.0))]
-    scene = sp.Scene([sp.Body("bar", MESH, bodies(integration))], pins=pins)
+    scene = sp.Scene([sp.Body("bar", MESH, bodies())], pins=pins)
     sink = sp.Recorder(tmp_path / "r.vtkhdf")
     (frame,) = sp.simulate(scene, sp.Implicit(integrator="static", contact=None), dt=1.0, steps=1, sinks=[sink])
     assert frame.report.status == "converged"
@@ -184,7 +182,6 @@ def test_a_body_in_equilibrium_is_recorded_with_its_laws(integration, tmp_path):
         (lambda: sp.Ogden(mu=[1e5], alpha=[2, 3], bulk=1e6), "Ogden: 1 mu and 2 alpha"),
         (lambda: sp.Ogden(mu=[1e5], alpha=[0.0], bulk=1e6), "Ogden: an alpha is 0"),
         (lambda: sp.Ogden(mu=1e5, alpha=[2.0], bulk=1e6), "Ogden: mu is 100000.0; give a list"),
-        (lambda: sp.Yeoh(c10=1e5, bulk=1e6, integration="mean"), "Yeoh: integration is 'mean'"),
     ],
 )  # fmt: skip
 def test_bad_parameters_are_one_clear_line(make, message):

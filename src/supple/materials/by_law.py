@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, Choice, NumberPerTet
+from supple.kinds.forms import POSITIVE, NumberPerTet
 from supple.materials.material import Hyperelastic
-from supple.materials.per_tet import BY_LAW, NO_REGION, Law, LawTets, TetMaterial, one_per_tet
+from supple.materials.per_tet import BY_LAW, Law, LawTets, TetMaterial, one_per_tet
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -22,7 +22,6 @@ class ByLaw(Hyperelastic):
     Parameters
     ----------
     bulk : bulk modulus K at rest [Pa]; one number, or one per tetrahedron.
-    integration : "tets" or "patches", as of `Elastic`.
 
     Attributes
     ----------
@@ -32,25 +31,15 @@ class ByLaw(Hyperelastic):
     shear_formula: ClassVar[str]
 
     bulk: Annotated[float | NDArray[np.float64], NumberPerTet(POSITIVE)]
-    integration: Annotated[str, Choice(("tets", "patches"))] = "tets"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check()
-        self._check_integration()
         mu = np.atleast_1d(self.rest_moduli()[0])
         if not (mu > 0.0).all():
             raise SceneError(
                 f"{type(self).__name__}: the shear modulus at rest, {self.shear_formula}, is "
                 f"{mu[~(mu > 0.0)][0]:g} Pa; give parameters with which it is above zero"
-            )
-
-    def _check_integration(self) -> None:
-        name = type(self).__name__
-        if self.integration == "patches" and self.law().bulk is None:
-            raise SceneError(
-                f"{name}: integration='patches' needs an energy with the volume term K/2 (J - 1)^2; give "
-                "integration='tets'"
             )
 
     def _check(self) -> None:
@@ -84,6 +73,5 @@ class ByLaw(Hyperelastic):
         name = type(self).__name__
         columns = [one_per_tet(value, n_tets, f"{name}: {key}") for key, value in self.law_parameters()]
         mu, bulk = self.rest_moduli()
-        region = 0 if self.integration == "patches" else NO_REGION
-        basis = self._tet_material(n_tets, BY_LAW, mu, bulk - 2.0 * mu / 3.0, region)
+        basis = self._tet_material(n_tets, BY_LAW, mu, bulk - 2.0 * mu / 3.0)
         return basis.with_laws(LawTets(self.law(), np.arange(n_tets), np.column_stack(columns)))

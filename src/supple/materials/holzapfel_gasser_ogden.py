@@ -62,13 +62,6 @@ class HolzapfelGasserOgden(ByLaw):
             raise SceneError(f"{name}: a direction is zero or not finite; give vectors of a length above zero")
         object.__setattr__(self, "directions", directions / lengths[..., None])
 
-    def _check_integration(self) -> None:
-        if self.integration != "tets":
-            raise SceneError(
-                f"{type(self).__name__}: integration is {self.integration!r}; give 'tets': fibres are not averaged "
-                "over patches"
-            )
-
     def rest_moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Of the ground, without fibres."""
         return 2.0 * np.asarray(self.c10), np.asarray(self.bulk)

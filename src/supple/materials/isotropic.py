@@ -57,7 +57,7 @@ if TYPE_CHECKING:  # `functions_of` gives these names to each copy of the functi
 
     def stress(U, s, V, mu, lam) -> Any: ...
 
-    def principal_hessian(s, mu, lam, project) -> Any: ...
+    def principal_hessian(s, mu, lam, pressure, project) -> Any: ...
 
 
 def _energy_density(F, mu, lam):
@@ -88,20 +88,29 @@ def _stress(U, s, V, mu, lam):
 @njit
 def stable_piola(F, mu, lam):
     """P = mu F + (lam (J - 1) - mu) cof F of Stable Neo-Hookean material, which needs no stretches."""
-    c = lam * shape_and_volume(F)[1] - mu
-    a, b, d = F[0:3], F[3:6], F[6:9]
-    u, v, w = cross(b, d), cross(d, a), cross(a, b)
+    return add_scaled(F, mu, cofactor(F), lam * shape_and_volume(F)[1] - mu)
+
+
+@njit
+def add_scaled(A, a, B, b):
+    """a A + b B of nine numbers each."""
     return (
-        mu * a[0] + c * u[0],
-        mu * a[1] + c * u[1],
-        mu * a[2] + c * u[2],
-        mu * b[0] + c * v[0],
-        mu * b[1] + c * v[1],
-        mu * b[2] + c * v[2],
-        mu * d[0] + c * w[0],
-        mu * d[1] + c * w[1],
-        mu * d[2] + c * w[2],
+        a * A[0] + b * B[0],
+        a * A[1] + b * B[1],
+        a * A[2] + b * B[2],
+        a * A[3] + b * B[3],
+        a * A[4] + b * B[4],
+        a * A[5] + b * B[5],
+        a * A[6] + b * B[6],
+        a * A[7] + b * B[7],
+        a * A[8] + b * B[8],
     )
+
+
+@njit
+def cofactor(F):
+    """dJ/dF, nine numbers."""
+    return (*cross(F[3:6], F[6:9]), *cross(F[6:9], F[0:3]), *cross(F[0:3], F[3:6]))
 
 
 @njit
@@ -126,16 +135,23 @@ def nearest_semidefinite(A):
     )
 
 
-def _principal_hessian(s, mu, lam, project):
-    """The Hessian in the frame of U and V.
+@njit
+def add_pressure(s, pressure, A, q):
+    """psi_ij and the quotients d and t of psi + pressure J, from those of psi (`StretchFunctions`)."""
+    a, b, c = pressure * s[0], pressure * s[1], pressure * s[2]
+    A = (A[0], A[1], A[2], A[3] + a, A[4] + b, A[5] + c)
+    return A, (q[0] - a, q[1] - b, q[2] - c, q[3] + a, q[4] + b, q[5] + c)
+
+
+def _principal_hessian(s, mu, lam, pressure, project):
+    """The Hessian of psi + pressure J in the frame of U and V.
 
     Returns
     -------
     A : psi_ij as (a00, a11, a22, a12, a02, a01)
     alpha, beta : (three numbers each, for the pairs 12, 02, 01)
     """
-    A = curvature(s, mu, lam)
-    q = quotients(s, mu, lam)
+    A, q = add_pressure(s, pressure, curvature(s, mu, lam), quotients(s, mu, lam))
     if project:
         A = nearest_semidefinite(A)
         q = (max(q[0], 0.0), max(q[1], 0.0), max(q[2], 0.0), max(q[3], 0.0), max(q[4], 0.0), max(q[5], 0.0))
@@ -178,7 +194,7 @@ _FUNCTIONS = {kind: functions_of(kind) for kind in (UNKNOWN, *range(len(STRETCH_
 
 
 class KernelOfKinds:
-    """A kernel over tets or patches that is compiled for each kind of energy by itself, where a scene has it.
+    """A kernel over tets that is compiled for each kind of energy by itself, where a scene has it.
 
     Parameters
     ----------
@@ -265,7 +281,7 @@ def hessians(F, kind, mu, lam, project, out):
     for e in range(len(F)):
         if is_kind(kind[e], KIND):
             U, s, V = decompose(load_mat(F, e))
-            A, alpha, beta = principal_hessian(s, mu[e], lam[e], project)
+            A, alpha, beta = principal_hessian(s, mu[e], lam[e], 0.0, project)
             store_hessian(U, A, alpha, beta, V, out, e)
 
 

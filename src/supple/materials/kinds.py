@@ -16,7 +16,7 @@ from supple.materials.stretch_energies import (
     st_venant_kirchhoff,
     stable_neo_hookean,
 )
-from supple.materials.stretch_energies.stretches import StretchFunctions
+from supple.materials.stretch_energies.stretches import StretchFunctions, no_volume_term
 
 STRETCH_ENERGIES: tuple[StretchFunctions, ...] = (
     stable_neo_hookean.FUNCTIONS,
@@ -31,6 +31,11 @@ def needs_positive_volume(kind: NDArray[np.int32]) -> NDArray[np.bool_]:
     """(m,) whether the energy of each tet's material is infinite for J <= 0, from its kind (m,)."""
     wanted = [k for k, energy in enumerate(STRETCH_ENERGIES) if energy.needs_positive_volume]
     return np.isin(kind, wanted)
+
+
+def has_volume_term(kind: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(m,) whether lam is the factor of a function of J alone in the energy of a tet, from its kind (m,)."""
+    return np.isin(kind, [k for k, energy in enumerate(STRETCH_ENERGIES) if energy.volume_term is not no_volume_term])
 
 
 def without_inversion(material: TetMaterial) -> NDArray[np.bool_]:

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Choice, Number, NumberPerTet
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Number, NumberPerTet
 from supple.kinds.kind import Kind
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.laws.internal import add_resting_densities, add_resting_hessians, add_resting_piolas
 from supple.materials.laws.pointwise import densities_at, hessians_at, piolas_at
-from supple.materials.per_tet import NO_REGION, TetMaterial, one_per_tet
-from supple.materials.stretch_energies.stretches import StretchFunctions, no_volume_term
+from supple.materials.per_tet import TetMaterial, one_per_tet
+from supple.materials.stretch_energies.stretches import StretchFunctions
 
 
 def lame_from_engineering(youngs: ArrayLike, poisson: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -83,9 +83,7 @@ class Material(Kind, ABC):
         SceneError : where a parameter is given per tet, for another number of tets.
         """
 
-    def _tet_material(
-        self, n_tets: int, kind: int, mu: ArrayLike, lam: ArrayLike, region: int = NO_REGION
-    ) -> TetMaterial:
+    def _tet_material(self, n_tets: int, kind: int, mu: ArrayLike, lam: ArrayLike) -> TetMaterial:
         name = type(self).__name__
         return TetMaterial(
             density=one_per_tet(self.density, n_tets, f"{name}: density"),
@@ -93,7 +91,6 @@ class Material(Kind, ABC):
             kind=np.full(n_tets, kind, dtype=np.int32),
             mu=one_per_tet(mu, n_tets, f"{name}: mu"),
             lam=one_per_tet(lam, n_tets, f"{name}: lam"),
-            region=np.full(n_tets, region, dtype=np.int32),
         )
 
 
@@ -181,9 +178,6 @@ class Elastic(Hyperelastic):
     youngs : Young's modulus E of small strains [Pa]; one number, or one per tetrahedron of the body.
     poisson : Poisson's ratio nu [-], above -1 and below 0.5; one number, or one per tetrahedron. Below 0
         (auxetic), some energies have no lower bound at large strains; see docs/reference/materials.md.
-    integration : "tets", the energy of each tet from its own F; or "patches", from the mean F around each edge and
-        the mean J around each vertex, with which tets bend, twist and keep their volume without locking (`Implicit`
-        only; energies with a volume term lam U(J)). See docs/theory/locking.md.
 
     Raises
     ------
@@ -194,19 +188,6 @@ class Elastic(Hyperelastic):
 
     youngs: Annotated[float | NDArray[np.float64], NumberPerTet(POSITIVE)]
     poisson: Annotated[float | NDArray[np.float64], NumberPerTet(POISSON)]
-    integration: Annotated[str, Choice(("tets", "patches"))] = "tets"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._check_integration()
-
-    def _check_integration(self) -> None:
-        kind = type(self).__name__
-        if self.integration == "patches" and self.stretch_functions.volume_term is no_volume_term:
-            raise SceneError(
-                f"{kind}: integration='patches' needs an energy with a volume term of J; give integration='tets', or "
-                "use StableNeoHookean, NeoHookean or FixedCorotated"
-            )
 
     @classmethod
     def energy_kind(cls) -> int:
@@ -231,5 +212,4 @@ class Elastic(Hyperelastic):
         name = type(self).__name__
         one_per_tet(self.youngs, n_tets, f"{name}: youngs")
         one_per_tet(self.poisson, n_tets, f"{name}: poisson")
-        region = 0 if self.integration == "patches" else NO_REGION
-        return self._tet_material(n_tets, self.energy_kind(), *self.lame_parameters(), region)
+        return self._tet_material(n_tets, self.energy_kind(), *self.lame_parameters())

@@ -17,7 +17,6 @@ from supple.errors import SceneError
 NOT_ELASTIC = -1
 BY_LAW = -2
 UNKNOWN = -1  # to kernels both are
-NO_REGION = -1
 
 
 class Law(ABC):
@@ -28,8 +27,8 @@ class Law(ABC):
     counts : numbers of parameters that a row may have
     name : by which recordings know the law; None for one that they do not keep
     infinite_when_flat : whether psi goes to infinity wherever J goes to zero. No law has an energy for J <= 0.
-    bulk : the parameter K, where psi has the volume term K/2 (J - 1)^2 and no other; such tets can be averaged over
-        patches. None where there is none.
+    bulk : the parameter K of the law, where psi has the volume term K/2 (J - 1)^2, of which quadratic tets average J.
+        None where there is none.
     """
 
     counts: range
@@ -118,7 +117,6 @@ class TetMaterial:
     density : (m,) [kg/m^3]; damping : (m,) Kelvin-Voigt time [s]
     kind : (m,) int32, the row of `kinds.STRETCH_ENERGIES`, `BY_LAW` or `NOT_ELASTIC`
     mu, lam : (m,) parameters of each material's energy density [Pa]; of tets `BY_LAW` the Lamé parameters at rest
-    region : (m,) int32, the region over whose patches the energy of a tet is averaged, or `NO_REGION`
     laws : whose energies are added to those of `kind`; tets `BY_LAW` have no other
     """
 
@@ -127,7 +125,6 @@ class TetMaterial:
     kind: NDArray[np.int32]
     mu: NDArray[np.float64]
     lam: NDArray[np.float64]
-    region: NDArray[np.int32]
     laws: tuple[LawTets, ...] = ()
 
     @property

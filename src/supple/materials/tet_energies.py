@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from supple.materials.isotropic import STABLE, hessian_block, is_kind, kernel_of_kinds, stable_piola
+from supple.materials.isotropic import (
+    STABLE,
+    add_scaled,
+    cofactor,
+    hessian_block,
+    is_kind,
+    kernel_of_kinds,
+    stable_piola,
+)
 from supple.numerics.mat3 import cross, dot, load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.svd3 import svd3 as decompose
 from supple.runtime.kernel_cache import njit, prange
@@ -146,15 +154,15 @@ def _minus_cross(a, scale, u, v, factor, diagonal):
 
 
 @njit
-def _put_stable_hessian(x, tets, B, volume, mu, lam, out, e):
-    """The Hessian of a Stable Neo-Hookean tet into out[e], from the derivatives of J = det(Ds) det(B) by its nodes."""
+def _put_stable_hessian(x, tets, B, volume, mu, lam, pressure, out, e):
+    """The Hessian of a Stable Neo-Hookean tet with a pressure into out[e], from derivatives of J = det(Ds) det(B)."""
     D = edge_matrix(x, tets, e)
     a, b, d = (D[0], D[3], D[6]), (D[1], D[4], D[7]), (D[2], D[5], D[8])
     g, h, k = B[0:3], B[3:6], B[6:9]
     scale = dot(g, cross(h, k))
     u, v, w = cross(b, d), cross(d, a), cross(a, b)
     J = scale * dot(a, u)
-    c = volume * scale * (lam * (J - 1.0) - mu)
+    c = volume * scale * (lam * (J - 1.0) - mu + pressure)
     m, s = volume * mu, volume * lam * scale * scale
     zero = (0.0, 0.0, 0.0)
     _put_blocks(
@@ -170,13 +178,14 @@ def _put_stable_hessian(x, tets, B, volume, mu, lam, out, e):
 
 
 @kernel_of_kinds(parallel=True)
-def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
+def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, pressures, second, project, energies, gradients, hessians):
     """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets from at most one
     decomposition of each F, which takes most of the time; without `project`, that of Stable Neo-Hookean needs none.
 
     Parameters
     ----------
     x, tets, Dm_inv, volumes, kind, mu, lam : as of `element_energies`
+    pressures : (m,) [Pa]; gradients and Hessians are those of psi + pressure J, energies of psi; or (0,) without any
     second : whether Hessians are wanted; if not, `hessians` is left as it is
     project : see `element_hessians`
     """
@@ -185,17 +194,24 @@ def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, ene
             continue
         F = deformation_gradient(x, tets, Dm_inv, e)
         B = load_mat(Dm_inv, e)
+        pressure = pressures[e] if len(pressures) else 0.0
         if KIND == STABLE and not (second and project):
             energies[e] = volumes[e] * density(F, (0.0, 0.0, 0.0), mu[e], lam[e])
-            put_gradient(stable_piola(F, mu[e], lam[e]), B, volumes[e], gradients, e)
+            P = stable_piola(F, mu[e], lam[e])
+            if pressure != 0.0:
+                P = add_scaled(P, 1.0, cofactor(F), pressure)
+            put_gradient(P, B, volumes[e], gradients, e)
             if second:
-                _put_stable_hessian(x, tets, B, volumes[e], mu[e], lam[e], hessians, e)
+                _put_stable_hessian(x, tets, B, volumes[e], mu[e], lam[e], pressure, hessians, e)
             continue
         U, s, V = decompose(F)
         energies[e] = volumes[e] * density(F, s, mu[e], lam[e])
-        put_gradient(stress(U, s, V, mu[e], lam[e]), B, volumes[e], gradients, e)
+        P = stress(U, s, V, mu[e], lam[e])
+        if pressure != 0.0:
+            P = add_scaled(P, 1.0, cofactor(F), pressure)
+        put_gradient(P, B, volumes[e], gradients, e)
         if second:
-            A, alpha, beta = principal_hessian(s, mu[e], lam[e], project)
+            A, alpha, beta = principal_hessian(s, mu[e], lam[e], pressure, project)
             put_hessian(U, A, alpha, beta, V, B, volumes[e], hessians, e)
 
 
@@ -218,7 +234,7 @@ def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
 
     Parameters as of `element_energies`.
     """
-    tet = x, tets, Dm_inv, volumes, kind, mu, lam
+    tet = x, tets, Dm_inv, volumes, kind, mu, lam, np.zeros(0)
     element_models(*tet, False, False, np.empty(len(tets)), out, np.empty((0, 12, 12)))
 
 
@@ -228,5 +244,5 @@ def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> N
 
     Other parameters as of `element_energies`.
     """
-    tet = x, tets, Dm_inv, volumes, kind, mu, lam
+    tet = x, tets, Dm_inv, volumes, kind, mu, lam, np.zeros(0)
     element_models(*tet, True, project, np.empty(len(tets)), np.empty((len(tets), 4, 3)), out)

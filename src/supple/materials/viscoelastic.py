@@ -61,11 +61,6 @@ class Viscoelastic(Hyperelastic):
         object.__setattr__(self, "prony", tuple((share, time) for share, time in pairs.tolist()))
 
     @property
-    def integration(self) -> str:
-        """That of the material; the elements are always those of tets, and have no volume term that could lock."""
-        return str(getattr(self.material, "integration", "tets"))
-
-    @property
     def youngs(self) -> float | NDArray[np.float64]:
         """Young's modulus of small strains after a long time [Pa]."""
         return self.material.youngs

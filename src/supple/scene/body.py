@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.checks import check_name, finite_vector, float_array, non_negative
 from supple.materials.material import Material
-from supple.materials.per_tet import NO_REGION
 from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.quadratic import node_volumes
 from supple.mesh.skin import Embedding
@@ -212,8 +211,6 @@ class Body(PlacedBody):
         check_look(self.look, owner)
         self._check_placement(owner, self.mesh.edges)
         self._require_one_value_per_tet(owner)
-        if self.mesh.order == 2 and (self.material.per_tet(len(self.mesh.tets)).region != NO_REGION).any():
-            raise SceneError(f'{owner}: quadratic tets need no patches; give its material integration="tets"')
 
     @property
     def drawn_look(self) -> str:

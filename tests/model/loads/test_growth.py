@@ -86,12 +86,13 @@ def test_heat_in_a_bar_between_walls_gives_its_thermal_stress():
     assert abs(stress[1, 1]) < 0.01 * abs(stress[0, 0])
 
 
-PATCHES = sp.StableNeoHookean(youngs=E, poisson=0.4, integration="patches")
 YEOH = sp.Yeoh(c10=2e4, c20=1e3, bulk=2e5)
 
 
 @pytest.mark.parametrize(
-    ("mesh", "law"), [(BAR, PATCHES), (BAR.to_order(2), RUBBER), (BAR, YEOH)], ids=["patches", "quadratic", "yeoh"]
+    ("mesh", "law"),
+    [(BAR.to_order(2), RUBBER), (BAR.to_order(2), YEOH), (BAR, YEOH)],
+    ids=["quadratic", "quadratic yeoh", "yeoh"],
 )
 def test_every_kind_of_tet_grows(mesh, law):
     pins = [sp.Pin("bar", [0])]

@@ -11,11 +11,11 @@ from scipy.sparse import csr_array
 
 from supple.materials.elastic_tets.active import ActiveTets, Growth
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
+from supple.materials.elastic_tets.mean_volume import MeanVolumes, mean_volumes
 from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS, QuadraticTets
 from supple.materials.laws.internal import checked, rows_of_points
 from supple.materials.material import Material
-from supple.materials.patches.domains import Patches, patches_of
-from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, LawTets, TetMaterial
+from supple.materials.per_tet import NOT_ELASTIC, LawTets, TetMaterial
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,17 +54,16 @@ class TetLaws:
         return replace(self, Dm_inv=Dm_inv, volumes=volumes, quadratic=curved, active=())
 
     @cached_property
-    def patches(self) -> Patches | None:
-        """The patches of the tets whose material is averaged over such; None where there is none."""
-        if not (self.material.region != NO_REGION).any():
-            return None
-        # Patches must not reach from body to body or into another region of the same body.
-        return patches_of(self.tets, self.Dm_inv, self.volumes, self.material)
+    def at_points(self) -> tuple[MeanVolumes | None, TetMaterial]:
+        """Of the quadratic tets: the terms of their mean volumes, and the material of each quadrature point."""
+        tets = self.quadratic
+        assert tets is not None
+        means, material = mean_volumes(self.material, tets.rows, tets.quadrature.volumes)
+        return means, of_points(material, tets.rows, QUADRATURE_POINTS)
 
-    def at_points(self, tets: QuadraticTets, internal: NDArray[np.float64]) -> tuple[TetMaterial, NDArray[np.float64]]:
-        """The material of each quadrature point, and the internal variables there, from those of the scene."""
-        own = of_points(self.material, tets.rows, QUADRATURE_POINTS)
-        return own, checked(self.material, internal)[rows_of_points(self.material)]
+    def internal_at_points(self, internal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The internal variables at the quadrature points, from those of the scene."""
+        return checked(self.material, internal)[rows_of_points(self.material)]
 
     def means(self, part: LawTets, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k,) means over each of the k tets of a law, from values (k s,) at its s points in each."""
@@ -123,7 +122,7 @@ def tet_material(material: Material, count: int, order: int) -> TetMaterial:
 
 def joined_materials(parts: list[TetMaterial]) -> TetMaterial:
     """The materials of several bodies as one, in their order."""
-    names = ("density", "damping", "kind", "mu", "lam", "region")
+    names = ("density", "damping", "kind", "mu", "lam")
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     laws, begin = [], 0
     for part in parts:

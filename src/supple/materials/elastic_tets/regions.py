@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.materials.material import Elastic, Hyperelastic
-from supple.materials.per_tet import NO_REGION, TetMaterial
+from supple.materials.per_tet import TetMaterial
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,7 +25,6 @@ class Regions(Elastic):
     Attributes
     ----------
     youngs, poisson, density, damping : (n_tets,) of each tet's material, as for any material.
-    integration : that of each material counts, not this one; patches do not reach into another material.
 
     Raises
     ------
@@ -36,7 +35,6 @@ class Regions(Elastic):
     index: ArrayLike
     youngs: NDArray[np.float64] = field(init=False)
     poisson: NDArray[np.float64] = field(init=False)
-    integration: str = field(init=False, default="tets")
     density: NDArray[np.float64] = field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
     damping: NDArray[np.float64] = field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
@@ -80,13 +78,12 @@ class Regions(Elastic):
         index = np.asarray(self.index)
         if len(index) != n_tets:
             raise SceneError(f"Regions: index has {len(index)} values for {n_tets} tets; give one per tet")
-        kind, region = np.empty(n_tets, dtype=np.int32), np.empty(n_tets, dtype=np.int32)
+        kind = np.empty(n_tets, dtype=np.int32)
         mu, lam = np.empty(n_tets), np.empty(n_tets)
         laws = []
         for k, material in enumerate(self.materials):
             here, part = index == k, material.per_tet(n_tets)
             for out, values in ((kind, part.kind), (mu, part.mu), (lam, part.lam)):
                 out[here] = values[here]
-            region[here] = k if part.region[0] != NO_REGION else NO_REGION
             laws += [tets.selected(here) for tets in part.laws]
-        return TetMaterial(self.density, self.damping, kind, mu, lam, region, tuple(laws))
+        return TetMaterial(self.density, self.damping, kind, mu, lam, tuple(laws))

@@ -1,14 +1,11 @@
 """Stresses and energy densities of all tets, from positions.
 
 The first Piola stress P of a tet is the one whose nodal forces -V P Dm^-T, added up, are the elastic forces on the
-vertices. For most materials it is d psi / dF. Where strains are averaged over patches, their virtual work is
-
-    sum_k V_k P_k : dF_k + sum_a p_a dV_a = sum_e V_e (mean_k P_k + mean_a p_a cof F) : dF_e,
-
-the means over the six edges and the four vertices of tet e (see `materials.patches`): the stress of the tet.
+vertices, d psi / dF.
 
 A quadratic tet has one value of each quantity, too, the mean over its volume: at rest of F, P and the energy density,
-as it is deformed of the Cauchy stress. J is the ratio of the volumes.
+as it is deformed of the Cauchy stress. J is the ratio of the volumes. At its points the stress has the pressure of the
+mean volume (see `mean_volume`), d psi' / dF + p cof F.
 """
 
 from __future__ import annotations
@@ -20,18 +17,12 @@ from supple.materials.elastic_tets.active import add_active_piolas
 from supple.materials.elastic_tets.edge_springs import cofactors
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.quadratic import QuadraticTets
-from supple.materials.isotropic import piolas
 from supple.materials.laws.internal import add_densities, add_piolas
 from supple.materials.laws.pointwise import densities_at, piolas_at
-from supple.materials.patches.domains import Patches
-from supple.materials.patches.energy import star_states, tet_shares
 from supple.numerics.bernstein import determinant_coefficients
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.mat3 import det, load_mat, mat_mul_transposed, store_mat
 from supple.runtime.kernel_cache import njit
-from supple.runtime.threads import threads_for
-
-_SERIAL_EDGES = 20_000
 
 
 def energy_densities(
@@ -49,8 +40,6 @@ def energy_densities(
     if laws.growth is not None:
         return laws.growth.ratios * energy_densities(laws.stress_free, x, F @ laws.growth.inverses, internal)
     out = densities_at(laws.material, F)
-    if laws.patches is not None:
-        out[laws.patches.rows] = tet_shares(laws.patches, x) / laws.patches.tet_volumes
     add_densities(laws.material, F, internal, out)
     if laws.quadratic is not None:
         out[laws.quadratic.rows] = (
@@ -85,8 +74,6 @@ def first_piolas(
         add_active_piolas(laws.active, F, out)
         return out
     out = piolas_at(laws.material, F)
-    if laws.patches is not None:
-        out[laws.patches.rows] = _of_patches(laws.patches, x, F[laws.patches.rows])
     add_piolas(laws.material, F, internal, out)
     if laws.quadratic is not None:
         out[laws.quadratic.rows] = laws.quadratic.quadrature.means(_at_points(laws, laws.quadratic, x, internal)[1])
@@ -94,22 +81,6 @@ def first_piolas(
         own = F[springs.rows]
         out[springs.rows] = springs.first_piolas(x, own, determinants(own), laws.volumes[springs.rows])
     return out
-
-
-def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
-    edges = patches.edges
-    numbers = edges.of_tet.ravel()
-    shares = np.repeat(patches.tet_volumes / 6.0, 6)
-    means = np.empty((len(edges.volumes), 9))
-    for k, entry in enumerate(F.reshape(-1, 9).T):
-        means[:, k] = np.bincount(numbers, weights=shares * np.repeat(entry, 6)) / edges.volumes
-    P = np.empty((len(means), 3, 3))
-    with threads_for(len(P), _SERIAL_EDGES):
-        piolas(means.reshape(-1, 3, 3), edges.kind, edges.mu, edges.lam, P)
-        for part in edges.laws:
-            P[part.rows] += part.law.models(means[part.rows].reshape(-1, 3, 3), part.parameters, False, False)[1]
-        pressures = star_states(patches, x)[1][patches.stars.of_tet]
-    return P[edges.of_tet].mean(axis=1) + pressures[:, None, None] * cofactors(F)
 
 
 def mean_deformation_gradients(laws: TetLaws, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -143,11 +114,12 @@ def quadratic_energies(
     laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64], internal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(k,) of every quadratic tet [J]."""
-    F = tets.quadrature.deformation_gradients(x).reshape(-1, 3, 3)
-    material, own = laws.at_points(tets, internal)
+    F, volumes = tets.quadrature.deformation_gradients(x).reshape(-1, 3, 3), tets.quadrature.volumes
+    means, material = laws.at_points
     at_points = densities_at(material, F)
-    add_densities(material, F, own, at_points)
-    return (at_points.reshape(tets.quadrature.volumes.shape) * tets.quadrature.volumes).sum(axis=1)
+    add_densities(material, F, laws.internal_at_points(internal), at_points)
+    energies = (at_points.reshape(volumes.shape) * volumes).sum(axis=1)
+    return energies if means is None else energies + means.states(determinants(F).reshape(volumes.shape))[0]
 
 
 def _at_points(
@@ -155,9 +127,13 @@ def _at_points(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(k, s, 3, 3) F and first Piola stress at the quadrature points."""
     F = tets.quadrature.deformation_gradients(x)
-    material, own = laws.at_points(tets, internal)
-    P = piolas_at(material, F.reshape(-1, 3, 3))
-    add_piolas(material, F.reshape(-1, 3, 3), own, P)
+    of_points = F.reshape(-1, 3, 3)
+    means, material = laws.at_points
+    P = piolas_at(material, of_points)
+    add_piolas(material, of_points, laws.internal_at_points(internal), P)
+    if means is not None:
+        pressures = means.states(determinants(of_points).reshape(F.shape[:2]))[1]
+        P += np.repeat(pressures, F.shape[1])[:, None, None] * cofactors(of_points)
     return F, P.reshape(F.shape)
 
 
@@ -186,10 +162,7 @@ def cauchy_of_tets(
 
 @njit(cache=True)
 def cauchy_stresses(P, F):
-    """(m, 3, 3) P F^T / J [Pa], from P and F (m, 3, 3).
-
-    The symmetric part: with patches, P F^T of a single tet is symmetric only where the deformation is uniform.
-    """
+    """(m, 3, 3) the symmetric part of P F^T / J [Pa], from P and F (m, 3, 3)."""
     out = np.empty_like(P)
     for e in range(len(P)):
         f = load_mat(F, e)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.isotropic import nearest_semidefinite, store_hessian
+from supple.materials.isotropic import add_pressure, nearest_semidefinite, store_hessian
 from supple.materials.laws.log_strains import VALUES
 from supple.materials.per_tet import Law
 from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
@@ -41,11 +41,19 @@ class IsotropicLaw(Law):
             return self.decomposed(F, p)[3][:, 0].copy()
 
     def models(
-        self, F: NDArray[np.float64], p: NDArray[np.float64], second: bool, project: bool
+        self,
+        F: NDArray[np.float64],
+        p: NDArray[np.float64],
+        second: bool,
+        project: bool,
+        pressures: NDArray[np.float64] | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """As of `Law`; with pressures (k,), P and the Hessian are those of psi + pressure J."""
         P, H = np.empty((len(F), 3, 3)), np.empty((len(F) if second else 0, 9, 9))
         with threads_for(len(F), _SERIAL_TETS):
-            U, _, V, values = self.decomposed(F, p)
+            U, s, V, values = self.decomposed(F, p)
+            if pressures is not None:
+                _add_pressures(s, pressures, values)
             _models(U, V, values, second, project, P, H)
         return values[:, 0].copy(), P, H
 
@@ -86,6 +94,21 @@ def principal_hessian_of(x, project):
     alpha = (0.5 * (q[0] + q[3]), 0.5 * (q[1] + q[4]), 0.5 * (q[2] + q[5]))
     beta = (0.5 * (q[0] - q[3]), 0.5 * (q[1] - q[4]), 0.5 * (q[2] - q[5]))
     return A, alpha, beta
+
+
+@njit(parallel=True, cache=True)
+def _add_pressures(s, pressures, values):
+    """Change the values of psi (k, 16) at stretches s (k, 3) to those of psi + pressure J, all but psi itself."""
+    for e in prange(len(values)):
+        p, x, r = pressures[e], values[e], s[e]
+        x[1] += p * r[1] * r[2]
+        x[2] += p * r[0] * r[2]
+        x[3] += p * r[0] * r[1]
+        A, q = (x[4], x[5], x[6], x[7], x[8], x[9]), (x[10], x[11], x[12], x[13], x[14], x[15])
+        A, q = add_pressure((r[0], r[1], r[2]), p, A, q)
+        for k in range(6):
+            x[4 + k] = A[k]
+            x[10 + k] = q[k]
 
 
 @njit(parallel=True, cache=True)

@@ -64,7 +64,7 @@ class EnergyMaterial(ByLaw):
     of : "invariants", then the variables are I1 = tr C, I2 = (I1^2 - tr C^2) / 2 and J = det F; or "stretches", then
         they are the principal stretches, in which psi must be symmetric.
     parameters : by name; one number each, or one per tetrahedron, in the units of the formula [SI].
-    bulk : K [Pa], zero or more. `integration="patches"` needs one above zero.
+    bulk : K [Pa], zero or more. Quadratic tets average the volume of this part alone.
 
     Raises
     ------
@@ -85,11 +85,6 @@ class EnergyMaterial(ByLaw):
         object.__setattr__(self, "_expression", expression)
         self._check_rest(expression)
         object.__setattr__(self, "_law", compiled_law(expression, self.of, self._names))
-
-    def _check_integration(self) -> None:
-        super()._check_integration()
-        if self.integration == "patches" and not np.all(np.asarray(self.bulk) > 0.0):
-            raise SceneError("EnergyMaterial: integration='patches' needs a bulk above zero, the part that is averaged")
 
     def _check_rest(self, expression: Any) -> None:
         """Before anything is compiled."""

@@ -39,7 +39,7 @@ class StretchFunctions(NamedTuple):
         a symmetric in-plane change, and t_ij = (psi_i + psi_j) / (s_i + s_j), the stiffness against an in-plane twist
     needs_positive_volume : whether the energy is infinite for J <= 0
     volume_term : J -> (U, U', U''), where lam stands in the energy as the factor of U(J) alone; `no_volume_term` of
-        other energies, whose tets cannot be averaged over patches
+        other energies
     density_of_stretches : whether `density` reads s. False for energies of the invariants of F^T F, which need no
         decomposition of F.
     """

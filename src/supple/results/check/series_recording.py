@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError, OutputError
 from supple.materials.elastic import Elastic, FixedCorotated, NeoHookean, StableNeoHookean, StVenantKirchhoff
-from supple.materials.per_tet import NO_REGION
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.mesh.io.series.series import OtherCells, Series
 from supple.results.check.series_parts import parts_of
@@ -241,7 +240,6 @@ def _physics(given: Given, tets: int, bodies: int) -> RecordedPhysics:
         kind=kind,
         mu=mu,
         lam=lam,
-        region=np.full(tets, NO_REGION, dtype=np.int32),
         materials=tuple(law.__name__ for law in ELASTIC_MATERIALS),
         recorded_laws=(),
         internal=0,

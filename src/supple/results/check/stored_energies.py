@@ -9,13 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from supple.materials.elastic_tets.active import GROWTH, ActiveTets
 from supple.materials.isotropic import densities, rest_lame_parameters
-from supple.materials.kinds import needs_positive_volume
-from supple.materials.patches.domains import partition, volume_share
-from supple.materials.per_tet import BY_LAW, NO_REGION, LawTets, TetMaterial
+from supple.materials.kinds import has_volume_term, needs_positive_volume
+from supple.materials.per_tet import BY_LAW, LawTets, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.results.check.geometry.quadratic_tets import at_quadrature_points
 from supple.results.recording.physics import RecordedPhysics
@@ -56,13 +54,23 @@ def elastic_energy(
             F, parts = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
             F, parts = F @ grown[body.tets, None], parts * ratios[body.tets, None]
             laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
+            own = [_of_body(part, body.tets) for part in physics.laws if part.flow is None]
+            share = _mean_share(laws, own)
             of_points = np.empty(parts.size)
-            densities(F.reshape(-1, 3, 3), *(np.repeat(law, parts.shape[1]) for law in laws), of_points)
+            lowered = laws[0], laws[1], laws[2] - share
+            densities(F.reshape(-1, 3, 3), *(np.repeat(law, parts.shape[1]) for law in lowered), of_points)
             of_points = np.where(laws[0][:, None] == BY_LAW, 0.0, of_points.reshape(parts.shape))
-            for part in (_of_body(each, body.tets) for each in physics.laws if each.flow is None):
+            for part in own:
+                parameters = part.parameters.copy()
+                if part.law.bulk is not None:
+                    parameters[:, part.law.bulk] -= share[part.rows]
                 for point in range(parts.shape[1]):
-                    of_points[part.rows, point] += part.law.densities(F[part.rows, point], part.parameters)
-            total += float((of_points * parts).sum())
+                    of_points[part.rows, point] += part.law.densities(F[part.rows, point], parameters)
+            whole = parts.sum(axis=1)
+            J_mean = (np.linalg.det(F) * parts).sum(axis=1) / whole
+            with np.errstate(invalid="ignore", divide="ignore"):
+                change = np.where(needs_positive_volume(laws[0]), np.log(J_mean), J_mean - 1.0)
+            total += float((of_points * parts).sum()) + 0.5 * float((whole * share) @ change**2)
             continue
         if pair is None:
             out = np.empty(len(tets))
@@ -74,12 +82,7 @@ def elastic_energy(
             F = _gradients(x, tets, rest_inverse[body.tets])
             for part in own:
                 out[part.rows] += volumes[part.rows] * part.law.densities(F[part.rows], part.parameters)
-            region = physics.region[body.tets]
-            total += float(out[region == NO_REGION].sum())
-            for number in np.unique(region[region != NO_REGION]):
-                of = region == number
-                arrays = tets[of], volumes[of], F[of], J[body.tets][of], [law[of] for law in laws]
-                total += _averaged(*arrays, next((part for part in own if of[part.rows].any()), None))
+            total += float(out.sum())
             continue
         if pair[0] > 0.0:
             edges = np.unique(np.sort(tets[:, _EDGES].reshape(-1, 2), axis=1), axis=0)
@@ -138,34 +141,16 @@ def _of_body(part: LawTets, tets: slice) -> LawTets:
     return part.of(part.rows[inside] - tets.start, part.parameters[inside])
 
 
-def _averaged(tets, volumes, F, J, laws, by_law: LawTets | None) -> float:
-    """The energy of one region's tets, averaged over edges and stars (see `materials.patches`)."""
+def _mean_share(laws, own: list[LawTets]) -> NDArray[np.float64]:
+    """(m,) the part of the first Lamé parameter of which a quadratic tet takes its mean J (docs/theory/locking.md)."""
     kind, mu, lam = laws
-    mu_L, lam_L = rest_lame_parameters(TetMaterial(mu, mu, kind, mu, lam, kind))
-    rest = volume_share(mu_L, lam_L)
-    ends = np.sort(tets[:, _EDGES], axis=2).reshape(-1, 2)
-    _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
-    shares = sparse.coo_array((np.repeat(volumes / 6.0, 6), (edge.ravel(), np.repeat(np.arange(len(tets)), 6)))).tocsr()
-    around = shares.sum(axis=1)
-    means = (shares @ np.column_stack([F.reshape(-1, 9), mu, lam - rest])) / around[:, None]
-    F_mean = means[:, :9].reshape(-1, 3, 3).copy()
-    out = np.empty(len(means))
-    if by_law is None:
-        densities(F_mean, kind[first // 6], means[:, 9].copy(), means[:, 10].copy(), out)
-    else:
-        p = by_law.parameters.copy()
-        p[:, by_law.law.bulk] -= rest
-        out = by_law.law.densities(F_mean, (shares @ p) / around[:, None])
-    total = float(out @ around)
-    star = partition(tets, np.zeros(len(tets), dtype=np.int32), edge.reshape(-1, 6).astype(np.int32))
-    _, first = np.unique(star, return_index=True)
-    around = np.bincount(star, weights=volumes)
-    J_mean = np.bincount(star, weights=volumes * J) / around
-    factor = np.bincount(star, weights=volumes * rest) / around
-    logarithmic = needs_positive_volume(kind)[first]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        change = np.where(logarithmic, np.log(J_mean), J_mean - 1.0)
-    return total + 0.5 * float((around * factor) @ change**2)
+    mu_L, lam_L = rest_lame_parameters(TetMaterial(mu, mu, kind, mu, lam))
+    share = np.where(lam_L > 2.0 * mu_L, lam_L - mu_L - 2.0 * mu_L**2 / np.where(lam_L > 0.0, lam_L, 1.0), 0.0)
+    at_most = np.where(has_volume_term(kind), np.inf, 0.0)
+    for part in own:
+        if part.law.bulk is not None:
+            at_most[part.rows] = np.maximum(part.parameters[:, part.law.bulk], 0.0)
+    return np.minimum(share, at_most)
 
 
 def stiffness_scale(recording: Recording) -> float:

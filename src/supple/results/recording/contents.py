@@ -51,7 +51,7 @@ def recorded_laws(
         Dm_inv = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1) / (6.0 * volumes)[:, None, None]
     tets, unknown = np.ascontiguousarray(tets, dtype=np.int32), np.full(m, np.nan)
     kind = physics.tet_kinds
-    material = TetMaterial(unknown, unknown, kind, physics.mu, physics.lam, physics.region, physics.laws)
+    material = TetMaterial(unknown, unknown, kind, physics.mu, physics.lam, physics.laws)
     springs = [
         EdgeSprings.of(pair, body.tets, rest_positions, tets[body.tets], volumes[body.tets])
         for body, pair in zip(bodies, physics.compliances, strict=True)

@@ -17,7 +17,7 @@ from supple.materials.material import Hyperelastic
 from supple.materials.own.derivation import OwnLaw
 from supple.materials.own.formula import Formula
 from supple.materials.own.formula_law import FormulaLaw
-from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, Law, LawTets
+from supple.materials.per_tet import BY_LAW, NOT_ELASTIC, Law, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS, RECORDED_FLOWS, RECORDED_LAWS
 from supple.model.system import System
 from supple.results.checkpoint.values import Rows
@@ -61,7 +61,6 @@ class RecordedPhysics:
     Attributes
     ----------
     kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, `GIVEN_BY_LAW` or `NOT_KNOWN`; mu, lam : (m,) [Pa]
-    region : (m,) the region over whose patches the energy of a tet is averaged, or `NO_REGION`
     materials : names of `registry.ELASTIC_MATERIALS`
     recorded_laws : whose energies are added to those of `kind`
     internal : number of rows of internal variables of a frame
@@ -74,7 +73,6 @@ class RecordedPhysics:
     kind: Annotated[NDArray[np.uint8], Rows("m")]
     mu: Annotated[NDArray[np.float64], Rows("m")]
     lam: Annotated[NDArray[np.float64], Rows("m")]
-    region: Annotated[NDArray[np.int32], Rows("m")]
     materials: tuple[str, ...]
     recorded_laws: tuple[RecordedLaw, ...]
     internal: int
@@ -146,7 +144,6 @@ def recorded_physics(system: System) -> RecordedPhysics:
     """The laws of a scene."""
     m = len(system.tets)
     kind, mu, lam = np.full(m, NOT_KNOWN, dtype=np.uint8), np.zeros(m), np.zeros(m)
-    region = np.full(m, NO_REGION, dtype=np.int32)
     compliances: list[tuple[float, float] | None] = []
     for part in system.bodies:
         material = part.body.material
@@ -156,7 +153,7 @@ def recorded_physics(system: System) -> RecordedPhysics:
         elif isinstance(material, Hyperelastic):
             rows = material.per_tet(part.tets.stop - part.tets.start)
             kind[part.tets] = np.where(rows.kind == BY_LAW, GIVEN_BY_LAW, rows.kind)
-            mu[part.tets], lam[part.tets], region[part.tets] = rows.mu, rows.lam, rows.region
+            mu[part.tets], lam[part.tets] = rows.mu, rows.lam
     laws = []
     for tets in system.laws.material.laws:
         named = _named(tets.law)
@@ -171,7 +168,6 @@ def recorded_physics(system: System) -> RecordedPhysics:
         kind=kind,
         mu=mu,
         lam=lam,
-        region=region,
         materials=tuple(law.__name__ for law in ELASTIC_MATERIALS),
         recorded_laws=tuple(laws),
         internal=count_of(system.laws.material),

@@ -11,7 +11,6 @@ import numpy as np
 from supple.errors import SolverError
 from supple.kinds.forms import COUNT, POSITIVE, SHARE, Choice, Number, OneOf
 from supple.materials.laws.internal import checked
-from supple.materials.per_tet import NO_REGION
 from supple.model.actuator_readings import actuator_fields, start_of
 from supple.model.energy_balance import add_works, no_works, works_of_actuators
 from supple.model.joints.at_state import initial_joint_details, refuse_apart, refuse_moved_welds
@@ -48,10 +47,9 @@ from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)
 
-# Measured on cubes: 2900 bytes per tet, and 5800 more for one in patches; for a factorization 870 bytes times the
+# Measured on cubes: 2900 bytes per tet; for a factorization 870 bytes times the
 # number of vertices to the power 4/3, as the factor of a solid body grows. The margin is for contact.
 _BYTES_PER_TET = 5000
-_BYTES_OF_PATCHES = 7000
 _BYTES_OF_FACTOR = 1200
 # Beyond the above, for the matrices of its quadrature points and its blocks: 45,000 on a cube of 6,000.
 _BYTES_PER_QUADRATIC_TET = 50_000
@@ -108,10 +106,8 @@ class Implicit(Solver):
         """Estimate of the memory that a simulation takes beyond that of the program itself [bytes]."""
         needed = 0
         for body in scene.bodies:
-            averaged = body.material.per_tet(len(body.mesh.tets)).region != NO_REGION
-            if body.mesh.order == 2:
-                needed += _BYTES_PER_QUADRATIC_TET * len(averaged)
-            needed += _BYTES_PER_TET * len(averaged) + _BYTES_OF_PATCHES * int(np.count_nonzero(averaged))
+            per_tet = _BYTES_PER_TET + (_BYTES_PER_QUADRATIC_TET if body.mesh.order == 2 else 0)
+            needed += per_tet * len(body.mesh.tets)
         if self.linear_solver == "direct":
             needed += int(_BYTES_OF_FACTOR * sum(len(body.mesh.vertices) ** (4.0 / 3.0) for body in scene.bodies))
         return needed

@@ -277,14 +277,13 @@ def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
     import numpy as np
 
     from supple.materials.material import Hyperelastic
-    from supple.materials.per_tet import NO_REGION
     from supple.mesh.quality import thickness
 
     material, mesh = body.material, body.mesh
     if not isinstance(material, Hyperelastic) or mesh.order == 2:
         return []
     poisson = np.broadcast_to(np.asarray(material.poisson, dtype=np.float64), len(mesh.tets))
-    locking = (poisson > 0.4) & (material.per_tet(len(mesh.tets)).region == NO_REGION)
+    locking = poisson > 0.4
     if not locking.any():
         return []
     lines = thickness(mesh.vertices, mesh.tets, limit=9)
@@ -294,8 +293,8 @@ def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
         return []
     text = (
         f"{100 * share:.0f} % of the surface has fewer than three tets across behind it, with Poisson's ratio up to "
-        f"{poisson[locking].max():g}: linear tets are too stiff there; give integration='patches' or quadratic tets "
-        "(order: 2; both for Implicit only), or smaller tets"
+        f"{poisson[locking].max():g}: linear tets are too stiff there; give quadratic tets "
+        "(order: 2, for Implicit only), or smaller tets"
     )
     return [(f"warning {body.name}", text)]
 

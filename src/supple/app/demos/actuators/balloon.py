@@ -18,7 +18,7 @@ from supple.scene.loads.over_time import Curve
 from supple.scene.scene import Scene
 from supple.solvers.implicit.solver import Implicit
 
-INNER, OUTER, EDGE = 0.1, 0.15, 0.025
+INNER, OUTER, EDGE = 0.1, 0.15, 0.05
 YOUNGS, POISSON = 1e5, 0.49
 FIRST, LAST, STEPS = 1.1, 2.0, 18
 
@@ -36,8 +36,8 @@ def closed_form(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def scene() -> Scene:
     """A hollow ball whose inner radius is doubled by a liquid, in steps of equal stretch."""
-    material = NeoHookean(youngs=YOUNGS, poisson=POISSON, integration="patches")
-    ball = Body("ball", shapes.spherical_shell(INNER, OUTER, EDGE), material)
+    material = NeoHookean(youngs=YOUNGS, poisson=POISSON)
+    ball = Body("ball", shapes.spherical_shell(INNER, OUTER, EDGE, order=2), material)
     empty = Scene([ball], cavities=[Cavity("ball", pressure=0.0)], gravity=(0, 0, 0))
     start = build_system(empty).actuators[0].start
     stretches = np.linspace(FIRST, LAST, STEPS)

@@ -32,7 +32,7 @@ else:
 
 def scene_file_line(material: ByLaw) -> str:
     """A rubber as a scene file has it, with the parameters of its class; density and damping are left out."""
-    skipped = {field.name for field in fields(Material)} | {"integration"}
+    skipped = {field.name for field in fields(Material)}
     values = {key: getattr(material, key) for key in declared(type(material)) if key not in skipped}
     texts = [f"{key}: {list(value) if isinstance(value, tuple) else float(value)}" for key, value in values.items()]
     return f"{{kind: {material.kind}, {', '.join(texts)}}}"

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.isotropic import rest_lame_parameters
-from supple.materials.per_tet import NO_REGION
 from supple.materials.stretch_energies.stretches import green_strain
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
@@ -73,9 +72,8 @@ def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
         tau[elasticity.quadratic.rows] = 0.0
     if not tau.any():
         return None
+    # At the points of quadratic tets, without the part of the mean volume: it would lock them.
     mu, lam = rest_lame_parameters(elasticity.material)
-    # Viscosity acts tet by tet. With a bulk viscosity far above that of shear, tets would lock.
-    lam = np.where(elasticity.material.region == NO_REGION, lam, np.minimum(lam, mu))
     return Viscosity(elasticity, tau * mu, tau * lam)
 
 

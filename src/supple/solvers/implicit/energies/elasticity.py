@@ -10,19 +10,18 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.materials.elastic import StableNeoHookean
-from supple.materials.elastic_tets.laws import of_points
-from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS, QuadraticTets
+from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.elastic_tets.mean_volume import MeanVolumes
+from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.laws.internal import rows_of_points
 from supple.materials.material import Hyperelastic
-from supple.materials.patches.energy import tet_shares
-from supple.materials.per_tet import BY_LAW, NO_REGION, TetMaterial
+from supple.materials.per_tet import BY_LAW, TetMaterial
 from supple.materials.tet_energies import element_energies, element_models
 from supple.model.system import System
 from supple.numerics.sparse.block_csr import incidences
 from supple.runtime.kernel_cache import njit, prange
 from supple.runtime.threads import threads_for
-from supple.solvers.implicit.energies.law_elasticity import LawElasticity, LawElements
-from supple.solvers.implicit.energies.patch_elasticity import PatchElasticity
+from supple.solvers.implicit.energies.law_elasticity import NO_PRESSURES, LawElasticity, LawElements
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
 from supple.solvers.implicit.energies.quadratic.term import Gathering, OfQuadraticTets, VirtualTets
 
@@ -32,30 +31,55 @@ SERIAL_TETS = 2_000
 
 @dataclass(frozen=True, eq=False)
 class QuadraticElasticity(OfQuadraticTets):
-    """The energy of the quadratic tets `rows` (k,), at their quadrature points.
+    """The energy of the quadratic tets `rows` (k,): at their quadrature points, and of their mean volumes.
 
     Attributes
     ----------
     internal : the rows of the internal variables of all tets that belong to these points
+    means : see `mean_volume`; None where no material has such a term
     """
 
     rows: NDArray[np.int64]
     at_points: Elasticity
     internal: NDArray[np.int64]
+    means: MeanVolumes | None
 
     @classmethod
-    def of(cls, tets: QuadraticTets, material: TetMaterial, vertices: int) -> QuadraticElasticity:
-        """With the material (m,) of all tets; `vertices` : their number."""
+    def of(cls, tets: QuadraticTets, laws: TetLaws, vertices: int) -> QuadraticElasticity:
+        """With the laws of all tets; `vertices` : their number."""
         virtual = VirtualTets(tets.quadrature, Gathering.of(tets.nodes, vertices))
-        own = of_points(material, tets.rows, QUADRATURE_POINTS)
+        means, own = laws.at_points
         each = np.arange(4 * virtual.count + 1, dtype=np.int32)
         system = virtual.system()
-        at_points = Elasticity(system, own, each, each[:-1], laws=_law_elasticity(system, own, own.region == NO_REGION))
-        return cls(at_points, virtual, tets.rows, at_points, rows_of_points(material))
+        every = np.ones(virtual.count, dtype=bool)
+        at_points = Elasticity(system, own, each, each[:-1], laws=_law_elasticity(system, own, every))
+        return cls(at_points, virtual, tets.rows, at_points, rows_of_points(laws.material), means)
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return super().value(x) if self.means is None else float(self.energies(x).sum())
 
     def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k,) of each element [J]."""
-        return self.at_points.energies(self.virtual.corners(x)).reshape(len(self.rows), -1).sum(axis=1)
+        y = self.virtual.corners(x)
+        energies = self.at_points.energies(y).reshape(len(self.rows), -1).sum(axis=1)
+        return energies if self.means is None else energies + self.means.states(self.virtual.determinants(y))[0]
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        """See `Potential.add_model`; with `project`, that of psi' + p J at each point, and the product of gradients."""
+        if self.means is None:
+            return super().add_model(x, gradient, hessian, project)
+        y = self.virtual.corners(x)
+        energies, pressures, stiffness = self.means.states(self.virtual.determinants(y))
+        of_points = np.repeat(pressures, self.means.volumes.shape[1])
+        blocks, forces = self.virtual.blocks(hessian), np.zeros_like(y)
+        energy = self.at_points.add_model(y, forces, blocks, project, of_points)
+        self.virtual.add_forces(forces, gradient)
+        if hessian is not None and blocks is not None:
+            products = np.maximum(stiffness, 0.0) if project else stiffness
+            hessian.patches.append(self.virtual.couplings(blocks.tets, (products, self.virtual.volume_gradients(y))))
+        return energy + float(energies.sum())
 
     def in_step(self, internal: NDArray[np.float64], h: float) -> QuadraticElasticity:
         """As of `Elasticity`, with the internal variables of all tets."""
@@ -77,7 +101,6 @@ class Elasticity(JointlyEvaluated):
     ----------
     material : one row per tet
     start, incidence : for every vertex the (tet, node) pairs that name it, coded 4 tet + node
-    patches : the energy of the tets that are averaged over patches, or None
     laws : the energies of tets that are given by laws, or None
     quadratic : the energy of the quadratic tets, or None
     """
@@ -86,21 +109,18 @@ class Elasticity(JointlyEvaluated):
     material: TetMaterial
     start: NDArray[np.int32]
     incidence: NDArray[np.int32]
-    patches: PatchElasticity | None = None
     laws: LawElasticity | None = None
     quadratic: QuadraticElasticity | None = None
     label = "elasticity"
     projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
-        parts = [part.value(x) for part in (self.patches, self.laws, self.quadratic) if part is not None]
+        parts = [part.value(x) for part in (self.laws, self.quadratic) if part is not None]
         return float(self._own_energies(x).sum()) + sum(parts)
 
     def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m,) of each tet [J]; those of patches are divided among their tets."""
+        """(m,) of each tet [J]."""
         energies = self._own_energies(x)
-        if self.patches is not None:
-            energies[self.patches.patches.rows] += tet_shares(self.patches.patches, x)
         if self.laws is not None:
             for rows, values in self.laws.energies(x):
                 energies[rows] += values
@@ -116,20 +136,29 @@ class Elasticity(JointlyEvaluated):
         return energies
 
     def add_model(
-        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+        self,
+        x: NDArray[np.float64],
+        gradient: NDArray[np.float64],
+        hessian: HessianBlocks | None,
+        project: bool,
+        pressures: NDArray[np.float64] = NO_PRESSURES,
     ) -> float:
+        """See `Potential.add_model`; with pressures (m,), derivatives are of psi + pressure J, the energy of psi."""
         s = self.system
         energies = np.empty(len(s.tets))
         gradients = np.empty((len(s.tets), 4, 3))
-        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters
+        of_own = np.where(self.own, pressures, 0.0) if len(pressures) else pressures
+        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, of_own
         with threads_for(len(s.tets), SERIAL_TETS):
             if hessian is None:
                 element_models(*tets, False, project, energies, gradients, _NO_HESSIANS)
             else:
                 hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
             gather_gradients(self.start, self.incidence, gradients, gradient)
-        parts = [part for part in (self.patches, self.laws, self.quadratic) if part is not None]
-        return float(energies.sum()) + sum(part.add_model(x, gradient, hessian, project) for part in parts)
+        total = float(energies.sum())
+        if self.laws is not None:
+            total += self.laws.add_model(x, gradient, hessian, project, pressures)
+        return total if self.quadratic is None else total + self.quadratic.add_model(x, gradient, hessian, project)
 
     def in_step(self, internal: NDArray[np.float64], h: float) -> Elasticity:
         """The energy of a step of h [s] from these internal variables (k, 11), at whose end its forces act."""
@@ -147,15 +176,15 @@ class Elasticity(JointlyEvaluated):
 
     @cached_property
     def own(self) -> NDArray[np.bool_]:
-        """(m,) which tets have an energy of their own F: not those of patches or laws, nor the quadratic ones."""
-        own = (self.material.region == NO_REGION) & (self.material.kind != BY_LAW)
+        """(m,) which tets have an energy of their own F: not those of laws, nor the quadratic ones."""
+        own = self.material.kind != BY_LAW
         if self.quadratic is not None:
             own[self.quadratic.rows] = False
         return own
 
     @cached_property
     def _parameters(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-        """Kind, mu and lam (m,) of each tet's own energy: zero where patches, laws or quadratic tets have it."""
+        """Kind, mu and lam (m,) of each tet's own energy: zero where laws or quadratic tets have it."""
         material = self.material
         own = self.own
         if own.all():
@@ -181,14 +210,13 @@ def elasticity_of(system: System) -> Elasticity:
                 "give it an elastic one such as StableNeoHookean"
             )
     start, incidence = incidences(system.tets, len(system.rest_positions))
-    patches = None if system.laws.patches is None else PatchElasticity.of(system.laws.patches)
     material, quadratic = system.laws.material, None
-    own = material.region == NO_REGION
+    own = np.ones(len(system.tets), dtype=bool)
     if system.quadratic is not None:
-        quadratic = QuadraticElasticity.of(system.quadratic, material, len(system.rest_positions))
+        quadratic = QuadraticElasticity.of(system.quadratic, system.laws, len(system.rest_positions))
         own[system.quadratic.rows] = False
     laws = _law_elasticity(system, material, own)
-    return Elasticity(system, material, start, incidence, patches, laws, quadratic)
+    return Elasticity(system, material, start, incidence, laws, quadratic)
 
 
 def _law_elasticity(system: System, material: TetMaterial, own: NDArray[np.bool_]) -> LawElasticity | None:

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.kinds import infinite_when_flat
-from supple.materials.per_tet import NO_REGION
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.mat3 import cross, det, dot, load_mat
 from supple.runtime.kernel_cache import njit, prange
@@ -83,8 +82,7 @@ def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset:
     if elasticity.quadratic is not None:
         guarded = guarded.copy()
         guarded[elasticity.quadratic.rows] = False
-    # The energy of a patch is finite where one of its tets is flat.
-    wanted = guarded & (~infinite_when_flat(material) | (material.region != NO_REGION))
+    wanted = guarded & ~infinite_when_flat(material)
     if not wanted.any():
         return None
     kappa = onset * (material.mu + np.abs(material.lam))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.laws.internal import inverse_flow
+from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.per_tet import Flow, Law, LawTets
 from supple.numerics.deformation import deformation_gradients
 from supple.runtime.kernel_cache import njit, prange
@@ -19,6 +20,7 @@ from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
 
 _SERIAL_TETS = 2_000
+NO_PRESSURES = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,12 +99,22 @@ class LawElasticity(JointlyEvaluated):
         return after
 
     def add_model(
-        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+        self,
+        x: NDArray[np.float64],
+        gradient: NDArray[np.float64],
+        hessian: HessianBlocks | None,
+        project: bool,
+        pressures: NDArray[np.float64] = NO_PRESSURES,
     ) -> float:
+        """See `Elasticity.add_model`; laws with a bulk modulus take the pressures (m,) of all tets."""
         total = 0.0
         for each in self.elements:
             F = deformation_gradients(x, each.tets, each.B)
-            psi, P, H = each.law.models(F, each.parameters, hessian is not None, project)
+            arguments = F, each.parameters, hessian is not None, project
+            if len(pressures) and isinstance(each.law, IsotropicLaw) and each.law.bulk is not None:
+                psi, P, H = each.law.models(*arguments, pressures[each.rows])
+            else:
+                psi, P, H = each.law.models(*arguments)
             total += float((each.volumes * psi).sum())
             forces = np.empty((len(psi), 4, 3))
             with threads_for(len(psi), _SERIAL_TETS):

@@ -16,7 +16,6 @@ from supple.errors import SolverError
 from supple.materials.elastic import EdgesAndVolume, StableNeoHookean
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Elastic, Material
-from supple.materials.per_tet import NO_REGION
 from supple.model.system import BodyRange, System
 from supple.solvers.xpbd.constraints.edges_and_volume import EdgeConstraints, VolumeConstraints
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
@@ -77,11 +76,6 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
         material = part.body.material
         if not any(entry.takes(material) for entry in CONSTRAINT_SETS):
             raise SolverError(f"XPBD: {_why_not(part.name, material)}, or simulate with Implicit")
-        if (material.per_tet(part.tets.stop - part.tets.start).region != NO_REGION).any():
-            raise SolverError(
-                f"XPBD: body {part.name!r} has integration='patches', which XPBD cannot simulate; give "
-                "integration='tets', or simulate with Implicit"
-            )
     sets = []
     for entry in CONSTRAINT_SETS:
         parts = [part for part in soft if entry.takes(part.body.material)]

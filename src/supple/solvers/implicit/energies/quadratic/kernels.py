@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from supple.numerics.mat3 import cross, det
 from supple.runtime.kernel_cache import njit, prange
 
 
@@ -82,3 +83,44 @@ def sum_pairs(start, entries, blocks, out):
                     m = entries[t] >> 1
                     total += blocks[m, j, i] if entries[t] & 1 else blocks[m, i, j]
                 out[p, i, j] = total
+
+
+@njit(cache=True, parallel=True)
+def add_products(factors, g, out):
+    """Add c g_a g_b^T to the blocks (k, 10, 10, 3, 3) of nodes a <= b, for factors c (k,) and g (k, 10, 3)."""
+    for e in prange(len(factors)):
+        for a in range(10):
+            for i in range(3):
+                scaled = factors[e] * g[e, a, i]
+                for b in range(a, 10):
+                    for j in range(3):
+                        out[e, a, b, i, j] += scaled * g[e, b, j]
+
+
+@njit
+def _columns(y, e):
+    """The columns of F of a virtual tet."""
+    return (
+        (y[e, 1, 0], y[e, 1, 1], y[e, 1, 2]),
+        (y[e, 2, 0], y[e, 2, 1], y[e, 2, 2]),
+        (y[e, 3, 0], y[e, 3, 1], y[e, 3, 2]),
+    )
+
+
+@njit(cache=True)
+def determinants_of(y, out):
+    """J (m,) of virtual tets with corners y (m, 4, 3)."""
+    for e in range(len(y)):
+        a, b, c = _columns(y, e)
+        out[e] = det((a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2]))
+
+
+@njit(cache=True, parallel=True)
+def volume_pushes(y, volumes, out):
+    """V dJ/dF (m, 4, 3) of virtual tets with corners y (m, 4, 3), by the corners 1, 2 and 3."""
+    for e in prange(len(y)):
+        a, b, c = _columns(y, e)
+        u, v, w = cross(b, c), cross(c, a), cross(a, b)
+        for i in range(3):
+            out[e, 0, i] = 0.0
+            out[e, 1, i], out[e, 2, i], out[e, 3, i] = volumes[e] * u[i], volumes[e] * v[i], volumes[e] * w[i]

@@ -21,10 +21,13 @@ from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Potential, Projection
 from supple.solvers.implicit.energies.quadratic.kernels import (
     add_by_vertex,
+    add_products,
+    determinants_of,
     element_blocks,
     element_forces,
     place_virtual_tets,
     sum_pairs,
+    volume_pushes,
 )
 
 
@@ -97,13 +100,39 @@ class VirtualTets:
             element_forces(self.points.gradients, forces.reshape(-1, 4, 3), of_nodes)
             add_by_vertex(self.gathering.start, self.gathering.entries, of_nodes.reshape(-1, 3), out)
 
-    def couplings(self, hessians: NDArray[np.float64]) -> Couplings:
-        """W^T H W of matrices (m, 12, 12) of the virtual tets."""
+    def blocks(self, wanted: HessianBlocks | None) -> HessianBlocks | None:
+        """Room for the matrices of the virtual tets, where a Hessian is wanted."""
+        if wanted is None:
+            return None
+        return HessianBlocks(np.empty((self.count, 12, 12)), np.zeros((0, 3, 3)), self.count, blank=True)
+
+    def determinants(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, s) J at the points, from the corners (4 m, 3) of the virtual tets."""
+        out = np.empty(self.count)
+        determinants_of(y.reshape(-1, 4, 3), out)
+        return out.reshape(self.points.volumes.shape)
+
+    def volume_gradients(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, 10, 3) the derivatives of the elements' volumes, sums over their points, by the nodes [m^2]."""
+        with self._threads():
+            pushes, out = np.empty((self.count, 4, 3)), np.empty((len(self.points.nodes), 10, 3))
+            volume_pushes(y.reshape(-1, 4, 3), self.points.volumes.ravel(), pushes)
+            element_forces(self.points.gradients, pushes, out)
+        return out
+
+    def couplings(
+        self,
+        hessians: NDArray[np.float64],
+        products: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    ) -> Couplings:
+        """W^T H W of matrices (m, 12, 12) of the virtual tets, and c g g^T of products c (k,), g (k, 10, 3)."""
         pairs = self.gathering
         sums = np.empty((len(pairs.rows), 3, 3))
         with self._threads():
             blocks = np.empty((len(self.points.nodes), 10, 10, 3, 3))
             element_blocks(self.points.gradients, hessians, blocks)
+            if products is not None:
+                add_products(*products, blocks)
             sum_pairs(pairs.pair_start, pairs.pair_entries, blocks.reshape(-1, 3, 3), sums)
         return Couplings(pairs.rows, pairs.columns, sums)
 
@@ -144,11 +173,8 @@ class OfQuadraticTets(JointlyEvaluated):
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float:
-        y, m = self.virtual.corners(x), self.virtual.count
-        forces = np.zeros_like(y)
-        blocks = None
-        if hessian is not None:
-            blocks = HessianBlocks(np.empty((m, 12, 12)), np.zeros((0, 3, 3)), m, blank=True)
+        y = self.virtual.corners(x)
+        blocks, forces = self.virtual.blocks(hessian), np.zeros_like(y)
         energy = self.inner.add_model(y, forces, blocks, project)
         self.virtual.add_forces(forces, gradient)
         if hessian is not None and blocks is not None and not blocks.blank:
