@@ -208,7 +208,7 @@ def test_what_cannot_be_is_one_clear_line():
         ([0.5, 1.0], "prony is not a list of pairs"),
     ):
         with pytest.raises(SceneError, match=message):
-            sp.Viscoelastic(material=RUBBER, prony=prony)
+            sp.Viscoelastic(material=RUBBER, prony=prony)  # pyright: ignore[reportArgumentType]
     with pytest.raises(SceneError, match="Viscoelastic: material is a J2Plastic; give a hyperelastic one"):
         sp.Viscoelastic(material=METAL, prony=[(0.5, 1.0)])
     with pytest.raises(SceneError, match="J2Plastic: saturation_stress is below yield_stress"):

@@ -181,7 +181,7 @@ def test_a_body_in_equilibrium_is_recorded_with_its_laws(tmp_path):
         (lambda: sp.Yeoh(c10=np.nan, bulk=1e6), "Yeoh: c10 is nan; it must be finite"),
         (lambda: sp.Ogden(mu=[1e5], alpha=[2, 3], bulk=1e6), "Ogden: 1 mu and 2 alpha"),
         (lambda: sp.Ogden(mu=[1e5], alpha=[0.0], bulk=1e6), "Ogden: an alpha is 0"),
-        (lambda: sp.Ogden(mu=1e5, alpha=[2.0], bulk=1e6), "Ogden: mu is 100000.0; give a list"),
+        (lambda: sp.Ogden(mu=1e5, alpha=[2.0], bulk=1e6), "Ogden: mu is 100000.0; give a list"),  # pyright: ignore[reportArgumentType]
     ],
 )  # fmt: skip
 def test_bad_parameters_are_one_clear_line(make, message):

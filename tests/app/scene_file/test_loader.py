@@ -91,7 +91,7 @@ def test_a_scene_file_covers_the_whole_api(load):
 
     floor, room, bowl, log, drum, ring = scene.obstacles
     assert isinstance(floor, sp.HalfSpace)
-    np.testing.assert_allclose(floor.normal, [0, 1, 0])
+    np.testing.assert_allclose(np.asarray(floor.normal), [0, 1, 0])
     assert isinstance(room, sp.obstacles.Box)
     assert room.inside
     assert isinstance(bowl, sp.obstacles.Sphere)
@@ -102,6 +102,7 @@ def test_a_scene_file_covers_the_whole_api(load):
     assert isinstance(drum, sp.obstacles.Cylinder)
     np.testing.assert_allclose(drum.pose(1.0)[0][0, 0], np.cos(1.0))
     assert isinstance(ring, sp.obstacles.TriangleObstacle)
+    assert ring.surface is not None
     np.testing.assert_allclose(ring.surface.bounds[1], [4.4, 0.4, 5.4], atol=0.05)
 
     assert scene.pins[1].name == "left"
@@ -362,6 +363,8 @@ contact_pairs:
 def test_the_table_of_the_documentation_has_every_key_of_every_kind():
     """It is made from the same declarations as the schema."""
     spec = importlib.util.spec_from_file_location("kinds_page", ROOT / "docs" / "building" / "kinds.py")
+    assert spec is not None
+    assert spec.loader is not None
     page = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(page)
     text = page.kinds_page()

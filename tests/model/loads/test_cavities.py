@@ -243,7 +243,7 @@ def test_scene_files_recordings_tables_and_resumed_runs_have_cavities(tmp_path, 
         (lambda: sp.Cavity("shell", pressure=1, volume=1), "pressure and volume given; give exactly one"),
         (lambda: sp.Cavity("shell", pressure=np.inf), "pressure is inf; it must be finite"),
         (lambda: sp.Cavity("shell", volume=0.0), "volume is 0; it must be above zero"),
-        (lambda: sp.Cavity("shell", gas=1.0), "gas is 1.0; give a Gas"),
+        (lambda: sp.Cavity("shell", gas=1.0), "gas is 1.0; give a Gas"),  # pyright: ignore[reportArgumentType]
         (lambda: sp.Cavity("shell", gas=sp.Gas(amount=-1.0)), "gas: amount is -1; it must be above zero"),
         (lambda: sp.Cavity("shell", gas=sp.Gas(ambient=0.0)), "no gas at the start; give the amount"),
         (lambda: sp.Cavity("shell", pressure=1.0, void=1), "void 1 does not exist; body 'shell' encloses 1"),

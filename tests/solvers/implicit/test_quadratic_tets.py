@@ -8,9 +8,11 @@ from tests.derivatives import dense_couplings, differences, gradient_of
 
 import supple as sp
 from supple.errors import SceneError, SolverError
+from supple.materials.material import Material
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.model.system import build_system
 from supple.runtime.threads import numba_threads
+from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.energies.damping import StrainRate, quadratic_viscosity_of
 from supple.solvers.implicit.energies.elasticity import elasticity_of
 from supple.solvers.implicit.energies.potential import HessianBlocks
@@ -29,7 +31,7 @@ def wavy(mesh, size=0.01):
 BAR = wavy(sp.shapes.box((0.6, 0.2, 0.2), (3, 1, 1), order=2))
 
 
-def bar_scene(material=SOFT, pinned=True, mesh=BAR, **extra):
+def bar_scene(material: Material = SOFT, pinned=True, mesh=BAR, **extra):
     left = np.flatnonzero(mesh.vertices[:, 0] < mesh.vertices[:, 0].min() + 0.02)
     pins = [sp.Pin("bar", left)] if pinned else []
     return sp.Scene([sp.Body("bar", mesh, material)], pins=pins, **extra)
@@ -99,11 +101,13 @@ def test_derivatives_of_damping_and_of_the_barrier():
     x = system.rest_positions + 0.01 * random.normal(size=BAR.vertices.shape)
     elasticity = elasticity_of(system)
     viscosity = quadratic_viscosity_of(elasticity)
+    assert viscosity is not None
     rate = StrainRate(50.0, viscosity.strains(system.rest_positions))
     assert_derivatives(viscosity.damping(rate), system, x, 1.0)
     turning = np.cross([0.3, -0.2, 0.9], system.rest_positions)
     np.testing.assert_allclose(viscosity.strain_rates(system.rest_positions, turning), 0.0, atol=1e-12)
     barrier = InversionGuard.at(system, x).quadratic_barrier(0.9)
+    assert barrier is not None
     assert barrier.value(x) > 0.0
     assert barrier.value(system.rest_positions) == 0.0
     assert barrier.value(x * [1.0, 1.0, -1.0]) == np.inf
@@ -243,8 +247,11 @@ def test_a_quadratic_body_rests_on_a_floor_and_on_a_linear_one():
     scene = sp.Scene([low, high], obstacles=[sp.HalfSpace((0, 0, 0), (0, 1, 0), friction=0.4)])
     *_, frame = sp.simulate(scene, sp.Implicit(), 0.02, 12)
     assert frame.report.status == "converged", frame.report.message
+    assert frame.report.min_distance is not None
     assert frame.report.min_distance > 0.0
-    forces = frame.report.details.contact_forces
+    details = frame.report.details
+    assert isinstance(details, ImplicitDetails)
+    forces = details.contact_forces
     weight = 9.81 * frame.system.masses.sum()
     assert 0.2 * weight < forces["low"][1] + forces["high"][1] < 5.0 * weight
     assert forces["high"][1] > 0.0
