@@ -192,7 +192,7 @@ def test_missing_files_and_folders(tmp_path, load):
     (tmp_path / "folder.vtk").mkdir()
     with pytest.raises(MeshError, match="it is a folder"):
         load(tmp_path / "folder.vtk")
-    with pytest.raises(MeshError, match="there is no such file"):
+    with pytest.raises(MeshError, match="the file does not exist"):
         load(tmp_path / "none.vtk")
 
 

@@ -84,9 +84,9 @@ def test_bad_transforms_are_errors(arguments, words):
     ("vertices", "triangles", "words"),
     [
         ([], TETRAHEDRON, "shape"),
-        (np.empty((0, 3)), TETRAHEDRON, "no vertices"),
-        (CORNERS, [], "no triangles"),
-        (CORNERS, np.empty((0, 3), dtype=int), "no triangles"),
+        (np.empty((0, 3)), TETRAHEDRON, "vertices are missing"),
+        (CORNERS, [], "triangles are missing"),
+        (CORNERS, np.empty((0, 3), dtype=int), "triangles are missing"),
         (np.array(CORNERS)[:, :2], TETRAHEDRON, r"\(n, 3\)"),
         ("bear.stl", TETRAHEDRON, "real numbers"),
         ([[0, 0, 0], [1, 0]], TETRAHEDRON, "real numbers"),

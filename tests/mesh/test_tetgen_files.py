@@ -153,8 +153,8 @@ MALFORMED = {
     "empty node": ({"node": ""}, "two.1.node: it is empty"),
     "only comments": ({"node": "# nothing\n\n"}, "two.1.node: it is empty"),
     "empty ele": ({"ele": ""}, "two.1.ele: it is empty"),
-    "no ele": ({"ele": None}, "two.1.ele: there is no such file"),
-    "no node": ({"node": None}, "two.1.node: there is no such file"),
+    "no ele": ({"ele": None}, "two.1.ele: the file does not exist"),
+    "no node": ({"node": None}, "two.1.node: the file does not exist"),
     "two dimensions": ({"node": "3 2 0 0\n1 0 0\n2 1 0\n3 0 1\n"}, "two.1.node:1: dimension 2"),
     "header in words": ({"node": "five 3 0 0\n"}, "two.1.node:1: the header"),
     "header of fractions": ({"node": NODE.replace("5 3", "5.5 3", 1)}, "two.1.node:1: the header"),
@@ -243,7 +243,7 @@ def test_malformed_files_are_named_with_their_line(tmp_path: Path, case: str) ->
 def test_a_name_without_its_number_gives_a_hint(tmp_path: Path) -> None:
     path = write_family(tmp_path)
     (tmp_path / "two.node").write_text(NODE)
-    with pytest.raises(MeshError, match=r"two\.ele: there is no such file; two\.1\.ele exists"):
+    with pytest.raises(MeshError, match=r"two\.ele: the file does not exist; two\.1\.ele exists"):
         read_tetgen(path.with_name("two.node"))
 
 

@@ -157,8 +157,8 @@ def test_thin_tets_are_errors_only_below_round_off(scale):
 @pytest.mark.parametrize(
     ("vertices", "tets", "words"),
     [
-        (np.empty((0, 3)), TWO, "no vertices"),
-        (CORNERS, [], "no tets"),
+        (np.empty((0, 3)), TWO, "vertices are missing"),
+        (CORNERS, [], "tets are missing"),
         (CORNERS[:, :2], TWO, r"\(n, 3\)"),
         (CORNERS, [[0, 1, 2]], r"\(m, 4\)"),
         (CORNERS, np.array(TWO, dtype=float), "integers"),

@@ -114,7 +114,7 @@ def test_damaged_contents_are_errors_of_one_line(tmp_path, recorded, damage):
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
     [
-        ("missing.vtkhdf", None, "there is no such file"),
+        ("missing.vtkhdf", None, "the file does not exist"),
         ("empty.vtkhdf", b"", "is empty"),
         ("text.vtkhdf", b"solid ascii\n" * 50, "it is not an HDF5 file"),
         ("noise.vtkhdf", random.Random(1).randbytes(5000), "it is not an HDF5 file"),

@@ -103,7 +103,7 @@ def test_plots_that_cannot_be_written(tmp_path, recorded):
         plot_recording(recorded[0], tmp_path)
     with pytest.raises(OutputError, match="no picture format"):
         plot_recording(recorded[0], tmp_path / "plot.docx")
-    with pytest.raises(OutputError, match="no such file"):
+    with pytest.raises(OutputError, match="the file does not exist"):
         plot_recording(tmp_path / "none.vtkhdf", tmp_path / "plot.png")
     assert list(tmp_path.iterdir()) == []
 

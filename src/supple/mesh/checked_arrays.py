@@ -32,7 +32,7 @@ def vertex_array(value: ArrayLike, owner: str) -> NDArray[np.float64]:
     if array.ndim != 2 or array.shape[1] != 3:
         raise MeshError(f"{owner}: vertices have shape {array.shape}; they must have shape (n, 3), one x y z per row")
     if len(array) == 0:
-        raise MeshError(f"{owner}: there are no vertices; give those of at least one element")
+        raise MeshError(f"{owner}: vertices are missing; give those of at least one element")
     if len(array) > MAX_VERTICES:
         raise MeshError(f"{owner}: {len(array)} vertices are more than 32-bit indices can count")
     if not np.isfinite(array).all():
@@ -55,7 +55,7 @@ def index_array(value: ArrayLike, width: int, n_vertices: int, owner: str, name:
     except (TypeError, ValueError, OverflowError):
         raise MeshError(f"{owner}: {name}s are not an array; give integers of shape (m, {width})") from None
     if array.size == 0:
-        raise MeshError(f"{owner}: there are no {name}s; give at least one row of {width} vertex indices")
+        raise MeshError(f"{owner}: {name}s are missing; give at least one row of {width} vertex indices")
     if array.dtype.kind not in "iu":
         raise MeshError(
             f"{owner}: {name}s have dtype {array.dtype}; vertex indices must be integers of shape (m, {width})"

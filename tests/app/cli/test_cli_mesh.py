@@ -92,7 +92,7 @@ def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> N
     [
         (["missing.stl", "-o", "b.node"], "missing.stl: "),
         (["ball.stl", "-o", "b.step"], "b.step: the extension must be one of .node"),
-        (["ball.stl", "-o", "no/where/b.msh"], "there is no folder"),
+        (["ball.stl", "-o", "no/where/b.msh"], "does not exist"),
         (["ball.stl", "-o", "used.1.node"], "used.1.face: is a folder"),
         (["ball.stl", "-o", "b.node", "--quality", "0.9"], "ball.stl: --quality must be"),
         (["ball.stl", "-o", "b.node", "--max-volume", "-1"], "--max-volume must be"),

@@ -49,7 +49,7 @@ def test_a_surface_becomes_the_body_in_metres(tmp_path, capsys, factor, scale):
         (["old.yaml"], "old.yaml: exists already; give another name, or --overwrite"),
         (["ball.stl"], "is a surface, not a scene file; give it as supple new --surface ball.stl"),
         (["scene.json"], "a scene file ends in .yaml"),
-        (["no/where.yaml"], "there is no folder"),
+        (["no/where.yaml"], "does not exist"),
         (["--scale", "2"], "give --surface, too"),
         (["--surface", "missing.stl"], "missing.stl: "),
         (["--surface", "ball.stl", "--scale", "-1"], "scale must be"),

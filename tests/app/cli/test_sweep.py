@@ -50,7 +50,7 @@ def test_a_study_in_the_shell(study, tmp_path, capfd):
 
 def test_a_study_file_that_is_missing(tmp_path, capfd):
     assert main(["sweep", str(tmp_path / "absent.yaml")]) == ExitCode.INPUT
-    assert capfd.readouterr().err.endswith("absent.yaml: there is no such file\n")
+    assert capfd.readouterr().err.endswith("absent.yaml: the file does not exist\n")
 
 
 def test_the_bar_shows_failures_and_the_time_left():

@@ -120,7 +120,7 @@ def test_bad_yaml_is_an_error_of_one_line_with_its_place(read, tmp_path, text, l
 
 
 def test_unreadable_files(tmp_path):
-    with pytest.raises(sp.SceneError, match="no such file"):
+    with pytest.raises(sp.SceneError, match="the file does not exist"):
         read_yaml(tmp_path / "absent.yaml")
     with pytest.raises(sp.SceneError, match="this is a folder"):
         read_yaml(tmp_path)

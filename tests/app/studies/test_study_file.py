@@ -81,7 +81,7 @@ def test_designs(write, text, design):
     ("old", "new", "words"),
     [
         ("scene: fall.yaml\n", "", "study.yaml:1: the key `scene` is missing"),
-        ("fall.yaml", "absent.yaml", "absent.yaml: there is no such file"),
+        ("fall.yaml", "absent.yaml", "absent.yaml: the file does not exist"),
         ("{kind: grid}", "{kind: gird}", "study.yaml:5: design.kind: unknown kind 'gird'; did you mean `grid`"),
         ("{kind: grid}", "{kind: sobol, samples: 9}", "study.yaml:5: design: sobol: .* 8 or 16"),
         ("[-1.0, -2.0]", "[]", r"study.yaml:3: factors.gravity.1.values: has 0 values"),

@@ -127,7 +127,7 @@ def _read_text(path: Path) -> str:
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise SceneError(f"{path}: there is no such file") from None
+        raise SceneError(f"{path}: the file does not exist") from None
     except IsADirectoryError:
         raise SceneError(f"{path}: this is a folder; give the scene file in it") from None
     except (OSError, ValueError) as error:

@@ -29,7 +29,7 @@ class TetgenFamily(NamedTuple):
     ----------
     points : (n, 3) float [m], with `point_attributes` (n, a) and `point_markers` (n,) or None
     tets : (m, 4) int32, the corners as in the file, with `tet_attributes` (m, b), mostly regions
-    edges, faces : (e, 2) and (f, 3) int32 or None where there is no such file, with `edge_markers` and `face_markers`
+    edges, faces : (e, 2) and (f, 3) int32 or None where the file does not exist, with `edge_markers` and `face_markers`
     base_index : 0 or 1, as in the files
     order : 1, or 2 where the file holds ten-node tets, of which the four corners are kept here
     """
@@ -130,7 +130,7 @@ def _require(member: Path, given: Path) -> None:
         hint = f"; {iteration.name} exists: give that name"
     elif member != given:
         hint = f"; it belongs to {given.name}, and a tet mesh needs both .node and .ele"
-    raise MeshError(f"{member}: there is no such file{hint}")
+    raise MeshError(f"{member}: the file does not exist{hint}")
 
 
 def _read_nodes(

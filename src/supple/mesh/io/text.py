@@ -24,7 +24,7 @@ def file_contents(path: Path) -> bytes:
             raise MeshError(f"{path}: it is not a regular file")
         data = path.read_bytes()
     except FileNotFoundError:
-        raise MeshError(f"{path}: there is no such file") from None
+        raise MeshError(f"{path}: the file does not exist") from None
     except MemoryError:
         raise MeshError(f"{path}: it is too large for the memory of this machine") from None
     except (OSError, ValueError) as error:

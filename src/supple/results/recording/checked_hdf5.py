@@ -37,7 +37,7 @@ class CheckedFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         if not path.exists():
-            raise OutputError(f"{path}: there is no such file; a simulation writes one with Recorder, or supple run")
+            raise OutputError(f"{path}: the file does not exist; a simulation writes one with Recorder, or supple run")
         if path.is_dir():
             raise OutputError(f"{path}: is a folder; give the recording in it, such as {path / 'recording.vtkhdf'}")
         try:

@@ -133,13 +133,13 @@ class RecordedContents(RecordedScene):
         for body in self.bodies:
             if body.name == name:
                 return body
-        raise OutputError(f"{self.path}: there is no body {name!r}; it has {', '.join(b.name for b in self.bodies)}")
+        raise OutputError(f"{self.path}: body {name!r} does not exist; it has {', '.join(b.name for b in self.bodies)}")
 
     def series(self, name: str) -> NDArray[np.float64]:
         """A number (frames,) or vector (frames, 3) of the reports over time, such as "kinetic_energy"."""
         known = REPORT_NUMBERS + REPORT_VECTORS
         if name not in known:
-            raise OutputError(f"{self.path}: there is no series {name!r}; take one of {', '.join(known)}")
+            raise OutputError(f"{self.path}: series {name!r} does not exist; take one of {', '.join(known)}")
         return self._values(f"supple/frames/{name}")
 
     @property

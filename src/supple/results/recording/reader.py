@@ -46,7 +46,7 @@ class Recording(RecordedContents, Showable, Sequence[RecordedFrame]):
             return [RecordedFrame(self, i) for i in range(*index.indices(self._count))]
         number = index + self._count if index < 0 else index
         if not 0 <= number < self._count:
-            raise IndexError(f"{self.path}: there is no frame {index}; there are {self._count}")
+            raise IndexError(f"{self.path}: frame {index} does not exist; there are {self._count}")
         return RecordedFrame(self, number)
 
     def __iter__(self) -> Iterator[RecordedFrame]:

@@ -51,7 +51,7 @@ def gated_server(token: str, port: int = 0) -> Iterator[Any]:
             with _serving_behind(Gate(token)):
                 server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
         except OSError as error:
-            raise OutputError(f"page: there is no free port ({error}); give another port") from None
+            raise OutputError(f"page: no port is free ({error}); give another one") from None
     try:
         yield server
     finally:

@@ -92,7 +92,7 @@ def mesh(
     if output.suffix.lower() not in TET_EXTENSIONS:
         raise MeshError(f"{output}: the extension must be one of {', '.join(TET_EXTENSIONS)}")
     if not output.absolute().parent.is_dir():
-        raise MeshError(f"{output}: there is no folder {output.absolute().parent}")
+        raise MeshError(f"{output}: the folder {output.absolute().parent} does not exist")
     if not os.access(output.absolute().parent, os.W_OK):
         raise MeshError(f"{output}: the folder cannot be written to")
     targets = list(family_paths(output).values()) if is_tetgen_path(output) else [output]

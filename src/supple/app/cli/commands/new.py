@@ -43,7 +43,7 @@ def new(
     if scene.exists() and not overwrite:
         raise SceneError(f"{scene}: exists already; give another name, or --overwrite")
     if not scene.absolute().parent.is_dir():
-        raise SceneError(f"{scene}: there is no folder {scene.absolute().parent}")
+        raise SceneError(f"{scene}: the folder {scene.absolute().parent} does not exist")
     if surface is None:
         if scale is not None:
             raise SceneError("--scale is of a surface; give --surface, too")

@@ -41,7 +41,7 @@ def warm(
     known = kernels_of_scenes()
     unknown = [name for name in scenes if name not in known]
     if unknown:
-        raise SceneError(f"supple warm: there is no standard scene '{unknown[0]}'; there are {', '.join(known)}")
+        raise SceneError(f"supple warm: standard scene '{unknown[0]}' does not exist; there are {', '.join(known)}")
     kernels = {repr(kernel): kernel for name in scenes or known for kernel in known[name]}
     count = min(processes or os.cpu_count() or 1, max(1, len(kernels)))
     console, compiled = error_console(), 0

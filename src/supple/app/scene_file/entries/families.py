@@ -50,7 +50,7 @@ def solver_of_kind(kind: str) -> Solver:
     """
     known = {solver.kind: solver for solver in SOLVERS}
     if kind not in known:
-        raise SolverError(f"there is no solver {kind!r}; {suggestion(kind, known)}")
+        raise SolverError(f"solver {kind!r} does not exist; {suggestion(kind, known)}")
     return known[kind]()
 
 

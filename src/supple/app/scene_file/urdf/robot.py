@@ -195,7 +195,7 @@ def _geometry(element: ElementTree.Element, what: str, folder: Path, ignored: di
     keys = {"box": (("size", 3),), "cylinder": (("radius", 1), ("length", 1)), "sphere": (("radius", 1),)}
     if shape.tag not in keys:
         raise Problem(
-            f"{what}: there is no geometry <{printable(str(shape.tag))}>; there are box, cylinder, sphere, mesh"
+            f"{what}: geometry <{printable(str(shape.tag))}> does not exist; there are box, cylinder, sphere, mesh"
         )
     lengths = tuple(number for key, count in keys[shape.tag] for number in numbers(shape, key, what, count))
     if min(lengths) <= 0.0:
@@ -218,7 +218,7 @@ def _mesh_file(name: str, what: str, folder: Path) -> str:
     try:
         there = (folder / path).resolve()
         if not there.is_file():
-            raise Problem(f"{what}: there is no mesh {printable(name)!r}")
+            raise Problem(f"{what}: mesh {printable(name)!r} does not exist")
         return Path(os.path.relpath(there, folder.resolve())).as_posix()
     except (OSError, ValueError):
         raise Problem(f"{what}: the mesh {printable(name)!r} cannot be read") from None
@@ -233,7 +233,7 @@ def _joint(element: ElementTree.Element, links: dict[str, Link], ignored: dict[s
     parent, child = (attribute(child_of(element, key, what), "link", what) for key in ("parent", "child"))
     for end in (parent, child):
         if end not in links:
-            raise Problem(f"{what}: there is no link {printable(end)!r}")
+            raise Problem(f"{what}: link {printable(end)!r} does not exist")
     if parent == child:
         raise Problem(f"{what}: it joins link {printable(parent)!r} to itself")
     ignore_others(element, ("parent", "child", "origin", "axis", "limit", "dynamics"), what, ignored)

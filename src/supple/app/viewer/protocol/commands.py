@@ -103,7 +103,7 @@ class SetSolver(Command):
 
     def __post_init__(self) -> None:
         if self.kind not in ("xpbd", "implicit"):
-            raise CommandError(f"there is no solver {displayed(self.kind)}; there are xpbd and implicit")
+            raise CommandError(f"solver {displayed(self.kind)} does not exist; there are xpbd and implicit")
 
 
 @dataclass(frozen=True)

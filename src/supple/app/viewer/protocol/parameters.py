@@ -161,5 +161,5 @@ PARAMETERS: dict[str, Parameter] = {
 def find_parameter(name: object) -> Parameter:
     """The parameter of that name; raises `CommandError` where there is none."""
     if not isinstance(name, str) or name not in PARAMETERS:
-        raise CommandError(f"there is no parameter {displayed(name)}; there are {', '.join(PARAMETERS)}")
+        raise CommandError(f"parameter {displayed(name)} does not exist; there are {', '.join(PARAMETERS)}")
     return PARAMETERS[name]

@@ -93,7 +93,7 @@ def checked_length(value: object, what: str) -> float:
 
 def checked_shape(value: object, what: str) -> str:
     if value not in limits.SHAPES:
-        raise CommandError(f"there is no {what} {displayed(value)}; there are {', '.join(limits.SHAPES)}")
+        raise CommandError(f"{what} {displayed(value)} does not exist; there are {', '.join(limits.SHAPES)}")
     return str(value)
 
 

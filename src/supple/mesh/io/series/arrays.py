@@ -44,7 +44,7 @@ def read_npz(path: Path) -> ArraySeries:
                 )
             return _series(path, wanted, lambda name: arrays[name])
     except FileNotFoundError:
-        raise MeshError(f"{path}: there is no such file") from None
+        raise MeshError(f"{path}: the file does not exist") from None
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
         raise MeshError(f"{path}: it cannot be read as .npz: {' '.join(str(error).split())[:200]}") from None
 

@@ -96,7 +96,7 @@ def open_series(path: str | Path, *more: Path) -> Series:
         return WHOLE[suffix](path)
     if suffix in READERS:
         if not path.exists():
-            raise MeshError(f"{path}: there is no such file")
+            raise MeshError(f"{path}: the file does not exist")
         raise MeshError(
             f"{path}: it is one mesh; give a pattern of all frames, such as {_pattern(path)}, or their folder"
         )
@@ -109,7 +109,7 @@ def open_series(path: str | Path, *more: Path) -> Series:
 def file_contents_exist(path: Path) -> None:
     """Raise `MeshError` where a file is missing, not a regular one, or empty."""
     if not path.exists():
-        raise MeshError(f"{path}: there is no such file")
+        raise MeshError(f"{path}: the file does not exist")
     if not path.is_file():
         raise MeshError(f"{path}: it is not a regular file")
     if path.stat().st_size == 0:

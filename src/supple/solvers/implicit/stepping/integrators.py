@@ -266,5 +266,5 @@ def integrator_of(choice: str | Integrator) -> Integrator:
         return choice
     if choice not in INTEGRATORS:
         names = ", ".join(repr(name) for name in INTEGRATORS)
-        raise SolverError(f"Implicit: there is no integrator {choice!r}; there are {names}")
+        raise SolverError(f"Implicit: integrator {choice!r} does not exist; there are {names}")
     return INTEGRATORS[choice]

@@ -38,7 +38,7 @@ def make_mesh(shape: str, size: float, resolution: int) -> TetMesh:
             return shapes.torus(0.35 * size, 0.15 * size, min(edge, 0.12 * size))
         case "gummy_bear":
             return shapes.gummy_bear(size, min(edge, size / 7.0))
-    raise CommandError(f"there is no shape {shape!r}")
+    raise CommandError(f"shape {shape!r} does not exist")
 
 
 def new_body(command: AddBody | AddMesh, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
