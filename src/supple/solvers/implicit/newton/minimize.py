@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from supple.model.state import Status
 from supple.runtime.interruption import interruption_point
 from supple.solvers.implicit.newton.direction import DirectionFinder, Tools, newton_row
-from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
+from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
 from supple.solvers.implicit.newton.line_search import Jumps, extended, search
 from supple.solvers.implicit.newton.objective import Model, Objective
 from supple.solvers.implicit.newton.trace import NewtonRow
@@ -67,9 +67,9 @@ _LINEAR_RATE = 0.2
 # Those that shrink by less than this one crawl, and their steps may be made longer.
 _CRAWL = 0.5
 
-# Forces are nearly balanced where their sum is below this share of contact's. Larger ones leave errors in friction that
-# a block shows that just sticks on its slope.
-_NEARLY = 3e-3
+# Forces are nearly balanced where their sum is below this share of contact's: what is left would be lost work where
+# friction is renewed.
+_NEARLY = 0.1
 
 
 # After this many steps in a row that change the energy by less than this share of its terms, and with balanced forces,
@@ -90,7 +90,9 @@ class Problem:
     convergence : when the minimum is reached
     max_iterations : of Newton
     longest : largest component [m] that a direction may have where there is no inertia
-    outdated : whether the objective is due for a change at positions (n, 3) where forces are nearly balanced
+    outdated : whether the objective is due for a change at positions (n, 3) where this share of contact's forces is not
+        balanced
+    projected : the terms that are projected at first
     """
 
     objective: Objective
@@ -98,24 +100,29 @@ class Problem:
     convergence: Convergence
     max_iterations: int
     longest: float
-    outdated: Callable[[NDArray[np.float64]], bool] | None = None
+    outdated: Callable[[NDArray[np.float64], float], bool] | None = None
+    projected: ProjectedTerms = ProjectedTerms.ALL
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """The end of a minimization, and its status; `rows` describe every iteration."""
+    """The end of a minimization, and its status; `rows` describe every iteration.
+
+    unbalanced : share of contact's forces that is left where the objective is due for a change, else 0
+    """
 
     status: Status
     end: Model
     message: str = ""
     rows: list[NewtonRow] = field(default_factory=list)
+    unbalanced: float = 0.0
 
 
 def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools: Tools) -> Outcome:
     """Minimize over the free vertices from x, whose guarded tets all have positive volume."""
     objective, convergence, hessian = problem.objective, problem.convergence, tools.hessian
-    directions = DirectionFinder(objective, tools, problem.scale, convergence.step, problem.longest)
-    policy, jumps = directions.policy, Jumps()
+    policy, jumps = ProjectionPolicy(problem.projected), Jumps()
+    directions = DirectionFinder(objective, tools, problem.scale, convergence.step, problem.longest, policy=policy)
     here = objective.model(x, hessian, policy.now)
     rows: list[NewtonRow] = []
     if not np.isfinite(here.energy):
@@ -152,11 +159,10 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             if step == 0.0 or is_converged(problem, found.length, here, tools, found.touching):
                 return Outcome(Status.CONVERGED, here, "", rows)
             here = objective.model(here.positions, hessian, policy.now)
-        elif found.touching and (
-            (settled >= _SETTLED and _is_balanced(problem, here, tools))
-            or (step >= 1.0 and _is_outdated(problem, here, tools))
-        ):
+        elif found.touching and settled >= _SETTLED and _is_balanced(problem, here, tools):
             return Outcome(Status.CONVERGED, here, "", rows)
+        elif found.touching and step >= 1.0 and (share := _share_when_outdated(problem, here, tools)) is not None:
+            return Outcome(Status.CONVERGED, here, "", rows, share)
         if step == 0.0:
             text = (
                 f"no step along Newton's direction ({found.length:.2e} m) lowers the energy, in iteration {iteration}"
@@ -171,12 +177,14 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     return Outcome(Status.ITERATION_LIMIT, here, text, rows)
 
 
-def _is_outdated(problem: Problem, here: Model, tools: Tools) -> bool:
-    """Whether the objective is due for a change before its minimum is reached: what is left would be lost work."""
+def _share_when_outdated(problem: Problem, here: Model, tools: Tools) -> float | None:
+    """The unbalanced share where the objective is due for a change before its minimum is reached."""
     if problem.outdated is None:
-        return False
+        return None
     contact = free_norm(problem.objective.contact_gradient(here.positions), tools)
-    return free_norm(here.gradient, tools) <= _NEARLY * contact and problem.outdated(here.positions)
+    left = free_norm(here.gradient, tools)
+    outdated = contact > 0.0 and left <= _NEARLY * contact and problem.outdated(here.positions, left / contact)
+    return left / contact if outdated else None
 
 
 def _is_balanced(problem: Problem, here: Model, tools: Tools) -> bool:

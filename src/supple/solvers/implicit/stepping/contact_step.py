@@ -38,6 +38,11 @@ _LEAST_GAIN = 2.0
 _FORCE_CHANGE = 0.1
 _MOST_UPDATES = 5
 
+# Normal forces of a state in which more than this share of contact's forces is not balanced are not those of the end,
+# even if they are near: at the end they may differ by this share.
+_BALANCED = 3e-3
+_EARLY_CHANGE = 0.02
+
 
 @dataclass(eq=False)
 class ContactStep:
@@ -49,6 +54,7 @@ class ContactStep:
     stiffness : of the barrier now [Pa], the integrator's weight included
     stiffness_increases : their number; nearest : the smallest distance before the latest one [m]
     friction_updates : their number; normal_gradient : (n, 3) of the barrier at the latest one [N]
+    unbalanced : share of contact's forces that was not balanced there
     """
 
     model: ContactModel | None
@@ -60,6 +66,7 @@ class ContactStep:
     stiffness_increases: int = 0
     nearest: float = 0.0
     friction_updates: int = 0
+    unbalanced: float = 0.0
     barrier: Barrier | None = None
     frictions: list[Friction] | None = None
     normal_gradient: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
@@ -83,34 +90,45 @@ class ContactStep:
             self.normal_gradient = Objective([self.barrier]).gradient(x)
         return Objective([*objective.terms, self.barrier, *self.frictions], objective.clock)
 
-    def needs_update(self, x: NDArray[np.float64]) -> bool:
-        """Whether to continue from x (n, 3) with a stiffer barrier or with friction of the normal forces there."""
+    def needs_update(self, x: NDArray[np.float64], unbalanced: float = 0.0) -> bool:
+        """Whether to continue from x (n, 3) with a stiffer barrier or with friction of the normal forces there.
+
+        unbalanced : share of contact's forces that is not balanced
+        """
         if self.model is None:
             return False
         scales = self.model.scales
         nearest = self.model.smallest_distance(x)
         increases = self.stiffness_increases
         allowed = increases == 0 or (increases < _MOST_INCREASES and nearest > _LEAST_GAIN * self.nearest)
+        allowed = allowed and unbalanced <= _BALANCED
         if scales.adaptive and allowed and nearest < _TOO_NEAR * scales.dhat:
             self.stiffness *= _STIFFENING
             self.stiffness_increases += 1
             self.nearest = nearest
             return True
-        if self.friction_is_outdated(x):
+        if self.friction_is_outdated(x, unbalanced):
             self.friction_updates += 1
+            self.unbalanced = unbalanced
             return True
         return False
 
-    def friction_is_outdated(self, x: NDArray[np.float64]) -> bool:
-        """Whether friction has to be updated with the normal forces at x (n, 3)."""
+    def friction_is_outdated(self, x: NDArray[np.float64], unbalanced: float) -> bool:
+        """Whether friction has to be updated with the normal forces at x (n, 3); see `needs_update`."""
         if self.model is None or self.barrier is None or not self.model.coefficients.any():
             return False
         wanted = self.model.friction_iterations
         if self.friction_updates + 1 >= (_MOST_UPDATES if wanted is None else wanted):
             return False
+        if unbalanced > _BALANCED and (wanted is not None or self.friction_updates):
+            return False
+        if wanted is not None:
+            return True
         now = Objective([self.barrier]).gradient(x)
         change = float(np.linalg.norm(now - self.normal_gradient))
-        return wanted is not None or change > _FORCE_CHANGE * float(np.linalg.norm(now))
+        early = unbalanced <= _BALANCED < self.unbalanced
+        allowed = _EARLY_CHANGE if early else _FORCE_CHANGE
+        return change > allowed * float(np.linalg.norm(now))
 
     def verified(self, outcome: Outcome) -> Outcome:
         """The outcome, or a failure where surfaces intersect because of rounding.

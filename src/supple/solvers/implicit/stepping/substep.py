@@ -22,6 +22,7 @@ from supple.solvers.implicit.energies.midpoint import ActingWithin
 from supple.solvers.implicit.energies.potential import Potential
 from supple.solvers.implicit.energies.stitch_damping import StitchDamping
 from supple.solvers.implicit.inversion_guard import InversionGuard
+from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
 from supple.solvers.implicit.newton.linearize import FEW, linearize
 from supple.solvers.implicit.newton.minimize import Convergence, Outcome, Problem, minimize
 from supple.solvers.implicit.newton.objective import Objective
@@ -45,6 +46,9 @@ _STATIC_TOLERANCE = 1e-9
 _DHAT_SHARE = 0.1
 _FRICTION_SHARE = 1e-2
 
+# Pinned bodies start where they go on as they do, if the filters allow this share of the way: less of it leaves
+# surfaces that are nearer than forces would allow.
+_WORTHWHILE = 0.3
 
 # Each one takes nine tenths of the distance to what is ahead, until it is near enough to touch.
 _MOST_APPROACHES = 3
@@ -156,6 +160,7 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
         else:
             x = _first_guess(problem, x, ahead, limits)
     else:
+        x = _going_on(system, x, plan, targets, limits, tools.pinned)
         x, moved = move_pins(system, problem, x, targets, limits, tools)
         rows = moved.rows
         if moved.status is not Status.CONVERGED:
@@ -167,9 +172,10 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
         if outcome.status is not Status.CONVERGED:
             break
         updated = joints is not None and joints.update(x)
-        if not contact.needs_update(x) and not updated:
+        if not contact.needs_update(x, outcome.unbalanced) and not updated:
             break
-        problem = replace(problem, objective=contact.with_contact(_with_joints(base, joints), x))
+        objective = contact.with_contact(_with_joints(base, joints), x)
+        problem = replace(problem, objective=objective, projected=ProjectedTerms.RELEASED_LAST)
     outcome = contact.verified(replace(outcome, rows=rows))
     if joints is not None:
         outcome = joints.verified(outcome)
@@ -274,6 +280,25 @@ def _linearized_at(
         if limit.step == 1.0 or contact is None or np.isfinite(contact.smallest_distance(place)):
             break
     return place
+
+
+def _going_on(
+    system: System,
+    x: NDArray[np.float64],
+    plan: Plan,
+    targets: NDArray[np.float64],
+    limits: StepLimits,
+    pinned: NDArray[np.int32],
+) -> NDArray[np.float64]:
+    """Where pins are at `targets` and all else goes on as it does, as far as filters allow; x where that is near."""
+    if plan.scale is None:
+        return x
+    ahead = with_rigid_bodies(system, plan.predicted.copy())
+    ahead[pinned] = targets
+    system.welding.follow(ahead)
+    step = limits.largest_step(x, ahead - x).step
+    ahead = ahead if step == 1.0 else x + step * (ahead - x)
+    return ahead if step >= _WORTHWHILE and limits.allows(ahead) else x
 
 
 def _first_guess(
