@@ -1,6 +1,7 @@
 """When friction takes the normal forces anew: later ones may differ little from those of a state out of balance."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ def outdated(now, taken_at, unbalanced, wanted=None):
         coefficients=np.ones((1, 1)), friction_iterations=wanted, scales=scales, collisions=SimpleNamespace()
     )
     x = np.ones((1, 3))
-    step = ContactStep(model, x, (0.0, 1.0), 1.0)  # pyright: ignore[reportArgumentType]
+    step: Any = ContactStep(model, x, (0.0, 1.0), 1.0)  # pyright: ignore[reportArgumentType]
     step.barrier, step.normal_gradient, step.unbalanced = Push(), x, taken_at
     return step.friction_is_outdated(now * x, unbalanced)
 
