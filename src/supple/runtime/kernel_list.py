@@ -46,7 +46,7 @@ def compile_kernel(name: str, signature: list[Any]) -> bool:
     if kernel is None:
         return False
     before = sum(kernel.stats.cache_misses.values())
-    with suppress(NumbaError, AttributeError, ImportError):  # the code has another signature since
+    with suppress(NumbaError, AttributeError, ImportError, TypeError):  # the code has another signature since
         kernel.compile(from_json(signature))
     return sum(kernel.stats.cache_misses.values()) > before
 
