@@ -29,8 +29,8 @@ from benchmarks.table import Table
 from supple.results.check.checker import check_recording
 from supple.solvers.implicit.details import ImplicitDetails
 
-COUNTS = (5, 10, 20, 50, 100)
-SIDES = {5: (5, 1, 1), 10: (5, 2, 1), 20: (5, 2, 2), 50: (5, 2, 5), 100: (5, 4, 5)}
+COUNTS = (5, 10, 20, 40, 100)
+SIDES = {5: (5, 1, 1), 10: (5, 2, 1), 20: (5, 2, 2), 40: (5, 4, 2), 100: (5, 4, 5)}
 SQUEEZE = 0.72  # of the extents of a bear
 DHAT = 2.5e-3  # [m] a quarter of an edge
 NEAR = 0.75  # of dhat: gaps between squeezed bears, which then press on each other about as on the walls before
@@ -133,7 +133,7 @@ def run() -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "counts", nargs="*", type=int, metavar="COUNT", help="of 5, 10, 20, 50, 100; without it, 5 to 20 are written"
+        "counts", nargs="*", type=int, metavar="COUNT", help="of 5, 10, 20, 40, 100; without it, 5 to 20 are written"
     )
     parser.add_argument("--one", type=int, choices=COUNTS, help="one pile in this process")
     chosen = parser.parse_args()
