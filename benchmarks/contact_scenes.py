@@ -132,7 +132,7 @@ def main(
         chosen.append(TUMBLING)
     other = Path(against).resolve() if against is not None else None
     if other is not None and not (other / "supple" / "__init__.py").exists():
-        raise SystemExit(f"--against {against}: there is no package supple in it; give the folder src of a checkout")
+        raise SystemExit(f"--against {against}: the package supple is missing in it; give the folder src of a checkout")
     columns = {"scene": "", "tets": ",.0f", "contacts": ",.0f", "Newton/step": ".1f", "ms/step": ".1f"}
     columns |= {"contact": ".0%", "elasticity": ".0%", "linear systems": ".0%", "not as it should be": ""}
     table = Table("Steps with contact", columns)

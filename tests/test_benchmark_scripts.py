@@ -125,7 +125,7 @@ def test_contact_scenes_are_measured_against_another_checkout(capsys):
 def test_a_checkout_without_the_package_is_refused(tmp_path):
     from benchmarks import contact_scenes
 
-    with pytest.raises(SystemExit, match="there is no package supple in it"):
+    with pytest.raises(SystemExit, match="the package supple is missing in it"):
         contact_scenes.main(["slope:small"], against=tmp_path)
 
 

@@ -89,7 +89,7 @@ def test_given_positions_and_velocities_replace_those_of_the_scene():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"c": CUBE}, "no body 'c'"),
+        ({"c": CUBE}, "body 'c' does not exist"),
         ({"b": CUBE[:5]}, r"shape \(5, 3\)"),
         ({"b": CUBE * np.nan}, "row 0 is not finite"),
         ({"b": "here"}, "not an array of numbers"),

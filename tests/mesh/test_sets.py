@@ -138,7 +138,7 @@ def test_a_file_without_groups_has_no_sets(tmp_path):
     MESH.save(tmp_path / "a.msh")
     sets = sp.TetMesh.load(tmp_path / "a.msh").sets
     assert (dict(sets.vertices), dict(sets.tets), sets.tet_count) == ({}, {}, len(MESH.tets))
-    with pytest.raises(MeshError, match="there is no set of vertices 'left'; there are: none"):
+    with pytest.raises(MeshError, match="set of vertices 'left' does not exist; there are: none"):
         sets.vertices_of("left")
 
 
@@ -198,9 +198,9 @@ def test_sets_in_a_scene_file(tmp_path):
     np.testing.assert_array_equal(scene.pins[0].vertices, LEFT)
     np.testing.assert_array_equal(scene.bodies[0].material.index, np.isin(np.arange(len(MESH.tets)), BONE))
     for old, new, words in (
-        ("set: Left", "set: Right", "s.yaml:8: .*there is no set of vertices 'Right'; there are: left, soft, bone"),
+        ("set: Left", "set: Right", "s.yaml:8: .*set of vertices 'Right' does not exist; there are: left, soft, bone"),
         ("set: Left", "set: Left, vertices: [0]", "s.yaml:8: .*either `vertices`, `box` or `set`"),
-        ("set: bone", "set: blood", "s.yaml:6: .*there is no set of tets 'blood'; there are: soft, bone"),
+        ("set: bone", "set: blood", "s.yaml:6: .*set of tets 'blood' does not exist; there are: soft, bone"),
         ("mesh: {file: a.msh, scale: 0.1}", "shape: {kind: box}", "s.yaml:.*body 'arm' has no file of tets"),
     ):
         (tmp_path / "s.yaml").write_text(SCENE.replace(old, new))

@@ -236,7 +236,7 @@ def test_files_of_other_programs_are_not_replaced(tmp_path, recorded):
 
 
 def test_unknown_formats_are_refused(recorded):
-    with pytest.raises(OutputError, match="no format 'stl'; take one of glb, obj, vtu"):
+    with pytest.raises(OutputError, match="format 'stl' does not exist; take one of glb, obj, vtu"):
         export(recorded[0], "stl")
 
 

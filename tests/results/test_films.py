@@ -152,7 +152,7 @@ def test_a_field_of_quadratic_tets_has_values_at_middle_nodes(tmp_path):
         ("mp4", {"camera": "fly"}, "camera is 'fly'; give one of fit, follow, orbit"),
         ("mp4", {"size": (1281, 720)}, r"size is \(1281, 720\); give even pixels"),
         ("gif", {"rate": 0}, "rate is 0; give a number above zero"),
-        ("png", {"colour": "J"}, "there is no colour; there are size, rate"),
+        ("png", {"colour": "J"}, "colour does not exist; there are size, rate"),
         ("png", {"surface": "cut"}, "surface is 'cut'; give one of skin, tets"),
         ("png", {"eye": (1, 2, 3)}, "target is missing; give eye and target together"),
         ("png", {"eye": (1, 2), "target": (0, 0, 0)}, r"eye has shape \(2,\); give three numbers"),

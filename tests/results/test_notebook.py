@@ -113,7 +113,7 @@ def test_a_recording_has_its_check_its_plot_and_its_exports(recorded, shown, tmp
     assert plot._repr_png_().startswith(b"\x89PNG")
     assert plot.save(tmp_path / "p.pdf").read_bytes().startswith(b"%PDF")
     assert recording.export("csv", tmp_path / "t.csv").read_text().startswith("frame,time,status")
-    with pytest.raises(OutputError, match="no format 'mp5'"):
+    with pytest.raises(OutputError, match="format 'mp5' does not exist"):
         recording.export("mp5")
 
 

@@ -116,7 +116,7 @@ def test_tables_have_the_largest_value_of_each_body(recorded, tmp_path, capfd):
 
 
 def test_unknown_and_repeated_fields_are_errors(tmp_path):
-    with pytest.raises(sp.OutputError, match=r"there is no field 'von_misses'; did you mean 'von_mises'\?"):
+    with pytest.raises(sp.OutputError, match=r"field 'von_misses' does not exist; did you mean 'von_mises'\?"):
         sp.Recorder(tmp_path / "r.vtkhdf", fields=["von_misses"])
     with pytest.raises(sp.OutputError, match="'stress' is given twice"):
         sp.Recorder(tmp_path / "r.vtkhdf", fields=["stress", "stress"])
@@ -130,7 +130,7 @@ def test_unknown_and_repeated_fields_are_errors(tmp_path):
         plain[0].contact_force  # noqa: B018
     with (
         sp.read_recording(tmp_path / "r.vtkhdf") as plain,
-        pytest.raises(sp.OutputError, match=r"there is no field 'stres'; did you mean 'stress'\?"),
+        pytest.raises(sp.OutputError, match=r"field 'stres' does not exist; did you mean 'stress'\?"),
     ):
         plain[0].field("stres")
 
@@ -175,7 +175,7 @@ def test_supple_run_records_the_fields_of_the_file_or_of_the_option(tmp_path, mo
         with sp.read_recording(tmp_path / folder / "recording.vtkhdf") as recording:
             assert [field.name for field in recording.fields] == names
     assert main(["run", "scene.yaml", "-o", "c", "--fields", "shine"]) == ExitCode.INPUT
-    assert "there is no field 'shine'" in capfd.readouterr().err
+    assert "field 'shine' does not exist" in capfd.readouterr().err
     (tmp_path / "bad.yaml").write_text(FILE.replace("von_mises", "shine"))
     assert main(["run", "bad.yaml", "-o", "d"]) == ExitCode.INPUT
     assert "output.fields[0]" in capfd.readouterr().err

@@ -72,9 +72,15 @@ BAD = [
     (lambda: sp.ContactPair("b", 7, collide=False), "second is 7; give a name or a list"),
     (lambda: sp.ContactPair("b", ["a1", None], collide=False), "second holds None; give names"),
     (lambda: scene("floor"), r"scene: contact_pairs\[0\] is a str; give a ContactPair"),
-    (lambda: scene(sp.ContactPair("a1", "flor", collide=False)), "second: there is no .* 'flor'; did you mean 'floor'"),
-    (lambda: scene(sp.ContactPair("zz", "b", collide=False)), "first: there is no .* 'zz'; there are 'a1', 'a2', 'b'"),
-    (lambda: scene(sp.ContactPair("c*", "b", collide=False)), r"first: there is no body or obstacle 'c\*'"),
+    (
+        lambda: scene(sp.ContactPair("a1", "flor", collide=False)),
+        "second: body or obstacle 'flor' does not exist; did you mean 'floor'",
+    ),
+    (
+        lambda: scene(sp.ContactPair("zz", "b", collide=False)),
+        "first: body or obstacle 'zz' does not exist; there are 'a1', 'a2', 'b'",
+    ),
+    (lambda: scene(sp.ContactPair("c*", "b", collide=False)), r"first: body or obstacle 'c\*' does not exist"),
     (
         lambda: scene(sp.ContactPair(["b", "floor"], "Sphere 1", collide=False)),
         "'floor' and 'Sphere 1' are both obstacles, which never touch",

@@ -125,7 +125,7 @@ def test_what_cannot_be_set_is_refused_in_one_line():
     one = sp.MotionInput("a")
     assert held_cube(one).inputs == {"a": one}
     for sent, expected in (
-        ({"b": (0, 0, 0)}, "there is no input 'b'; there are: 'a'"),
+        ({"b": (0, 0, 0)}, "input 'b' does not exist; there are: 'a'"),
         ({"a": (0, 0)}, r"input 'a' has shape \(2,\)"),
         ({"a": np.zeros((2, 3))}, r"input 'a' is set to an array of shape \(2, 3\); give \(3,\)"),
         (3, "inputs are set by 3; give a mapping"),

@@ -128,7 +128,7 @@ BAD = [
     (lambda: sp.obstacles.Cylinder(end=(0, np.nan, 0), name="pole"), "obstacle 'pole': end is .*must be finite"),
     (lambda: sp.obstacles.Cylinder(inside="yes"), "Cylinder: inside is 'yes'; give True or False"),
     (lambda: sp.obstacles.Box(size=(1, 0, 1)), r"Box: size is \[1.0, 0.0, 1.0\]; every edge must be above zero"),
-    (lambda: sp.obstacles.TriangleObstacle(), "TriangleObstacle: there is no surface; give surface="),
+    (lambda: sp.obstacles.TriangleObstacle(), "TriangleObstacle: surface is missing; give surface="),
 ]
 
 

@@ -116,7 +116,7 @@ BAD_OBSTACLES = [
     (sp.obstacles.Box, {"rotation": "x"}, "rotation is 'x'"),
     (sp.obstacles.Sphere, {"radius": 0}, "radius is 0"),
     (sp.obstacles.Sphere, {"radius": "1"}, "radius is '1'"),
-    (sp.obstacles.TriangleObstacle, {}, "there is no surface; give surface="),
+    (sp.obstacles.TriangleObstacle, {}, "surface is missing; give surface="),
     (sp.obstacles.TriangleObstacle, {"surface": MESH}, "give a SurfaceMesh"),
 ]
 
@@ -151,7 +151,7 @@ def test_bad_keyframes(values, words):
 
 
 BAD_SCENES = [
-    ({"bodies": []}, "there is no body"),
+    ({"bodies": []}, "bodies are missing"),
     ({"bodies": None}, "bodies is None"),
     ({"bodies": [MESH]}, r"bodies\[0\] is a TetMesh; give a Body"),
     ({"bodies": [body(), body()]}, "body 'cube' and body 'cube' have the same name; give each"),
@@ -161,7 +161,7 @@ BAD_SCENES = [
         "obstacle 'floor' and obstacle 'floor' have the same name",
     ),
     ({"obstacles": [sp.HalfSpace(name="cube")]}, "body 'cube' and obstacle 'cube' have the same name; give each body"),
-    ({"pins": [sp.Pin("ball", [0])]}, "there is no body 'ball'; there are 'cube'"),
+    ({"pins": [sp.Pin("ball", [0])]}, "body 'ball' does not exist; there are 'cube'"),
     ({"pins": [sp.Pin("cube", [8])]}, "vertex 8 does not exist; the body has 8"),
     ({"pins": [sp.Pin("cube", sp.InBox((5, 5, 5), (6, 6, 6)))]}, "its box holds no vertex; the body reaches from"),
     ({"pins": [sp.Pin("cube", [0, 1]), sp.Pin("cube", [1, 2])]}, "vertex 1 is already held by another pin"),
@@ -201,7 +201,7 @@ def test_scenes_are_frozen():
     with pytest.raises(ValueError, match="read-only"):
         np.asarray(scene.gravity)[1] = 0.0
     assert scene.body("cube") is scene.bodies[0]
-    with pytest.raises(sp.SceneError, match="no body 'ball'; there are 'cube'"):
+    with pytest.raises(sp.SceneError, match="body 'ball' does not exist; there are 'cube'"):
         scene.body("ball")
 
 

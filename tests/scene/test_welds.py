@@ -212,7 +212,7 @@ def test_welds_of_scene_files(tmp_path):
         (lambda: sp.Weld("beam", "cube"), "give the vertices by one of `vertices`, `box` and `max_distance`"),
         (lambda: sp.Weld("beam", "cube", [0], 0.1), "give the vertices by one of `vertices`, `box` and `max_distance`"),
         (lambda: sp.Weld("beam", "cube", max_distance=-1), "max_distance is -1; it must be above zero"),
-        (lambda: welded(sp.Weld("bean", "cube", [0])), "there is no body 'bean'; did you mean 'beam'?"),
+        (lambda: welded(sp.Weld("bean", "cube", [0])), "body 'bean' does not exist; did you mean 'beam'?"),
         (lambda: welded(sp.Weld("cube", "beam", [0])), "body 'cube' is rigid; a weld is of a soft body to a rigid"),
         (lambda: welded(sp.Weld("beam", "cube", [99])), "vertex 99 does not exist"),
         (lambda: welded(sp.Weld("beam", "cube", LEFT), sp.Weld("beam", "cube", LEFT[:1])), "is already welded"),

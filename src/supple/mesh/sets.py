@@ -77,7 +77,7 @@ def _found(sets: Mapping[str, NDArray[np.int32]], name: str, kind: str) -> NDArr
         if known.upper() == str(name).upper():
             return rows
     listed = ", ".join(sets) or "none"
-    raise MeshError(f"there is no set of {kind} {name!r}; there are: {listed}")
+    raise MeshError(f"set of {kind} {name!r} does not exist; there are: {listed}")
 
 
 def sets_of(file: TetFile) -> MeshSets:

@@ -120,7 +120,7 @@ class ContactPoints:
 
     def _number(self, name: str) -> int:
         if name not in self.names:
-            raise SceneError(f"there is no body or obstacle {name!r}; there are {', '.join(map(repr, self.names))}")
+            raise SceneError(f"body or obstacle {name!r} does not exist; there are {', '.join(map(repr, self.names))}")
         return self.names.index(name)
 
 

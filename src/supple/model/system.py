@@ -337,7 +337,9 @@ def initial_state(
     for what, given in (("initial_positions", positions), ("initial_velocities", velocities)):
         for name in given:
             if name not in names:
-                raise SceneError(f"{what}: there is no body {name!r}; there are {', '.join(map(repr, sorted(names)))}")
+                raise SceneError(
+                    f"{what}: body {name!r} does not exist; there are {', '.join(map(repr, sorted(names)))}"
+                )
     x, v = [], []
     for body in scene.bodies:
         placed, moving = body.place(body.mesh.vertices), None

@@ -68,7 +68,7 @@ def paper_figure(path: Path, width: float, height: float) -> Iterator[Any]:
 
     kind = path.suffix[1:].lower()
     if kind not in KINDS and not path.is_dir():
-        raise OutputError(f"{path}: there is no picture format {path.suffix!r}; take .png, .pdf or .svg")
+        raise OutputError(f"{path}: picture format {path.suffix!r} does not exist; take .png, .pdf or .svg")
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(width, height), layout="constrained", dpi=150)
         FigureCanvasAgg(figure)

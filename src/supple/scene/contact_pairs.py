@@ -166,7 +166,9 @@ def _found(pair: ContactPair, key: str, names: list[str]) -> list[int]:
     for name in getattr(pair, key):
         found = [i for i, known in enumerate(names) if _matches(name, known)]
         if not found:
-            raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {suggestion(name, names)}")
+            raise SceneError(
+                f"{pair.label}: {key}: body or obstacle {name!r} does not exist; {suggestion(name, names)}"
+            )
         numbers.update(found)
     return sorted(numbers)
 

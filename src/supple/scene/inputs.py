@@ -159,7 +159,7 @@ def checked_values(inputs: Mapping[str, Input], values: object) -> dict[str, NDA
     for name in values:
         if name not in inputs:
             known = ", ".join(map(repr, sorted(inputs))) or "none"
-            raise SceneError(f"there is no input {name!r}; there are: {known}")
+            raise SceneError(f"input {name!r} does not exist; there are: {known}")
     return {name: inputs[name].checked(value) for name, value in values.items()}
 
 

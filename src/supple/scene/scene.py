@@ -113,7 +113,7 @@ class Scene(Showable):
             object.__setattr__(self, key, (*getattr(self, key), *(one for one in self.loads if isinstance(one, kind))))
         object.__setattr__(self, "loads", tuple(load for load in self.loads if isinstance(load, Load)))
         if not self.bodies:
-            raise SceneError("scene: there is no body; give at least one")
+            raise SceneError("scene: bodies are missing; give at least one")
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
         object.__setattr__(self, "bodies", with_stiffness(self.bodies, np.asarray(self.gravity)))
         object.__setattr__(self, "obstacles", _all_named(self.obstacles, [body.name for body in self.bodies]))
@@ -173,8 +173,8 @@ class Scene(Showable):
                     if getattr(item, name) in skins:
                         with at(key, i, name):
                             raise SceneError(
-                                f"{item.label}: body {getattr(item, name)!r} touches with its skin, on which there are "
-                                f"no {key}; give it collide='tets'"
+                                f"{item.label}: body {getattr(item, name)!r} touches with its skin, which cannot carry "
+                                f"{key}; give it collide='tets'"
                             )
 
     def _check_joints(self) -> None:
@@ -208,7 +208,9 @@ class Scene(Showable):
         """Raise where body or vertices do not exist, or a pin selects vertices that are `pinned`, then mark these."""
         if item.body not in pinned:
             with at("body"):
-                raise SceneError(f"{item.label}: there is no body {item.body!r}; {suggestion(item.body, list(pinned))}")
+                raise SceneError(
+                    f"{item.label}: body {item.body!r} does not exist; {suggestion(item.body, list(pinned))}"
+                )
         body, held = self.body(item.body), pinned[item.body]
         item.check_kind_of_body(isinstance(body, RigidBody))
         with at("box" if isinstance(item.vertices, InBox) else "vertices"):
@@ -302,7 +304,9 @@ class Scene(Showable):
         for body in self.bodies:
             if body.name == name:
                 return body
-        raise SceneError(f"scene: there is no body {name!r}; there are {', '.join(repr(b.name) for b in self.bodies)}")
+        raise SceneError(
+            f"scene: body {name!r} does not exist; there are {', '.join(repr(b.name) for b in self.bodies)}"
+        )
 
 
 def _check_own_name(kind: str, item: Cavity | Cable | Sensor, others: Sequence[Cavity | Cable | Sensor]) -> None:

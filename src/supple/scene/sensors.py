@@ -98,7 +98,7 @@ class ForceSensor(SurfaceSensor):
         known = [name for name in (*(body.name for body in bodies), *obstacles) if name != self.body]
         if self.by is not None and self.by not in known:
             raise SceneError(
-                f"{self.label}: there is no other body or obstacle {self.by!r}; {suggestion(self.by, known)}"
+                f"{self.label}: other body or obstacle {self.by!r} does not exist; {suggestion(self.by, known)}"
             )
 
 

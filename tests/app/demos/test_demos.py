@@ -142,11 +142,11 @@ def test_every_claim_of_the_whole_demo_holds(name, kind):
 
 
 def test_an_unknown_demo_and_an_unknown_solver_are_errors():
-    with pytest.raises(SceneError, match=r"there is no demo 'squish'; there are squash, stretch"):
+    with pytest.raises(SceneError, match=r"demo 'squish' does not exist; there are squash, stretch"):
         find_demo("squish")
-    with pytest.raises(SolverError, match=r"demo 'bears': there is no solver 'implicit' for it; it has xpbd"):
+    with pytest.raises(SolverError, match=r"demo 'bears' has no solver 'implicit'; it has xpbd"):
         DEMOS["bears"].on("implicit")
-    with pytest.raises(SolverError, match=r"demo 'twist': there is no solver 'xpbd' for it; it has implicit"):
+    with pytest.raises(SolverError, match=r"demo 'twist' has no solver 'xpbd'; it has implicit"):
         DEMOS["twist"].solver("xpbd")
 
 

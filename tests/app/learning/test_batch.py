@@ -166,7 +166,7 @@ def test_a_batch_goes_on_in_a_forked_process():
 def test_nothing_moves_where_an_action_is_wrong_and_errors_are_one_line():
     batch = sp.Batch(cubes(), 2, sp.XPBD(substeps=2), DT)
     for actions, expected in (
-        ({"push": (0, 0, 0)}, "there is no input 'push'; there are: pull"),
+        ({"push": (0, 0, 0)}, "input 'push' does not exist; there are: pull"),
         ({"pull": np.zeros((3, 3))}, r"input 'pull' is set to an array of shape \(3, 3\)"),
         ({"pull": [(0, 0, 0), (0, np.inf, 0)]}, "input 'pull' is not finite"),
         (1, "actions are 1; give a mapping"),
@@ -174,7 +174,7 @@ def test_nothing_moves_where_an_action_is_wrong_and_errors_are_one_line():
         with pytest.raises(SceneError, match=expected):
             batch.step(actions)
     assert batch.times.tolist() == [0.0, 0.0]
-    with pytest.raises(SceneError, match="there is no copy 2; there are 2"):
+    with pytest.raises(SceneError, match="copy 2 does not exist; there are 2"):
         batch.reset([2])
     with pytest.raises(SceneError, match=r"copies are 0\.5; give numbers"):
         batch.reset(0.5)

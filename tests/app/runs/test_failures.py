@@ -72,7 +72,7 @@ def test_a_script_that_returns_nan_in_mid_run(out, solver, acts_on):
     ("control", "error", "words"),
     [
         (lambda frame: {"hand": (np.nan, 0, 0)}, SceneError, "input 'hand' is not finite"),
-        (lambda frame: {"foot": (0, 0, 0)}, SceneError, "there is no input 'foot'"),
+        (lambda frame: {"foot": (0, 0, 0)}, SceneError, "input 'foot' does not exist"),
         (lambda frame: 1 / 0, ZeroDivisionError, "division by zero"),
     ],
     ids=["nan", "unknown", "exception"],

@@ -67,7 +67,11 @@ def test_a_scene_file_describes_joints(scene_file):
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ("second: upper", "second: uper", ":10: joints[1].second: joint 'HingeJoint 1': there is no body or obstacle"),
+        (
+            "second: upper",
+            "second: uper",
+            ":10: joints[1].second: joint 'HingeJoint 1': body or obstacle 'uper' does not exist",
+        ),
         ("limits: [-1, 2]", "limits: [2, -1]", ":13: joints[1].limits: "),
         ("[0, 0, 2]", "[0, 0, 0]", ":12: joints[1].axis: "),
         ("kind: velocity", "kind: speed", ":18: joints[2].motor"),

@@ -40,10 +40,13 @@ def test_stitches(load, tmp_path, line):
     [
         (
             "kind: vertex_vertex, first: hihg, second: low, max_distance: 1, stiffness: 1",
-            "no body 'hihg'; did you mean 'high'",
+            "body 'hihg' does not exist; did you mean 'high'",
         ),
         ("kind: vertex_edge, first: high, second: low, max_distance: 0.1, stiffness: 1", "smallest distance"),
-        ("kind: vertex_edge, first: high, second: law, max_distance: 0.1, stiffness: 1", "no body or obstacle 'law'"),
+        (
+            "kind: vertex_edge, first: high, second: law, max_distance: 0.1, stiffness: 1",
+            "body or obstacle 'law' does not exist",
+        ),
         ("kind: vertex_edge, first: high, second: low, max_distance: 0.1, stiffness: 0", "stiffness"),
         ("kind: vertex_face, first: high, second: low, max_distance: 0.1", "vertex_face"),
         ("kind: soft_vertex_triangle, first: high, second: low, max_distance: 1, youngs: 1", "youngs and poisson"),

@@ -132,7 +132,7 @@ CASES = [
         "{kind: half_space, name: cube}",
         "10: obstacles[0].name: body 'cube' and obstacle 'cube' have the same name; give",
     ),
-    ("body: cube", "body: cub", "12: pins[0].body: pin of body 'cub': there is no body 'cub'; did you mean 'cube'?"),
+    ("body: cube", "body: cub", "12: pins[0].body: pin of body 'cub': body 'cub' does not exist; did you mean 'cube'?"),
     ("vertices: [0]", "vertices: [8]", "12: pins[0].vertices: pin of body 'cube': vertex 8 does not exist"),
     ("vertices: [0]", "vertices: [-1]", "12: pins[0].vertices[0]: is -1; it must be at least 0"),
     ("vertices: [0]", "vertices: [0, 0]", "12: pins[0].vertices: pin of body 'cube': vertices names a vertex twice"),
@@ -162,7 +162,7 @@ CASES = [
     (
         "dt: 1/60",
         "soft_targets: [{body: ball, vertices: [0], stiffness: 1}]",
-        "13: soft_targets[0].body: soft target of body 'ball': there is no body 'ball'; there are 'cube'",
+        "13: soft_targets[0].body: soft target of body 'ball': body 'ball' does not exist; there are 'cube'",
     ),
     (
         "dt: 1/60",
@@ -172,7 +172,7 @@ CASES = [
     (
         "dt: 1/60",
         "contact_pairs:\n  - {first: cube, second: '*1', friction: 1}\n  - {first: cub, second: cube, friction: 1}",
-        "15: contact_pairs[1].first: contact pair of 'cub' and 'cube': first: there is no body or obstacle 'cub'; "
+        "15: contact_pairs[1].first: contact pair of 'cub' and 'cube': first: body or obstacle 'cub' does not exist; "
         "did you mean 'cube'?",
     ),
     (

@@ -58,8 +58,8 @@ def test_every_series_is_one_that_recordings_have(recording):
         (SeriesMeasure("linear_momentum"), "give an axis"),
         (SeriesMeasure("kinetic_energy", axis="x"), "has no axis"),
         (SeriesMeasure("largest_stitch_stretch"), "is in no frame"),
-        (BodyMeasure("position", "ball"), "no body 'ball'"),
-        (BodyMeasure("position", "cube", vertices=(1, 8)), "8 vertices; there is no vertex 8"),
+        (BodyMeasure("position", "ball"), "body 'ball' does not exist"),
+        (BodyMeasure("position", "cube", vertices=(1, 8)), "8 vertices; vertex 8 does not exist"),
     ],
 )
 def test_what_cannot_be_measured_is_one_line(recording, measure, words):

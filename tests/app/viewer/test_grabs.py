@@ -118,7 +118,7 @@ class TestGrabs:
     def test_unknown_vertices_and_too_many_grabs_are_refused(self, live):
         with pytest.raises(CommandError, match="has no vertex 1000"):
             change(Grab(1, "cube", (1000,), (1.0,), (0, 0, 0)), live)
-        with pytest.raises(CommandError, match="no body 'ghost'"):
+        with pytest.raises(CommandError, match="body 'ghost' does not exist"):
             change(Grab(1, "ghost", (0,), (1.0,), (0, 0, 0)), live)
         for number in range(limits.MOST_GRABS):
             change(Grab(number, "cube", (number,), (1.0,), (0, 1, 0)), live)

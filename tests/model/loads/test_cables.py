@@ -203,7 +203,7 @@ AT = [("bar", 0), ("bar", (0.1, 0, 0))]
         (lambda: sp.Cable([AT[0], AT[0]], tension=1.0), r"points\[0\] and points\[1\] are the same"),
         (lambda: sp.Cable([(None, (0, 0, 0))] * 2, tension=1.0), "all points are fixed in the world"),
         (lambda: sp.Cable([AT[0], ("bar", (1.0, 0, 0))], tension=1.0), r"points\[1\]: \[1.0, 0.0, 0.0\] is outside of"),
-        (lambda: sp.Cable([AT[0], ("rod", 0)], tension=1.0), r"points\[1\]: there is no body 'rod'"),
+        (lambda: sp.Cable([AT[0], ("rod", 0)], tension=1.0), r"points\[1\]: body 'rod' does not exist"),
         (lambda: sp.Cable([AT[0], ("bar", 999)], tension=1.0), "vertex 999 of body 'bar' does not exist"),
     ],
 )

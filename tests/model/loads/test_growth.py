@@ -147,7 +147,7 @@ def test_what_is_refused():
         (lambda: sp.Growth("bar", 1.1, tets=[99]), None, "tet 99 does not exist"),
         (lambda: sp.Growth("bar", 1.1, tets=[1, 1]), None, "names a tet twice"),
         (lambda: sp.Growth("bar", 1.1), sp.Body("bar", BAR, net), "EdgesAndVolume has no deformation gradient"),
-        (lambda: sp.Growth("rug", 1.1), None, "there is no body 'rug'"),
+        (lambda: sp.Growth("rug", 1.1), None, "body 'rug' does not exist"),
     ):
         with pytest.raises(SceneError, match=message):
             sp.Scene([body or sp.Body("bar", BAR, RUBBER)], loads=[load()])

@@ -203,7 +203,7 @@ def test_scene_files_describe_loads(tmp_path):
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ("  - {kind: pressure, body: bra, pressure: 1}", r"there is no body 'bra'; did you mean 'bar'\?"),
+        ("  - {kind: pressure, body: bra, pressure: 1}", r"body 'bra' does not exist; did you mean 'bar'\?"),
         ("  - {kind: pressure, body: bar, pressure: .inf}", "loads\\[4\\]"),
         ("  - {kind: pressure, body: bar, pressure: {times: [1, 0], values: [1, 2]}}", r"times\[1\] = 0 s does not"),
         ("  - {kind: thrust, body: bar}", "thrust"),
@@ -233,9 +233,9 @@ AT = ("bar", (0.1, 0.0, 0.0))
         (lambda: sp.Pressure("bar", 1.0, region=[10**6]), "triangle 1000000 does not exist; the surface has"),
         (lambda: sp.Traction("bar", 3.0), "traction has shape ..; give three numbers"),
         (lambda: sp.Traction("bar", (1, 0, 0), region=sp.InBox((5, 5, 5), (6, 6, 6))), "holds no triangle"),
-        (lambda: sp.Traction("rod", (1, 0, 0)), "there is no body 'rod'"),
+        (lambda: sp.Traction("rod", (1, 0, 0)), "body 'rod' does not exist"),
         (lambda: sp.BodyForce((1, np.inf, 0)), "body force: force is .* it must be finite"),
-        (lambda: sp.BodyForce((1, 0, 0), "rod"), "body force: there is no body 'rod'"),
+        (lambda: sp.BodyForce((1, 0, 0), "rod"), "body force: body 'rod' does not exist"),
         (lambda: sp.Spring(AT, ("bar", (0.1, 0.0, 0.0)), 1.0), "both ends are the same point of body 'bar'"),
         (lambda: sp.Spring(AT, ("bar", (1.0, 0.0, 0.0)), 1.0), r"second: \[1.0, 0.0, 0.0\] is outside of body 'bar'"),
         (lambda: sp.Spring(AT, ("bar", 9999), 1.0), "vertex 9999 of body 'bar' does not exist; it has"),

@@ -131,7 +131,7 @@ def test_scene_files_describe_muscles(tmp_path):
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), force_length=([1.0], [-1.0])), "values must be finite and zero or"),
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), force_length=3.0), "force_length is 3.0; give .stretches, values."),
         (lambda: sp.Muscle("rigid", 1.0, (1, 0, 0)), "the body is rigid; a muscle acts in soft bodies"),
-        (lambda: sp.Muscle("rod", 1.0, (1, 0, 0)), "there is no body 'rod'"),
+        (lambda: sp.Muscle("rod", 1.0, (1, 0, 0)), "body 'rod' does not exist"),
     ],
 )
 def test_bad_muscles_are_one_line(make, message):

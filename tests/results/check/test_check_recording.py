@@ -104,7 +104,7 @@ def test_every_kth_frame_and_the_last(free, corrupted):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"only": ["inversions"]}, "no check 'inversions'"),
+        ({"only": ["inversions"]}, "check 'inversions' does not exist"),
         ({"skip": list(NAMES)}, "nothing is left"),
         ({"every": 0}, "every is 0"),
         ({"max_energy_gain": -1.0}, "max_energy_gain is -1"),

@@ -131,7 +131,7 @@ def test_the_impulses_of_a_fall_are_the_change_of_momentum():
 def test_unknown_names_and_frames_without_a_step():
     scene = stack_of_two()
     (frame,) = sp.simulate(scene, sp.XPBD(substeps=2), dt=0.001, steps=1)
-    with pytest.raises(sp.SceneError, match="there is no body or obstacle 'lid'; there are 'low', 'high', 'floor'"):
+    with pytest.raises(sp.SceneError, match="body or obstacle 'lid' does not exist; there are 'low', 'high', 'floor'"):
         frame.contacts.force_between("lid", "low")
     falling = sp.Scene([sp.Body("cube", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), RUBBER)])
     for solver in (sp.XPBD(substeps=2), sp.Implicit(), sp.Implicit(contact=None)):

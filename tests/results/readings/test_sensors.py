@@ -153,7 +153,7 @@ def test_scene_files_describe_sensors(tmp_path):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: [sp.ForceSensor("a", "brick")], "force sensor 'a': there is no body 'brick'"),
+        (lambda: [sp.ForceSensor("a", "brick")], "force sensor 'a': body 'brick' does not exist"),
         (lambda: [sp.ForceSensor("a", "block", [10**6])], "force sensor 'a': triangle 1000000 does not exist"),
         (lambda: [sp.ForceSensor("a", "block", sp.InBox((5, 5, 5), (6, 6, 6)))], "holds no triangle of the surface"),
         (lambda: [sp.ForceSensor("a", "block", [])], "region must be a non-empty list"),
@@ -230,7 +230,7 @@ def test_a_pad_that_is_pressed_has_its_force_displacement_and_work(solver, tmp_p
 @pytest.mark.parametrize(
     ("sensor", "reason"),
     [
-        (sp.ForceSensor("a", "block", by="flor"), "no other body or obstacle 'flor'; did you mean 'floor'"),
+        (sp.ForceSensor("a", "block", by="flor"), "other body or obstacle 'flor' does not exist; did you mean 'floor'"),
         (sp.AngleSensor("a", "block", [0, 1]), "2 vertices are on one line"),
         (sp.AngleSensor("a", "block"), "give the vertices"),
         (

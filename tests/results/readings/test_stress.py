@@ -131,7 +131,7 @@ def test_fields_are_read_by_the_name_of_a_body():
     assert "net" not in frame.von_mises
     with pytest.raises(sp.SceneError, match="body 'net' has rigid edges or volumes, whose forces do not follow"):
         frame.von_mises["net"]
-    with pytest.raises(sp.SceneError, match="there is no body 'cub'; did you mean 'cube'"):
+    with pytest.raises(sp.SceneError, match="body 'cub' does not exist; did you mean 'cube'"):
         frame.stress["cub"]
     # Edges are rigid, so that the energy is that of the volumes.
     V = small.volumes

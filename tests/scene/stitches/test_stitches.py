@@ -253,8 +253,8 @@ REFUSED = {
         lambda: soft("low", "flat", pairs=[[6, 2]], min_separate_distance=1e-18),
         "in the plane of triangle 2",
     ),
-    "body": (lambda: soft("top", pairs=[[0, 0]]), "no body 'top'"),
-    "second": (lambda: soft("low", "top", pairs=[[0, 0]]), "no body or obstacle 'top'"),
+    "body": (lambda: soft("top", pairs=[[0, 0]]), "body 'top' does not exist"),
+    "second": (lambda: soft("low", "top", pairs=[[0, 0]]), "body or obstacle 'top' does not exist"),
     "floor": (lambda: soft("low", "floor", pairs=[[0, 0]]), "stitches join bodies and TriangleObstacles"),
     "flat": (lambda: soft("low", "flat", pairs=[[0, 0]]), "triangle 0 of obstacle 'flat' has no area"),
 }

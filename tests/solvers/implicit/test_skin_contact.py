@@ -92,14 +92,14 @@ def test_skins_touch_skins_and_rigid_bodies_and_keep_momentum():
         (lambda: ball(skin=BALL.flipped()), "body 'ball': skin: its surface is inside out"),
         (
             lambda: sp.Scene([ball()], sensors=[sp.ForceSensor("pad", "ball")]),
-            "body 'ball' touches with its skin, on which there are no sensors",
+            "body 'ball' touches with its skin, which cannot carry sensors",
         ),
         (
             lambda: sp.Scene(
                 [ball(), sp.RigidBody("stone", CORNERS, mass=1.0, position=(0, 0.2, 0))],
                 welds=[sp.Weld("ball", "stone", max_distance=0.1)],
             ),
-            "on which there are no welds; give it collide='tets'",
+            "which cannot carry welds; give it collide='tets'",
         ),
         (
             lambda: sp.simulate(sp.Scene([ball()]), sp.XPBD(), 0.01, 1),

@@ -121,7 +121,7 @@ class Demo:
         SolverError : where this demo has no solver of that kind.
         """
         if kind not in self.kinds:
-            raise SolverError(f"demo {self.name!r}: there is no solver {kind!r} for it; it has {', '.join(self.kinds)}")
+            raise SolverError(f"demo {self.name!r} has no solver {kind!r}; it has {', '.join(self.kinds)}")
         return self.variants.get(kind, self)
 
     def solver(self, kind: str | None = None) -> Solver:

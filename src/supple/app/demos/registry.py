@@ -36,5 +36,5 @@ def find_demo(name: str) -> Demo:
     SceneError : where there is none.
     """
     if name not in DEMOS:
-        raise SceneError(f"there is no demo {name!r}; there are {', '.join(DEMOS)}")
+        raise SceneError(f"demo {name!r} does not exist; there are {', '.join(DEMOS)}")
     return DEMOS[name]

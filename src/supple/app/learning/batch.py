@@ -234,7 +234,9 @@ class Batch:
         inputs = self._copies[0].system.scene.inputs
         for name, given in actions.items():
             if name not in inputs:
-                raise SceneError(f"Batch: there is no input {name!r}; there are: {', '.join(sorted(inputs)) or 'none'}")
+                raise SceneError(
+                    f"Batch: input {name!r} does not exist; there are: {', '.join(sorted(inputs)) or 'none'}"
+                )
             rows = np.asarray(given)
             one_each = rows.shape == (len(self), *inputs[name].value.shape)
             for k, values in enumerate(wanted):
@@ -255,5 +257,5 @@ class Batch:
             raise SceneError(f"Batch: copies are {copies!r}; give numbers of copies, or {len(self)} truth values")
         for k in given:
             if not 0 <= k < len(self):
-                raise SceneError(f"Batch: there is no copy {k}; there are {len(self)}")
+                raise SceneError(f"Batch: copy {k} does not exist; there are {len(self)}")
         return [int(k) for k in given]

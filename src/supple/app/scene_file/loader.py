@@ -62,7 +62,7 @@ def _selected(entry: Any, model: SceneFileModel, meshes: MeshStore, place: tuple
     with at(*place, "set"):
         body = next((body for body in model.bodies if _is_of(entry.body, body)), None)
         if body is None:
-            raise SceneError(f"there is no body {entry.body!r}")
+            raise SceneError(f"body {entry.body!r} does not exist")
         return entry.model_copy(update={"set": None, "vertices": _sets(body, meshes).vertices_of(entry.set).tolist()})
 
 

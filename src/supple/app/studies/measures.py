@@ -129,7 +129,7 @@ class BodyMeasure:
         count = body.point_count
         rows: Any = slice(None) if self.vertices is None else list(self.vertices)
         if self.vertices is not None and max(self.vertices) >= count:
-            raise StudyError(f"{self.body!r} has {count} vertices; there is no vertex {max(self.vertices)}")
+            raise StudyError(f"{self.body!r} has {count} vertices; vertex {max(self.vertices)} does not exist")
         vectors = BODY_QUANTITIES[self.quantity][1]
         ends = {"first": [recording[0]], "last": [recording[-1]]}  # the other frames need not be read
         numbers = [

@@ -71,7 +71,7 @@ class CheckSettings:
     def __post_init__(self) -> None:
         for name in (*self.only, *self.skip):
             if name not in NAMES:
-                raise OutputError(f"check: there is no check {name!r}; there are {', '.join(NAMES)}")
+                raise OutputError(f"check: check {name!r} does not exist; there are {', '.join(NAMES)}")
         if isinstance(self.every, bool) or not isinstance(self.every, (int, np.integer)) or self.every < 1:
             raise OutputError(f"check: every is {self.every!r}; give a whole number of one or more")
         shares = ("max_orthogonality_error", "max_weld_error", "max_energy_gain", "max_momentum_change")

@@ -106,7 +106,7 @@ def decoded(tree: Any, arrays: Arrays, classes: Classes) -> Any:
                 return [value_of(part, depth + 1) for part in content]
             case "mapping":
                 return {key: value_of(part, depth + 1) for key, part in content.items()}
-        raise ValueError(f"there is no kind {kind!r}")
+        raise ValueError(f"kind {kind!r} does not exist")
 
     return value_of(tree, 0)
 

@@ -69,7 +69,7 @@ def export(recording: Recording | str | Path, to: str, output: str | Path | None
     """
     name = to.lower().lstrip(".")
     if name not in FORMATS:
-        raise OutputError(f"export: there is no format {to!r}; take one of {', '.join(FORMATS)}")
+        raise OutputError(f"export: format {to!r} does not exist; take one of {', '.join(FORMATS)}")
     if output is not None:
         _require_suffix(name, Path(output))
     chosen = FORMATS[name]
@@ -78,7 +78,7 @@ def export(recording: Recording | str | Path, to: str, output: str | Path | None
         raise OutputError(f"export: {', '.join(film)}: only {drawn} are drawn; leave that out for {name}")
     unknown = film.keys() - Film.__dataclass_fields__.keys()
     if unknown:
-        raise OutputError(f"export: there is no {min(unknown)}; there are {', '.join(Film.__dataclass_fields__)}")
+        raise OutputError(f"export: {min(unknown)} does not exist; there are {', '.join(Film.__dataclass_fields__)}")
     look = () if chosen.film is None else (Film(**{**chosen.film, **film}),)
     with opened(recording) as source:
         path = Path(output) if output is not None else source.path.with_name(source.path.stem + _ending(name))

@@ -51,7 +51,7 @@ class ByBody(Mapping[str, NDArray[Any]]):
         if name in self._refused:
             raise SceneError(f"body {name!r} {self._refused[name]}")
         if name not in self._rows:
-            raise SceneError(f"there is no body {name!r}; {suggestion(name, list(self._rows))}")
+            raise SceneError(f"body {name!r} does not exist; {suggestion(name, list(self._rows))}")
         return self.values_of_all[self._rows[name]]
 
     def __contains__(self, name: object) -> bool:

@@ -73,7 +73,7 @@ def checked_fields(names: Iterable[str]) -> tuple[Field, ...]:
     found: dict[str, Field] = {}
     for name in names:
         if name not in FIELDS:
-            raise OutputError(f"fields: there is no field {name!r}; {suggestion(str(name), list(FIELDS))}")
+            raise OutputError(f"fields: field {name!r} does not exist; {suggestion(str(name), list(FIELDS))}")
         if name in found:
             raise OutputError(f"fields: {name!r} is given twice; give it once")
         found[name] = FIELDS[name]

@@ -140,7 +140,7 @@ class Joint(Kind, ABC):
         if name not in bodies:
             known = [key for key, body in bodies.items() if isinstance(body, RigidBody)] + list(obstacles or ())
             what = "body" if obstacles is None else "body or obstacle"
-            raise SceneError(f"{self.label}: there is no {what} {name!r}; {suggestion(name, known)}")
+            raise SceneError(f"{self.label}: {what} {name!r} does not exist; {suggestion(name, known)}")
         if not isinstance(bodies[name], RigidBody):
             raise SceneError(f"{self.label}: body {name!r} is soft; joints join rigid bodies")
 

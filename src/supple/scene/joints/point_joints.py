@@ -48,7 +48,7 @@ class BallJoint(Joint):
             raise SceneError(f"{self.label}: a limit needs both axis and max_swing; give both, or none")
         if self.axis is None or self.max_swing is None:
             if self.twist_limits is not None:
-                raise SceneError(f"{self.label}: twist_limits need axis and max_swing, without which there is no twist")
+                raise SceneError(f"{self.label}: twist_limits need axis and max_swing, which define the twist")
             return
         check_swing(self.max_swing, self.label)
         low, high = self.twist_limits or (0.0, 0.0)

@@ -60,7 +60,7 @@ class Weld(OnVertices):
         for key, name, rigid in (("body", self.body, False), ("rigid", self.rigid, True)):
             with at(key):
                 if name not in bodies:
-                    raise SceneError(f"{self.label}: there is no body {name!r}; {suggestion(name, list(bodies))}")
+                    raise SceneError(f"{self.label}: body {name!r} does not exist; {suggestion(name, list(bodies))}")
                 if isinstance(bodies[name], RigidBody) != rigid:
                     what = "soft" if rigid else "rigid"
                     raise SceneError(f"{self.label}: body {name!r} is {what}; a weld is of a soft body to a rigid one")

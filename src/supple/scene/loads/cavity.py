@@ -49,7 +49,7 @@ class Gas(Kind):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.amount is None and self.ambient == 0.0:
-            raise SceneError("gas: ambient is 0, so that there is no gas at the start; give the amount")
+            raise SceneError("gas: ambient is 0, so that the cavity is empty at the start; give the amount")
 
 
 @dataclass(frozen=True, eq=False)

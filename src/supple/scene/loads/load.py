@@ -43,7 +43,7 @@ def body_of(name: str, bodies: Sequence[PlacedBody], label: str) -> PlacedBody:
     for body in bodies:
         if body.name == name:
             return body
-    raise SceneError(f"{label}: there is no body {name!r}; {suggestion(name, [body.name for body in bodies])}")
+    raise SceneError(f"{label}: body {name!r} does not exist; {suggestion(name, [body.name for body in bodies])}")
 
 
 Region = ArrayLike | InBox | None

@@ -305,4 +305,4 @@ def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Se
         ):
             if name not in known:
                 with at("stitches", number):
-                    raise SceneError(f"{stitch.label}: there is no {what} {name!r}; {suggestion(name, known)}")
+                    raise SceneError(f"{stitch.label}: {what} {name!r} does not exist; {suggestion(name, known)}")

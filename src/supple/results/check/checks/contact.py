@@ -251,7 +251,7 @@ class Distance(FrameCheck):
 
     def result(self) -> CheckResult:
         if self.tally.worst is None:
-            self.why_not = "there are no two surfaces"
+            self.why_not = "two surfaces are needed"
         if "files" in self.scene.recording.knows and self._of_frames:
             tenth, half = np.quantile(self._of_frames, [0.1, 0.5])
             self.good = f"{Distance.good}; {tenth:.3g} m in a tenth of the frames, {half:.3g} m in half of them"

@@ -306,7 +306,7 @@ class LiveScene:
         for part in parts:
             if part.name == name:
                 return part
-        raise CommandError(f"there is no body {name!r}; there are {', '.join(repr(each.name) for each in parts)}")
+        raise CommandError(f"body {name!r} does not exist; there are {', '.join(repr(each.name) for each in parts)}")
 
     def body_positions(self, name: str) -> NDArray[np.float64]:
         """(n, 3) of one body [m]."""
