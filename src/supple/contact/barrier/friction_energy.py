@@ -57,6 +57,10 @@ class Slips(NamedTuple):
     offsets: NDArray[np.float64]
     forces: NDArray[np.float64]
 
+    def where(self, chosen: NDArray[np.bool_]) -> Slips:
+        """The chosen ones (k,)."""
+        return Slips._make(array[chosen] for array in self)
+
 
 @njit
 def friction_potential(y, e):
@@ -161,6 +165,20 @@ def _write_hessians(x, slips, start, reach, duals, out):
                         entry -= across * normals[k, p] * normals[k, q]
                         out[b, p, q] = size * (entry + across if p == q else entry)
                 b += 1
+
+
+@njit(cache=True)
+def held_shares(x, way, slips, reach):
+    """(k, 3) f r(|u|) times the slip at the end of all of `way` (s, 3) from x, where u is the one at x, as shares of f:
+    the forces that the matrix of the majorizer predicts."""
+    end = x + way
+    out = np.empty((len(slips[0]), 3))
+    for k in range(len(out)):
+        u, v = slip_of(x, slips, k), slip_of(end, slips, k)
+        ratio = friction_ratio((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
+        for j in range(3):
+            out[k, j] = ratio * v[j]
+    return out
 
 
 @njit(cache=True)

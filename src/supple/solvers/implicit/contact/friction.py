@@ -19,6 +19,7 @@ from supple.contact.barrier.friction_energy import (
     add_friction_gradient,
     friction_energy,
     friction_hessian,
+    held_shares,
     renew_duals,
 )
 from supple.numerics.geometry.embedded_points import EmbeddedPoints, vertex_couplings
@@ -62,3 +63,9 @@ class Friction(ContactPotential):
     def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
         positions = self.points.positions
         renew_duals(positions(x), positions(direction), self.slips, self.reach, self.duals)
+
+    def held(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, 3) what the linearization at x (n, 3) predicts at the end of a way (n, 3), as shares of the largest
+        forces; along the slip."""
+        positions = self.points.positions
+        return held_shares(positions(x), positions(way), self.slips, self.reach)

@@ -17,6 +17,8 @@ from supple.model.state import Status
 from supple.runtime.interruption import interruption_point
 from supple.solvers.implicit.contact.approach import Approach
 from supple.solvers.implicit.contact.collisions import Barrier
+from supple.solvers.implicit.contact.friction import Friction
+from supple.solvers.implicit.contact.sliding import Sliding
 from supple.solvers.implicit.newton.direction import Direction, DirectionFinder, Tools, newton_row
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
 from supple.solvers.implicit.newton.line_search import Jumps, search
@@ -86,21 +88,30 @@ def _row_stiffness(tools: Tools) -> float:
 def _direction(
     directions: DirectionFinder, here: Model, limits: StepLimits, approach: Approach | None
 ) -> Direction | None:
-    """A direction from a point, with rows for what it would run into, so that contact does not cut it."""
+    """A direction from a point, with rows for what it would run into, so that contact does not cut it, and with no more
+    friction than Coulomb's law allows."""
     found, objective = directions.find(here), directions.objective
     couplings = directions.tools.hessian.couplings
     known, x = len(couplings), here.positions
+    sliding = [Sliding.of(term) for term in objective.terms if isinstance(term, Friction)]
     for _ in range(_MOST_ROUNDS):
-        if found is None or approach is None or limits.largest_step(x, found.vector).step == 1.0:
+        if found is None:
             break
-        approach = approach.with_more(x, found.vector)
-        if not len(approach.rows.kinds):
+        more = [each.with_more(x, found.vector) for each in sliding]
+        again = any(each is not None for each in more)
+        sliding = [each or old for each, old in zip(more, sliding, strict=True)]
+        if approach is not None and limits.largest_step(x, found.vector).step < 1.0:
+            approach = approach.with_more(x, found.vector)
+            again = again or len(approach.rows.kinds) > 0
+        if not again:
             break
+        corrections = [*sliding, *([] if approach is None else [approach])]
         del couplings[known:]
-        approach.add_hessian(x, directions.tools.hessian, True)
         gradient = here.gradient.copy()
-        approach.add_gradient(x, gradient)
-        directions.objective = replace(objective, terms=[*objective.terms, approach])
+        for each in corrections:
+            each.add_hessian(x, directions.tools.hessian, True)
+            each.add_gradient(x, gradient)
+        directions.objective = replace(objective, terms=[*objective.terms, *corrections])
         directions.forcing = _ROW_TOLERANCE
         found = directions.find(replace(here, gradient=gradient))
     directions.objective = objective

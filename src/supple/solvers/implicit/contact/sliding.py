@@ -1,0 +1,68 @@
+"""Contacts that a linearization of friction would hold by more than Coulomb's law allows: they slide in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.barrier.friction_energy import friction_hessian
+from supple.numerics.geometry.embedded_points import vertex_couplings
+from supple.solvers.implicit.contact.friction import Friction
+from supple.solvers.implicit.energies.potential import ContactPotential, HessianBlocks
+
+# Of the largest force: what rounding and conjugate gradients may add to one that holds.
+_EXCESS = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Sliding(ContactPotential):
+    """What a linearization's friction lacks so that some contacts slide: they get their largest force, along the slip.
+
+    Where friction is linearized, at a small slip u, its matrix is that of f / |u| or more in all directions: a force
+    that grows with the way without a limit. A contact on which it would be larger than f gets the constant force f, and
+    no matrix. The energy does not count.
+
+    Attributes
+    ----------
+    along : (k, 3) unit vectors of the slip of contacts that slide, zero for others
+    """
+
+    friction: Friction
+    along: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, friction: Friction) -> Sliding:
+        """Nothing slides."""
+        return cls(friction, np.zeros((len(friction.slips.forces), 3)))
+
+    def with_more(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> Sliding | None:
+        """With the contacts that a `way` (n, 3) from x (n, 3) loads by too much; None if there are none."""
+        friction = self.friction
+        held = friction.held(x, way)
+        sizes = np.linalg.norm(held, axis=1)
+        more = (sizes > 1.0 + _EXCESS) & ~self.along.any(axis=1)
+        if not more.any():
+            return None
+        return Sliding(friction, np.where(more[:, None], held / np.maximum(sizes, 1.0)[:, None], self.along))
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return 0.0
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        friction, slides = self.friction, self.along.any(axis=1)
+        s = friction.slips
+        shares = np.where(slides[:, None], self.along - friction.held(x, np.zeros_like(x)), 0.0)
+        forces = np.zeros((len(friction.points), 3))
+        pushes = s.coefficients[:, :, None] * (s.forces[:, None] * shares)[:, None]
+        np.add.at(forces, s.points[slides], pushes[slides])
+        friction.points.add_forces(forces, out)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        slides = self.along.any(axis=1)
+        slips = self.friction.slips.where(slides)
+        slips = slips._replace(forces=-slips.forces)
+        points = self.friction.points
+        between = friction_hessian(points.positions(x), slips, self.friction.reach, self.friction.duals[slides])
+        out.couplings.append(vertex_couplings(points, between))
