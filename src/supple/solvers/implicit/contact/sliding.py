@@ -32,6 +32,11 @@ class Sliding(ContactPotential):
     friction: Friction
     along: NDArray[np.float64]
 
+    @property
+    def slides(self) -> NDArray[np.bool_]:
+        """(k,) which contacts slide."""
+        return np.asarray(self.along.any(axis=1))
+
     @classmethod
     def of(cls, friction: Friction) -> Sliding:
         """Nothing slides."""
@@ -42,7 +47,7 @@ class Sliding(ContactPotential):
         friction = self.friction
         held = friction.held(x, way)
         sizes = np.linalg.norm(held, axis=1)
-        more = (sizes > 1.0 + _EXCESS) & ~self.along.any(axis=1)
+        more = (sizes > 1.0 + _EXCESS) & ~self.slides
         if not more.any():
             return None
         return Sliding(friction, np.where(more[:, None], held / np.maximum(sizes, 1.0)[:, None], self.along))
@@ -51,7 +56,7 @@ class Sliding(ContactPotential):
         return 0.0
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        friction, slides = self.friction, self.along.any(axis=1)
+        friction, slides = self.friction, self.slides
         s = friction.slips
         shares = np.where(slides[:, None], self.along - friction.held(x, np.zeros_like(x)), 0.0)
         forces = np.zeros((len(friction.points), 3))
@@ -60,7 +65,7 @@ class Sliding(ContactPotential):
         friction.points.add_forces(forces, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        slides = self.along.any(axis=1)
+        slides = self.slides
         slips = self.friction.slips.where(slides)
         slips = slips._replace(forces=-slips.forces)
         points = self.friction.points
