@@ -98,6 +98,19 @@ def barrier_forces(contacts, dhat, stiffness, soft=0.0):
 
 
 @njit(cache=True)
+def predicted_forces(distances, changes, weights, dhat, soft):
+    """(k,) forces, zero or more, after changes (k,) [m] of the distances, as the linearization of those says.
+
+    weights : (k,) kappa a_k [N]
+    """
+    out = np.empty(len(distances))
+    for k in range(len(out)):
+        first, second = barrier_slopes(distances[k], dhat, soft)
+        out[k] = max(0.0, -weights[k] * (first + changes[k] * second))
+    return out
+
+
+@njit(cache=True)
 def add_barrier_gradient(contacts, dhat, stiffness, out, soft=0.0):
     """Add the gradient by the points [N] to `out` (s, 3)."""
     kinds, points, coefficients, vectors, distances, weights = contacts

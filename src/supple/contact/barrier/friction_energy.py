@@ -216,8 +216,8 @@ def lagged_slips(
     start: NDArray[np.float64],
     owner: NDArray[np.int32],
     coefficients: NDArray[np.float64],
-) -> Slips:
-    """Of the contacts that have friction.
+) -> tuple[Slips, NDArray[np.int64]]:
+    """Of the contacts that have friction, and their numbers.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def lagged_slips(
     mu = coefficients[owner[first], owner[second]]
     rough = np.flatnonzero(mu * forces > 0.0)
     c, points = contacts.coefficients[rough], contacts.points[rough]
-    return Slips(
+    slips = Slips(
         contacts.kinds[rough],
         points,
         c,
@@ -236,6 +236,7 @@ def lagged_slips(
         np.einsum("ki,kij->kj", c, start[points]),  # points that a kind does not have have the coefficient 0
         mu[rough] * forces[rough],
     )
+    return slips, rough
 
 
 def sides(kinds: NDArray[np.int8], points: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

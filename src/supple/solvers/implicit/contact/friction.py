@@ -10,10 +10,12 @@ Source: Li et al., "Incremental Potential Contact" (2020), section 5.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.barrier.barrier_energy import predicted_forces
 from supple.contact.barrier.friction_energy import (
     Slips,
     add_friction_gradient,
@@ -26,6 +28,20 @@ from supple.numerics.geometry.embedded_points import EmbeddedPoints, vertex_coup
 from supple.solvers.implicit.energies.potential import ContactPotential, HessianBlocks, Projection
 
 
+class Press(NamedTuple):
+    """What the largest forces of friction follow from: the barrier of k contacts where their normal forces are taken.
+
+    Attributes
+    ----------
+    distances : (k,) [m]; weights : (k,) mu kappa a [N]; dhat, soft : of the barrier [m]
+    """
+
+    distances: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    dhat: float
+    soft: float
+
+
 @dataclass(frozen=True, eq=False)
 class Friction(ContactPotential):
     """Of contacts between points.
@@ -33,12 +49,14 @@ class Friction(ContactPotential):
     Attributes
     ----------
     points : that `slips` refers to; reach : eps_v h [m], the displacement below which friction is static
+    press : None where normal forces are not predicted
     duals : (k, 3) the state of a minimization, see `friction_energy`; zero at first: the step is that of the majorizer
     """
 
     points: EmbeddedPoints
     slips: Slips
     reach: float
+    press: Press | None = None
     duals: NDArray[np.float64] = field(init=False)
     projection = Projection.UNNEEDED
     work = "friction"
@@ -69,3 +87,12 @@ class Friction(ContactPotential):
         forces; along the slip."""
         positions = self.points.positions
         return held_shares(positions(x), positions(way), self.slips, self.reach)
+
+    def predicted(self, way: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) the largest forces at the end of a way (n, 3), as the barrier's linearization predicts [N]."""
+        if self.press is None:
+            return self.slips.forces
+        s, moved = self.slips, self.points.positions(way)
+        changes = np.einsum("ki,kij,kj->k", s.coefficients, moved[s.points], s.normals)
+        distances, weights, dhat, soft = self.press
+        return predicted_forces(distances, changes, weights, dhat, soft)

@@ -21,7 +21,7 @@ from supple.model.stitched_points import stitched_state
 from supple.model.system import System, initial_state
 from supple.scene.contact_pairs import PairTable, pair_table
 from supple.solvers.implicit.contact.collisions import Barrier, Collisions
-from supple.solvers.implicit.contact.friction import Friction
+from supple.solvers.implicit.contact.friction import Friction, Press
 from supple.solvers.implicit.contact.settings import IPCContact, Scales, largest_dhat, scales_of
 
 logger = logging.getLogger(__name__)
@@ -64,8 +64,13 @@ class ContactModel:
             return []
         points, contacts = self.collisions.half_spaces, self.collisions.at(lagged)
         forces = barrier_forces(contacts, self.scales.dhat, barrier.stiffness, barrier.soft)
-        slips = lagged_slips(contacts, forces, points.points.positions(start), points.owner, self.coefficients)
-        return [Friction(points.points, slips, self.scales.friction_velocity * duration)] if len(slips.forces) else []
+        begun = points.points.positions(start)
+        slips, rough = lagged_slips(contacts, forces, begun, points.owner, self.coefficients)
+        if not len(rough):
+            return []
+        weights = slips.forces / forces[rough] * barrier.stiffness * contacts.weights[rough]
+        press = Press(contacts.distances[rough], weights, self.scales.dhat, barrier.soft)
+        return [Friction(points.points, slips, self.scales.friction_velocity * duration, press)]
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:
         """How far along `direction` (n, 3), at most 1, nothing touches, and two points of what would touch."""

@@ -42,7 +42,8 @@ _LEAST_STEP = 0.5
 
 def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools: Tools) -> Outcome:
     """Take `max_iterations` Newton steps from x, and up to `FEW` after cuts; see `minimize`."""
-    objective, hessian = problem.objective, tools.hessian
+    hessian = tools.hessian
+    objective = problem.objective if problem.renewed is None else problem.renewed(x)
     policy = ProjectionPolicy(ProjectedTerms.RELEASED_LAST)
     directions = DirectionFinder(objective, tools, problem.scale, 0.0, problem.longest, policy=policy)
     here, jumps = objective.model(x, hessian, policy.now), Jumps()
@@ -53,9 +54,10 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
     for iteration in range(FEW):
         interruption_point()
-        found = _direction(directions, here, limits, approach)
-        if found is None:
+        solved = _direction(directions, here, limits, approach)
+        if solved is None:
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
+        here, found = solved
         way, limit = limits.shortened(here.positions, found.vector)
         slope = found.slope if limit.step == 1.0 else float(np.vdot(tools.freed(here.gradient), way))
         end, step, cuts = search(objective, here, way, slope, 1.0, limits, jumps)
@@ -66,6 +68,8 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
         whole = min(limit.step, step) >= _LEAST_STEP
         last = problem.convergence.is_short(found.length) or step == 0.0
         last = last or (whole and iteration + 1 >= problem.max_iterations) or iteration + 1 == FEW
+        if not last and problem.renewed is not None:
+            objective = directions.objective = problem.renewed(end)
         here = objective.model(end, None if last else hessian, policy.now)
         rows.append(newton_row(iteration, here.energy, found, (limit.step, step, cuts), limit.reason))
         limits.widen(here.positions)
@@ -87,8 +91,8 @@ def _row_stiffness(tools: Tools) -> float:
 
 def _direction(
     directions: DirectionFinder, here: Model, limits: StepLimits, approach: Approach | None
-) -> Direction | None:
-    """A direction from a point, with rows for what it would run into, so that contact does not cut it, and with no more
+) -> tuple[Model, Direction] | None:
+    """A direction from a point, and the objective there: with rows for what it would run into, so that contact does not cut it, and with no more
     friction than Coulomb's law allows."""
     found, objective = directions.find(here), directions.objective
     couplings = directions.tools.hessian.couplings
@@ -117,5 +121,20 @@ def _direction(
     directions.objective = objective
     if found is None:
         return None
+    here = _balanced(here, sliding, found.vector)
     gradient = directions.tools.freed(here.gradient)
-    return replace(found, slope=float(np.vdot(gradient, found.vector)))
+    return here, replace(found, slope=float(np.vdot(gradient, found.vector)))
+
+
+def _balanced(here: Model, sliding: list[Sliding], way: NDArray[np.float64]) -> Model:
+    """The objective at a point, with the friction of the normal forces that are predicted for a way (n, 3) from it."""
+    energy, gradient = here.energy, here.gradient.copy()
+    for each in sliding:
+        before, part = each.friction, np.zeros_like(gradient)
+        energy -= before.value(here.positions)
+        before.add_gradient(here.positions, part)
+        gradient -= part
+        each.renew(way)
+        energy += before.value(here.positions)
+        before.add_gradient(here.positions, gradient)
+    return replace(here, energy=energy, gradient=gradient)

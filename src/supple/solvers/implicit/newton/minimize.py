@@ -93,6 +93,7 @@ class Problem:
     outdated : whether the objective is due for a change at positions (n, 3) where this share of contact's forces is not
         balanced
     projected : the terms that are projected at first
+    renewed : the objective with friction of the contacts at positions (n, 3), where a linearization begins
     """
 
     objective: Objective
@@ -102,6 +103,7 @@ class Problem:
     longest: float
     outdated: Callable[[NDArray[np.float64], float], bool] | None = None
     projected: ProjectedTerms = ProjectedTerms.ALL
+    renewed: Callable[[NDArray[np.float64]], Objective] | None = None
 
 
 @dataclass(frozen=True, eq=False)

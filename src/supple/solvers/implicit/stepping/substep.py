@@ -149,6 +149,7 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
         settings.max_iterations,
         workspace.diagonal,
         contact.friction_is_outdated,
+        renewed=lambda x: contact.with_contact(_with_joints(base, joints), x),
     )
     tools.linear_solver.begin_step()
     x = state.positions
