@@ -92,8 +92,8 @@ def _row_stiffness(tools: Tools) -> float:
 def _direction(
     directions: DirectionFinder, here: Model, limits: StepLimits, approach: Approach | None
 ) -> tuple[Model, Direction] | None:
-    """A direction from a point, and the objective there: with rows for what it would run into, so that contact does not cut it, and with no more
-    friction than Coulomb's law allows."""
+    """A direction from a point, and the objective there: with rows for what it would run into, so that contact does not
+    cut it, and with no more friction than Coulomb's law allows."""
     found, objective = directions.find(here), directions.objective
     couplings = directions.tools.hessian.couplings
     known, x = len(couplings), here.positions
