@@ -46,7 +46,7 @@ class MeshSets(Displayed):
 
         Raises
         ------
-        MeshError : where there is no such set.
+        MeshError : where no such set exists.
         """
         return _found(self.vertices, name, "vertices")
 
@@ -55,7 +55,7 @@ class MeshSets(Displayed):
 
         Raises
         ------
-        MeshError : where there is no such set.
+        MeshError : where no such set exists.
         """
         return _found(self.tets, name, "tets")
 
@@ -64,7 +64,7 @@ class MeshSets(Displayed):
 
         Raises
         ------
-        MeshError : where there is no such set.
+        MeshError : where no such set exists.
         """
         index = np.zeros(self.tet_count, dtype=np.int32)
         for k, name in enumerate(names):

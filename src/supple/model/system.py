@@ -332,14 +332,12 @@ def initial_state(
     ------
     SceneError : where a name is unknown, a shape is wrong or a value is not finite.
     """
-    names = {body.name for body in scene.bodies}
+    names = sorted(body.name for body in scene.bodies)
     positions, velocities = positions or {}, velocities or {}
     for what, given in (("initial_positions", positions), ("initial_velocities", velocities)):
         for name in given:
             if name not in names:
-                raise SceneError(
-                    f"{what}: body {name!r} does not exist; there are {', '.join(map(repr, sorted(names)))}"
-                )
+                raise SceneError(f"{what}: body {name!r} does not exist; there are {', '.join(map(repr, names))}")
     x, v = [], []
     for body in scene.bodies:
         placed, moving = body.place(body.mesh.vertices), None

@@ -99,7 +99,7 @@ def last_positive_before_root(a, b, c, d, end):
     Returns
     -------
     t : the cubic is above zero on [0, t] and not at the next numbers after t, as far as double precision resolves it.
-        Minus one where there is no root in (0, end]. A root that is touched but not crossed counts.
+        Minus one without a root in (0, end]. A root that is touched but not crossed counts.
     """
     p, q = _extrema(a, b, c)
     low = 0.0

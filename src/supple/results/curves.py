@@ -28,7 +28,7 @@ def write_curves(recording: Recording, x: str, y: Sequence[str], output: Path) -
 
     Raises
     ------
-    OutputError : where there is no such column with numbers, or the picture cannot be written.
+    OutputError : where no such column with numbers exists, or the picture cannot be written.
     """
     columns = {name: values for name, values in report_columns(recording).items() if values.dtype.kind in "if"}
     x, *y = (_name(name, list(columns), recording) for name in (x, *y))

@@ -60,7 +60,7 @@ def paper_figure(path: Path, width: float, height: float) -> Iterator[Any]:
 
     Raises
     ------
-    OutputError : where there is no such format, or the system refuses.
+    OutputError : where no such format exists, or the system refuses.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg

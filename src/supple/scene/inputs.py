@@ -150,7 +150,7 @@ def checked_values(inputs: Mapping[str, Input], values: object) -> dict[str, NDA
 
     Raises
     ------
-    SceneError : where they are not a mapping, there is no such input, or a value does not suit it.
+    SceneError : where they are not a mapping, no such input exists, or a value does not suit it.
     """
     if values is None:
         return {}

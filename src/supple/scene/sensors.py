@@ -59,7 +59,7 @@ class SurfaceSensor(Sensor):
 
         Raises
         ------
-        SceneError : where the body does not exist, or there is no such triangle.
+        SceneError : where the body does not exist, or no such triangle exists.
         """
         return surface_region(self.region, body_of(self.body, bodies, self.label), self.label)
 

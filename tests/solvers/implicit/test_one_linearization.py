@@ -118,13 +118,16 @@ def test_a_box_on_a_slope_follows_coulombs_law(friction, most):
     mesh = shapes.box((0.1, 0.05, 0.1), (3, 2, 3))
     box = sp.Body("box", mesh, rubber(1e6), position=tuple(0.026 * normal), rotation=(0, 0, -angle))
     scene = sp.Scene([box], [sp.HalfSpace(point=(0, 0, 0), normal=tuple(normal), friction=friction)])
-    frames = sp.simulate(scene, sp.Implicit(max_iterations=most), 1 / 60, 50)
+    frames = list(sp.simulate(scene, sp.Implicit(max_iterations=most), 1 / 60, 50))
     speeds = np.array([frame.velocities["box"].mean(axis=0) @ down for frame in frames])
     if friction > np.tan(angle):
         assert abs(speeds[-1]) < 2e-3
     else:
         expected = 9.81 * (np.sin(angle) - friction * np.cos(angle)) / 3
         assert speeds[-1] - speeds[-21] == pytest.approx(expected, rel=0.02)
+        way = np.linalg.norm(frames[-1].positions["box"].mean(axis=0) - frames[-21].positions["box"].mean(axis=0))
+        work = sum(frame.report.details.work["friction"] for frame in frames[-20:])
+        assert work == pytest.approx(-friction * 0.5 * 9.81 * np.cos(angle) * way, rel=0.02)
 
 
 def test_a_drop_comes_to_rest_at_the_height_of_the_whole_method():

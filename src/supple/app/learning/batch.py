@@ -148,7 +148,7 @@ class Batch:
 
         Raises
         ------
-        SceneError : where the snapshot is not of this batch, or there is no such copy.
+        SceneError : where the snapshot is not of this batch, or no such copy exists.
         """
         if not isinstance(snapshot, BatchSnapshot):
             raise SceneError(f"Batch: the snapshot is {snapshot!r}; give what `snapshot` returned")

@@ -123,7 +123,7 @@ class BodyMeasure:
 
         Raises
         ------
-        OutputError, StudyError : where there is no such body, or no such vertex.
+        OutputError, StudyError : where no such body exists, or no such vertex.
         """
         body = recording.body(self.body)
         count = body.point_count

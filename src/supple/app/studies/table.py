@@ -80,7 +80,7 @@ class StudyTable:
 
         Raises
         ------
-        StudyError : where there is no such column.
+        StudyError : where no such column exists.
         """
         if name in self.measures:
             return np.array([result.measures.get(name, np.nan) for result in self.results])

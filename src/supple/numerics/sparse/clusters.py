@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.joined_sets import root_of
 from supple.numerics.sparse.block_csr import BlockRows
 from supple.runtime.kernel_cache import njit
 
@@ -56,23 +57,15 @@ def _strong_pairs(row_start, columns, diagonal, data):
     return of[:count].copy(), columns[chosen[:count]], strength
 
 
-@njit
-def _root(parent, k):
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
-
-
 @njit(cache=True)
 def _joined(rows, columns, order, n):
     parent, size = np.arange(n).astype(np.int32), np.ones(n, dtype=np.int32)
     for k in order:
-        a, b = _root(parent, rows[k]), _root(parent, columns[k])
+        a, b = root_of(parent, rows[k]), root_of(parent, columns[k])
         if a != b and size[a] + size[b] <= MOST_ROWS:
             a, b = min(a, b), max(a, b)
             parent[b] = a
             size[a] += size[b]
     for i in range(n):
-        parent[i] = _root(parent, i)
+        parent[i] = root_of(parent, i)
     return parent

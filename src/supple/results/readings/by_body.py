@@ -46,7 +46,7 @@ class ByBody(Mapping[str, NDArray[Any]]):
 
         Raises
         ------
-        SceneError : where there is no such body, or it has no such values.
+        SceneError : where no such body exists, or it has no such values.
         """
         if name in self._refused:
             raise SceneError(f"body {name!r} {self._refused[name]}")

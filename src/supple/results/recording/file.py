@@ -157,7 +157,7 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
 
     Raises
     ------
-    OSError : where there is no room.
+    OSError : where the disk is full.
     RuntimeError, TypeError, ValueError, KeyError : from HDF5, where the source is damaged.
     """
     _require_room(target, 0, length=layout.frame_bytes * (capacity or 0))

@@ -119,7 +119,7 @@ class RecordedFrame(TetReadings):
 
         Raises
         ------
-        OutputError : where there is no such field, or it was not recorded.
+        OutputError : where no such field exists, or it was not recorded.
         """
         checked_fields([name])
         for field in self.recording.fields:

@@ -42,7 +42,7 @@ def gated_server(token: str, port: int = 0) -> Iterator[Any]:
 
     Raises
     ------
-    OutputError : where there is no free port, or viser does not serve in the way that the gate protects.
+    OutputError : where all ports are taken, or viser does not serve in the way that the gate protects.
     """
     import viser
 

@@ -52,7 +52,7 @@ class HingeJoint(AxisJoint):
 
     Raises
     ------
-    SceneError : where a value is of the wrong kind or out of range, there is no point, or both ends are one body.
+    SceneError : where a value is of the wrong kind or out of range, a point is missing, or both ends are one body.
     """
 
     kind: ClassVar[str] = "hinge"

@@ -31,7 +31,7 @@ class BallJoint(Joint):
 
     Raises
     ------
-    SceneError : where a value is of the wrong kind, there is no point, both ends are one body, or only one of `axis`
+    SceneError : where a value is of the wrong kind, a point is missing, both ends are one body, or only one of `axis`
         and `max_swing` is given, or `twist_limits` without them.
     """
 
@@ -104,7 +104,7 @@ class UniversalJoint(Joint):
 
     Raises
     ------
-    SceneError : where a value is of the wrong kind or out of range, there is no point, both ends are one body, or the
+    SceneError : where a value is of the wrong kind or out of range, a point is missing, both ends are one body, or the
         axes are not perpendicular.
     """
 

@@ -106,7 +106,7 @@ class Cavity(Kind):
 
         Raises
         ------
-        SceneError : where the body does not exist or is rigid, or there is no such closed surface.
+        SceneError : where the body does not exist or is rigid, or no such closed surface exists.
         """
         body = body_of(self.body, bodies, self.label)
         if isinstance(body, RigidBody):

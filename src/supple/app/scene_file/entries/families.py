@@ -46,7 +46,7 @@ def solver_of_kind(kind: str) -> Solver:
 
     Raises
     ------
-    SolverError : where there is no such kind.
+    SolverError : where no such kind exists.
     """
     known = {solver.kind: solver for solver in SOLVERS}
     if kind not in known:
@@ -59,6 +59,6 @@ def model_of_kind(kind: str) -> KindModel:
 
     Raises
     ------
-    SolverError : where there is no such kind.
+    SolverError : where no such kind exists.
     """
     return model_of(type(solver_of_kind(kind)), True).model_validate({"kind": kind})

@@ -77,7 +77,7 @@ class InversionBarrier(Potential):
 
 
 def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset: float) -> InversionBarrier | None:
-    """The barrier below J = `onset` of the guarded tets whose energy has none; None where there is no such tet."""
+    """The barrier below J = `onset` of the guarded tets whose energy has none; None where no such tet exists."""
     material = elasticity.material
     if elasticity.quadratic is not None:
         guarded = guarded.copy()

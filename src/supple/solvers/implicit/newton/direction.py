@@ -106,7 +106,7 @@ class DirectionFinder:
     ----------
     scale : s of the inertia term [s^2], or None
     short : length [m] of a step that is the last one, for which a system with contact is solved more exactly
-    longest : largest component [m] that a direction may have where there is no inertia
+    longest : largest component [m] that a direction may have without inertia
     policy : which terms are projected; forcing : tolerance of the next linear system; last_norm : of the last residual
     """
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
+from supple.numerics.joined_sets import root_of
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit
 
@@ -78,14 +79,6 @@ class FreeMotion:
             _correct(self.piece, self.masses, self.totals, gradient, scale, direction)
 
 
-@njit
-def _root(parent, k):
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
-
-
 @njit(cache=True)
 def _unite(rows, columns, piece, parent):
     """Join the pieces of coupled vertices. The last one stands for everything that is held; the larger root wins."""
@@ -94,7 +87,7 @@ def _unite(rows, columns, piece, parent):
         i, j = piece[rows[t]], piece[columns[t]]
         if i == j:
             continue
-        a, b = _root(parent, held if i < 0 else i), _root(parent, held if j < 0 else j)
+        a, b = root_of(parent, held if i < 0 else i), root_of(parent, held if j < 0 else j)
         parent[min(a, b)] = max(a, b)
 
 
@@ -105,13 +98,13 @@ def _numbered(parent, piece, masses):
     number = np.full(held + 1, -1, dtype=np.int32)
     count = 0
     for k in range(held):
-        root = _root(parent, k)
+        root = root_of(parent, k)
         if root != held and number[root] < 0:
             number[root] = count
             count += 1
     totals = np.zeros(count)
     for k in range(held):
-        number[k] = number[_root(parent, k)]
+        number[k] = number[root_of(parent, k)]
         if number[k] >= 0:
             totals[number[k]] += masses[k]
     joined = np.empty(len(piece), dtype=np.int32)

@@ -89,7 +89,7 @@ class Problem:
     scale : s of its inertia term [s^2], or None
     convergence : when the minimum is reached
     max_iterations : of Newton
-    longest : largest component [m] that a direction may have where there is no inertia
+    longest : largest component [m] that a direction may have without inertia
     outdated : whether the objective is due for a change at positions (n, 3) where this share of contact's forces is not
         balanced
     projected : the terms that are projected at first

@@ -51,6 +51,7 @@ class ContactStep:
     Attributes
     ----------
     linearized : whether the step is a few linearizations
+    objective : the latest one, with contact
     stiffness : of the barrier now [Pa], the integrator's weight included
     stiffness_increases : their number; nearest : the smallest distance before the latest one [m]
     friction_updates : their number; normal_gradient : (n, 3) of the barrier at the latest one [N]
@@ -63,6 +64,7 @@ class ContactStep:
     weight: float
     linearized: bool = False
     stiffness: float = field(init=False)
+    objective: Objective = field(init=False)
     stiffness_increases: int = 0
     nearest: float = 0.0
     friction_updates: int = 0
@@ -78,6 +80,7 @@ class ContactStep:
 
     def with_contact(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
         """The objective with the barrier, and with friction whose normal forces are those at x (n, 3)."""
+        self.objective = objective
         if self.model is None:
             return objective
         if self.barrier is None:
@@ -88,7 +91,8 @@ class ContactStep:
         self.frictions = self.model.frictions(self.barrier, x, self.start, self.times[1] - self.times[0])
         if self.model.coefficients.any():
             self.normal_gradient = Objective([self.barrier]).gradient(x)
-        return Objective([*objective.terms, self.barrier, *self.frictions], objective.clock)
+        self.objective = Objective([*objective.terms, self.barrier, *self.frictions], objective.clock)
+        return self.objective
 
     def needs_update(self, x: NDArray[np.float64], unbalanced: float = 0.0) -> bool:
         """Whether to continue from x (n, 3) with a stiffer barrier or with friction of the normal forces there.

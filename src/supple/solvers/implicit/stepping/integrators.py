@@ -36,7 +36,7 @@ class Plan:
 
     Attributes
     ----------
-    scale : s [s^2]; None where there is no inertia
+    scale : s [s^2]; None without inertia
     predicted : x~ (n, 3) [m]
     velocity : positions at the end (n, 3) -> velocities at the end [m/s]
     strain_rate : the damped elements -> their strain rate at the end as a function of the strain there

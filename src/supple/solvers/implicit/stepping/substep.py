@@ -193,7 +193,7 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
         outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
     acted = state.positions + plan.place * (x - state.positions)
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
-    works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, end, workspace)
+    works, residual = works_of_step(contact.objective, outcome, state, internal, plan, middle, end, workspace)
     error = _time_error(system, workspace.bodies_end, settings.integrator.position_error(state, after))
     return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual, error)
 

@@ -78,18 +78,22 @@ class Cameras:
 
     def fit(self, client: Any) -> None:
         """Show one visitor all bodies as they are."""
-        self._carried[client.client_id].forget()
+        self._carried_of(client).forget()
         fit(client, self._stage.moment.finite_positions)
 
     def look(self, client: Any, preset: str) -> None:
         """Move the camera of one visitor to a preset."""
-        self._carried[client.client_id].forget()
+        self._carried_of(client).forget()
         look_from(client, preset, self._view())
 
     def _carry(self, way_of: Callable[[Any], NDArray[np.float64]]) -> None:
         for client in self._server.get_clients().values():
-            if client.client_id in self._carried:
-                self._carried[client.client_id].carry(way_of(client))
+            self._carried_of(client).carry(way_of(client))
+
+    def _carried_of(self, client: Any) -> CarriedCamera:
+        with self._lock:
+            made = CarriedCamera(client, self._stage.model.view.radius)
+            return self._carried.setdefault(client.client_id, made)
 
     def _view(self) -> View:
         """The view of the scene, moved as far as the cameras were moved with all bodies."""
@@ -127,7 +131,7 @@ class Cameras:
         view = self._view()
         if client.camera.aspect < 1.0 or view is not self._stage.model.view:
             look_from(client, PRESETS[0], view)
-        carried = self._carried[client.client_id] = CarriedCamera(client, self._stage.model.view.radius)
+        carried = self._carried_of(client)
         client.camera.on_update(lambda _: carried.keep())
         was_above = False
 
