@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import ContactMesh
-from supple.contact.search.distances import edges_nearer, points_nearer
+from supple.contact.search.distances import nearer
 from supple.contact.search.patch_search import PatchSearch
 from supple.runtime.kernel_cache import njit
 
@@ -38,8 +39,8 @@ class Candidates:
 
     def nearer_than(self, mesh: ContactMesh, points: NDArray[np.float64], reach: float) -> Candidates:
         """The pairs whose distance at `points` (s, 3) is below `reach` [m]."""
-        of_points = points_nearer(points, mesh.triangles, self.vertex_triangle, reach)
-        of_edges = edges_nearer(points, mesh.edges, self.edge_edge, reach)
+        of_points = nearer(points, VERTEX_TRIANGLE, mesh.triangles, mesh.edges, self.vertex_triangle, reach)
+        of_edges = nearer(points, EDGE_EDGE, mesh.triangles, mesh.edges, self.edge_edge, reach)
         return Candidates(self.vertex_triangle[of_points], self.edge_edge[of_edges])
 
 

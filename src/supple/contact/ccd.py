@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.candidates import CandidateFinder, Candidates
+from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE, corners
 from supple.contact.mesh.contact_mesh import ContactMesh
 from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle, combine
 from supple.numerics.mat3 import cross, dot, row, subtract
@@ -64,7 +65,7 @@ def _time_to(gap, speed, keep):
 
 
 @njit
-def _bound(n, a, p, b, q, so_far, keep):
+def _nearer(n, a, p, b, q, so_far, keep):
     """The time and the gap so far, or those of a point a + t p and b + t q along n where they are smaller."""
     gap = dot(n, subtract(a, b))
     return min(so_far[0], _time_to(gap, dot(n, subtract(p, q)), keep)), min(so_far[1], gap)
@@ -82,22 +83,26 @@ def _direction(r):
 
 
 @njit
-def _point_triangle_bound(n, a, b, c, p, q, r, keep):
-    """How long all corners keep their distance along n from a point at the origin, and the least distance now."""
+def _bound(kind, n, a, b, c, p, q, r, keep):
+    """How long the points of the second part keep their distance along n from the first's, and the least one now."""
     zero = (0.0, 0.0, 0.0)
-    least = _bound(n, a, p, zero, zero, (math.inf, math.inf), keep)
-    least = _bound(n, b, q, zero, zero, least, keep)
-    return _bound(n, c, r, zero, zero, least, keep)
+    least = _nearer(n, b, q, zero, zero, (math.inf, math.inf), keep)
+    least = _nearer(n, c, r, zero, zero, least, keep)
+    if kind == EDGE_EDGE:
+        least = _nearer(n, b, q, a, p, least, keep)
+        return _nearer(n, c, r, a, p, least, keep)
+    return _nearer(n, a, p, zero, zero, least, keep)
 
 
 @njit
-def _edge_edge_bound(n, b, c, d, p, q, r, keep):
-    """The same for both ends of the edge c d and both ends of the edge of the origin and b."""
+def _between(kind, a, b, c):
+    """The vector from the closest point of the first part to that of the second."""
     zero = (0.0, 0.0, 0.0)
-    least = _bound(n, c, q, zero, zero, (math.inf, math.inf), keep)
-    least = _bound(n, d, r, zero, zero, least, keep)
-    least = _bound(n, c, q, b, p, least, keep)
-    return _bound(n, d, r, b, p, least, keep)
+    if kind == VERTEX_TRIANGLE:
+        return combine(closest_on_triangle(zero, a, b, c), a, b, c)
+    s, t = closest_on_segments(zero, a, b, c)
+    w = subtract(c, b)
+    return (b[0] + t * w[0] - s * a[0], b[1] + t * w[1] - s * a[1], b[2] + t * w[2] - s * a[2])
 
 
 @njit
@@ -117,34 +122,34 @@ def _kept(gap, floor):
 
 
 @njit
-def point_triangle_time(x, way, v, corners, limit, floor):
-    """How long, up to `limit`, point v and the triangle of `corners` (3) may move along `way` (s, 3) from x (s, 3).
+def collision_time(x, way, kind, points, limit, floor):
+    """How long, up to `limit`, the parts of the four `points` may move along `way` (s, 3) from x (s, 3).
 
     Until then they keep at least `KEEP` of their distance, and `floor` [m] where it is larger. Larger than `limit`
     where they may move longer than that.
+
+    Parameters
+    ----------
+    kind : VERTEX_TRIANGLE or EDGE_EDGE
     """
-    o, shift = row(x, v), row(way, v)
-    a, b, c = (subtract(row(x, corners[0]), o), subtract(row(x, corners[1]), o), subtract(row(x, corners[2]), o))
-    p, q, r = (
-        subtract(row(way, corners[0]), shift),
-        subtract(row(way, corners[1]), shift),
-        subtract(row(way, corners[2]), shift),
-    )
-    zero = (0.0, 0.0, 0.0)
-    size = max(_largest(o), _largest(a), _largest(b), _largest(c))
+    o, shift = row(x, points[0]), row(way, points[0])
+    a0, b0, c0 = subtract(row(x, points[1]), o), subtract(row(x, points[2]), o), subtract(row(x, points[3]), o)
+    p, q = subtract(row(way, points[1]), shift), subtract(row(way, points[2]), shift)
+    r = subtract(row(way, points[3]), shift)
+    size = max(_largest(o), _largest(a0), _largest(b0), _largest(c0))
     error = ROUND_OFF * (size + max(_largest(shift), _largest(p), _largest(q), _largest(r)))
     time, keep = 0.0, -1.0
-    a0, b0, c0 = a, b, c
+    a, b, c = a0, b0, c0
     for _ in range(_MOST_STEPS):
-        n, gap = _direction(combine(closest_on_triangle(zero, a, b, c), a, b, c))
+        n, gap = _direction(_between(kind, a, b, c))
         if keep < 0.0:
             keep = _kept(gap, floor) + error
         elif gap <= _CLOSE_ENOUGH * keep:
             return time
-        step, least = _point_triangle_bound(n, a, b, c, p, q, r, keep)
+        step, least = _bound(kind, n, a, b, c, p, q, r, keep)
         if not least > _PRECISE * gap:
-            m = _normal(subtract(b, a), subtract(c, a), n)
-            other_step, other_least = _point_triangle_bound(m, a, b, c, p, q, r, keep)
+            m = _normal(a, subtract(c, b), n) if kind == EDGE_EDGE else _normal(subtract(b, a), subtract(c, a), n)
+            other_step, other_least = _bound(kind, m, a, b, c, p, q, r, keep)
             if other_least > least:
                 step = other_step
         if time + step > limit:
@@ -153,43 +158,6 @@ def point_triangle_time(x, way, v, corners, limit, floor):
             return time
         time += step
         a, b, c = _moved(a0, p, time), _moved(b0, q, time), _moved(c0, r, time)
-    return time
-
-
-@njit
-def edge_edge_time(x, way, one, other, limit, floor):
-    """The same for edges with the ends `one` (2) and `other` (2); see `point_triangle_time`."""
-    o, shift = row(x, one[0]), row(way, one[0])
-    zero = (0.0, 0.0, 0.0)
-    b, c, d = (subtract(row(x, one[1]), o), subtract(row(x, other[0]), o), subtract(row(x, other[1]), o))
-    p, q, r = (
-        subtract(row(way, one[1]), shift),
-        subtract(row(way, other[0]), shift),
-        subtract(row(way, other[1]), shift),
-    )
-    size = max(_largest(o), _largest(b), _largest(c), _largest(d))
-    error = ROUND_OFF * (size + max(_largest(shift), _largest(p), _largest(q), _largest(r)))
-    time, keep = 0.0, -1.0
-    b0, c0, d0 = b, c, d
-    for _ in range(_MOST_STEPS):
-        s, t = closest_on_segments(zero, b, c, d)
-        w = subtract(d, c)
-        n, gap = _direction((c[0] + t * w[0] - s * b[0], c[1] + t * w[1] - s * b[1], c[2] + t * w[2] - s * b[2]))
-        if keep < 0.0:
-            keep = _kept(gap, floor) + error
-        elif gap <= _CLOSE_ENOUGH * keep:
-            return time
-        step, least = _edge_edge_bound(n, b, c, d, p, q, r, keep)
-        if not least > _PRECISE * gap:
-            other_step, other_least = _edge_edge_bound(_normal(b, w, n), b, c, d, p, q, r, keep)
-            if other_least > least:
-                step = other_step
-        if time + step > limit:
-            return math.inf
-        if not step > 0.0:
-            return time
-        time += step
-        b, c, d = _moved(b0, p, time), _moved(c0, q, time), _moved(d0, r, time)
     return time
 
 
@@ -232,12 +200,12 @@ def largest_step(
     The points may be moved by step * way in rounded numbers. The pair is the first of those with the least step.
     """
     limit = Limit(1.0)
-    if len(candidates.vertex_triangle):
-        step, k = _first_point(points, way, mesh.triangles, candidates.vertex_triangle, floor)
-        limit = Limit(step, "vertex-triangle", _pair(candidates.vertex_triangle[k])) if k >= 0 else limit
-    if len(candidates.edge_edge):
-        step, k = _first_edge(points, way, mesh.edges, candidates.edge_edge, limit.step, floor)
-        limit = Limit(step, "edge-edge", _pair(candidates.edge_edge[k])) if k >= 0 else limit
+    for kind, name, pairs in (
+        (VERTEX_TRIANGLE, "vertex-triangle", candidates.vertex_triangle),
+        (EDGE_EDGE, "edge-edge", candidates.edge_edge),
+    ):
+        step, k = _first(points, way, kind, mesh.triangles, mesh.edges, pairs, limit.step, floor)
+        limit = Limit(step, name, (int(pairs[k, 0]), int(pairs[k, 1]))) if k >= 0 else limit
     return limit
 
 
@@ -262,23 +230,17 @@ def largest_step_in_pieces(
     return Limit(1.0 if longest <= count * piece else count * share)
 
 
-def _pair(row: NDArray[np.int32]) -> tuple[int, int]:
-    return int(row[0]), int(row[1])
-
-
 @njit
-def is_clear(x, way, a, b, c, d, ends):
-    """Whether the boxes of two parts stay so far apart along one axis that the pair certainly keeps its distance.
-
-    The parts are the points a, and b, c, d for ends = 1; and a, b, and c, d for ends = 2.
-    """
+def is_clear(x, way, kind, points):
+    """Whether the boxes of two parts, of four points, stay so far apart along one axis that the distance is kept."""
+    a, b, c, d = points
     square = 0.0
     for m in range(3):
         square += (x[a, m] - x[c, m]) ** 2
     for m in range(3):
         a0, b0, c0, d0 = x[a, m], x[b, m], x[c, m], x[d, m]
         a1, b1, c1, d1 = a0 + way[a, m], b0 + way[b, m], c0 + way[c, m], d0 + way[d, m]
-        if ends == 1:
+        if kind == VERTEX_TRIANGLE:
             low0, high0, low1, high1 = a0, a0, a1, a1
             low2, high2 = min(b0, c0, d0), max(b0, c0, d0)
             low3, high3 = min(b1, c1, d1), max(b1, c1, d1)
@@ -293,42 +255,20 @@ def is_clear(x, way, a, b, c, d, ends):
 
 
 @njit(cache=True, parallel=True)
-def _first_point(x, way, triangles, pairs, floor):
-    """The least step of pairs (k, 2) of points and triangles, and the pair's row; 1 and -1 for a full step."""
-    steps, rows = np.ones(_RUNS), np.full(_RUNS, -1, dtype=np.int64)
-    for r in prange(_RUNS):
-        least, at = 1.0, np.int64(-1)
-        for k in range(r, len(pairs), _RUNS):
-            v, t = pairs[k, 0], pairs[k, 1]
-            if not is_clear(x, way, v, triangles[t, 0], triangles[t, 1], triangles[t, 2], 1):
-                step = point_triangle_time(x, way, v, triangles[t], least, floor)
-                if step < least:
-                    least, at = step, k
-        steps[r], rows[r] = least, at
-    return _least(steps, rows, 1.0)
-
-
-@njit(cache=True, parallel=True)
-def _first_edge(x, way, edges, pairs, limit, floor):
-    """The same for pairs of edges, of those with a step below `limit`."""
+def _first(x, way, kind, triangles, edges, pairs, limit, floor):
+    """The least step below `limit` of pairs (k, 2) of a kind, and the first row with it; `limit` and -1 for none."""
     steps, rows = np.full(_RUNS, limit), np.full(_RUNS, -1, dtype=np.int64)
     for r in prange(_RUNS):
         least, at = limit, np.int64(-1)
         for k in range(r, len(pairs), _RUNS):
-            e, f = pairs[k, 0], pairs[k, 1]
-            if not is_clear(x, way, edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1], 2):
-                step = edge_edge_time(x, way, edges[e], edges[f], least, floor)
+            points = corners(kind, triangles, edges, pairs[k, 0], pairs[k, 1])
+            if not is_clear(x, way, kind, points):
+                step = collision_time(x, way, kind, points, least, floor)
                 if step < least:
                     least, at = step, k
         steps[r], rows[r] = least, at
-    return _least(steps, rows, limit)
-
-
-@njit
-def _least(steps, rows, limit):
-    """The least step, and the first row that has it."""
     least, at = limit, np.int64(-1)
-    for r in range(len(steps)):
+    for r in range(_RUNS):
         if rows[r] >= 0 and (at < 0 or steps[r] < least or (steps[r] == least and rows[r] < at)):
             least, at = steps[r], rows[r]
     return least, at

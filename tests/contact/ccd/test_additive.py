@@ -6,20 +6,16 @@ import ipctk
 import numpy as np
 import pytest
 
-from supple.contact.ccd import KEEP, ROUND_OFF, edge_edge_time, point_triangle_time
+from supple.contact.ccd import KEEP, ROUND_OFF, collision_time
+from supple.contact.features.pair_geometry import EDGE_EDGE
+from supple.contact.features.pair_geometry import VERTEX_TRIANGLE as POINT_TRIANGLE
 from supple.runtime.kernel_cache import njit
-
-POINT_TRIANGLE, EDGE_EDGE = 0, 1
 
 
 @njit
 def all_times(kind, x, way, out):
-    one, other, corners = np.array([0, 1]), np.array([2, 3]), np.array([1, 2, 3])
     for k in range(len(x)):
-        if kind == POINT_TRIANGLE:
-            out[k] = point_triangle_time(x[k], way[k], 0, corners, 1.0, 0.0)
-        else:
-            out[k] = edge_edge_time(x[k], way[k], one, other, 1.0, 0.0)
+        out[k] = collision_time(x[k], way[k], kind, (0, 1, 2, 3), 1.0, 0.0)
 
 
 def times(kind, x, way):
@@ -33,7 +29,7 @@ def configurations(kind, count):
 
     Sizes are 1e-9 to 1e3 m, and the places up to 1e3 m from the origin, as far as the points remain distinct.
     """
-    rng = np.random.default_rng(7 + kind)
+    rng = np.random.default_rng(7 + (kind == EDGE_EDGE))
     x, way = rng.normal(size=(count, 4, 3)), rng.normal(size=(count, 4, 3)) * 10.0 ** rng.uniform(-2, 1, (count, 1, 1))
     family = np.arange(count) % 8
     first = slice(0, 1) if kind == POINT_TRIANGLE else slice(0, 2)

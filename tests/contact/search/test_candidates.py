@@ -7,8 +7,9 @@ import pytest
 
 import supple as sp
 from supple.contact.candidates import CandidateFinder
+from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import mesh_of_triangles
-from supple.contact.search.distances import edges_nearer, points_nearer
+from supple.contact.search.distances import nearer
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 DHAT = 0.02
@@ -48,8 +49,8 @@ def near_pairs(mesh, places):
         candidates.build(library, np.asfortranarray(x), DHAT)
         points = np.array([(c.vertex_id, c.face_id) for c in candidates.fv_candidates], dtype=np.int32).reshape(-1, 2)
         sides = np.array([(c.edge0_id, c.edge1_id) for c in candidates.ee_candidates], dtype=np.int32).reshape(-1, 2)
-        points = points[points_nearer(x, mesh.triangles, points, DHAT)]
-        sides = np.sort(sides[edges_nearer(x, mesh.edges, sides, DHAT)], axis=1)
+        points = points[nearer(x, VERTEX_TRIANGLE, mesh.triangles, mesh.edges, points, DHAT)]
+        sides = np.sort(sides[nearer(x, EDGE_EDGE, mesh.triangles, mesh.edges, sides, DHAT)], axis=1)
         owners = mesh.owner[points[:, 0]], mesh.owner[mesh.triangles[points[:, 1], 0]]
         found[0].update(map(tuple, points[mesh.collide[owners]].tolist()))
         owners = mesh.owner[edges[sides[:, 0], 0]], mesh.owner[edges[sides[:, 1], 0]]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.barrier.barrier_energy import block_points, block_starts
-from supple.contact.ccd import edge_edge_time, is_clear, point_triangle_time
-from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
+from supple.contact.ccd import collision_time, is_clear
+from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE, corners
 from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle, combine
 from supple.numerics.mat3 import dot
 from supple.numerics.sparse.couplings import Couplings
@@ -102,29 +102,20 @@ def _along(a, u, time):
 def write_collisions(x, way, triangles, edges, point_pairs, edge_pairs, floor, rows):
     """Write the rows of all pairs that collide while points go from x (s, 3) along `way` (s, 3); returns their number.
 
-    floor : see `point_triangle_time`. Where `rows` has no room, only the first ones are written.
+    floor : see `collision_time`. Where `rows` has no room, only the first ones are written.
     """
     count = 0
-    for k in range(len(point_pairs)):
-        v, t = point_pairs[k, 0], point_pairs[k, 1]
-        if is_clear(x, way, v, triangles[t, 0], triangles[t, 1], triangles[t, 2], 1):
-            continue
-        time = point_triangle_time(x, way, v, triangles[t], 1.0, floor)
-        if time <= 1.0:
-            if count < len(rows.kinds):
-                points = (v, triangles[t, 0], triangles[t, 1], triangles[t, 2])
-                _write(x, way, time, VERTEX_TRIANGLE, points, rows, count)
-            count += 1
-    for k in range(len(edge_pairs)):
-        e, f = edge_pairs[k, 0], edge_pairs[k, 1]
-        if is_clear(x, way, edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1], 2):
-            continue
-        time = edge_edge_time(x, way, edges[e], edges[f], 1.0, floor)
-        if time <= 1.0:
-            if count < len(rows.kinds):
-                points = (edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1])
-                _write(x, way, time, EDGE_EDGE, points, rows, count)
-            count += 1
+    for kind in (VERTEX_TRIANGLE, EDGE_EDGE):
+        pairs = point_pairs if kind == VERTEX_TRIANGLE else edge_pairs
+        for k in range(len(pairs)):
+            points = corners(kind, triangles, edges, pairs[k, 0], pairs[k, 1])
+            if is_clear(x, way, kind, points):
+                continue
+            time = collision_time(x, way, kind, points, 1.0, floor)
+            if time <= 1.0:
+                if count < len(rows.kinds):
+                    _write(x, way, time, kind, points, rows, count)
+                count += 1
     return count
 
 

@@ -30,6 +30,14 @@ def point_count(kind):
 
 
 @njit
+def corners(kind, triangles, edges, i, j):
+    """The four points of vertex i and triangle j, or of the edges i and j."""
+    if kind == EDGE_EDGE:
+        return edges[i, 0], edges[i, 1], edges[j, 0], edges[j, 1]
+    return i, triangles[j, 0], triangles[j, 1], triangles[j, 2]
+
+
+@njit
 def normalized(a):
     """a / |a|"""
     length = math.sqrt(dot(a, a))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from supple.contact.features.pair_geometry import EDGE_EDGE
 from supple.numerics.geometry.closest_points import between, closest_on_segments, closest_on_triangle, combine
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
@@ -27,18 +28,11 @@ def edge_edge_square(x, edges, e, f):
 
 
 @njit(cache=True, parallel=True)
-def points_nearer(x, triangles, pairs, reach):
-    """Which pairs (k, 2) of points and triangles are nearer than `reach`."""
+def nearer(x, kind, triangles, edges, pairs, reach):
+    """Which pairs (k, 2) of points and triangles, or of edges, are nearer than `reach`."""
     near = np.empty(len(pairs), dtype=np.bool_)
     for k in prange(len(pairs)):
-        near[k] = point_triangle_square(x, pairs[k, 0], triangles, pairs[k, 1]) < reach * reach
-    return near
-
-
-@njit(cache=True, parallel=True)
-def edges_nearer(x, edges, pairs, reach):
-    """Which pairs (k, 2) of edges are nearer than `reach`."""
-    near = np.empty(len(pairs), dtype=np.bool_)
-    for k in prange(len(pairs)):
-        near[k] = edge_edge_square(x, edges, pairs[k, 0], pairs[k, 1]) < reach * reach
+        i, j = pairs[k, 0], pairs[k, 1]
+        square = edge_edge_square(x, edges, i, j) if kind == EDGE_EDGE else point_triangle_square(x, i, triangles, j)
+        near[k] = square < reach * reach
     return near
