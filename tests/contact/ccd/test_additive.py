@@ -76,7 +76,7 @@ def distance(kind, points):
     a, b, c, d = points
     if kind == EDGE_EDGE and (c == d).all():
         return ipctk.point_edge_distance(c, a, b)
-    return (ipctk.point_triangle_distance, ipctk.edge_edge_distance)[kind](a, b, c, d)
+    return (ipctk.point_triangle_distance, ipctk.edge_edge_distance)[kind == EDGE_EDGE](a, b, c, d)
 
 
 def errors(x, way):
@@ -109,7 +109,7 @@ def test_steps_agree_with_the_library(kind):
     start = distances(kind, x, way, np.zeros(len(x)))
     plain = start > 1e-6 * np.abs(x).max(axis=(1, 2))  # where round-off is no issue for the library either
     ccd = ipctk.AdditiveCCD()
-    detect = (ccd.point_triangle_ccd, ccd.edge_edge_ccd)[kind]
+    detect = (ccd.point_triangle_ccd, ccd.edge_edge_ccd)[kind == EDGE_EDGE]
     expected = []
     for a, p in zip(x[plain], way[plain], strict=True):
         hit, toi = detect(*(a / np.abs(a).max()), *((a + p) / np.abs(a).max()))

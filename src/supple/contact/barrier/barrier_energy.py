@@ -21,6 +21,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.barrier.on_points import PARALLEL_FROM, add_forces, room_for_blocks
 from supple.contact.barrier.pair_hessian import write_pair_hessian
 from supple.contact.features.contacts import Contacts
 from supple.contact.features.pair_geometry import EDGE_EDGE, point_count
@@ -71,10 +72,6 @@ def barrier_slopes(d, dhat, soft=0.0):
     return first + (d - soft) * second, second
 
 
-# Contacts from which a second thread pays.
-_PARALLEL_FROM = 300
-
-
 @njit(cache=True)
 def barrier_energy(contacts, dhat, stiffness, soft=0.0):
     """E [J], infinite where a point is on a plane or behind it; stiffness : kappa [Pa]."""
@@ -110,52 +107,22 @@ def predicted_forces(distances, changes, weights, dhat, soft):
     return out
 
 
-@njit(cache=True)
-def add_barrier_gradient(contacts, dhat, stiffness, out, soft=0.0):
+def add_barrier_gradient(
+    contacts: Contacts, dhat: float, stiffness: float, out: NDArray[np.float64], soft: float = 0.0
+) -> None:
     """Add the gradient by the points [N] to `out` (s, 3)."""
-    kinds, points, coefficients, vectors, distances, weights = contacts
-    for k in range(len(distances)):
-        size = stiffness * weights[k] * barrier_slopes(distances[k], dhat, soft)[0] / distances[k]
-        for i in range(point_count(kinds[k])):
-            for j in range(3):
-                out[points[k, i], j] += size * coefficients[k, i] * vectors[k, j]
+    sizes = -barrier_forces(contacts, dhat, stiffness, soft) / contacts.distances
+    add_forces(*contacts[:3], sizes, contacts.vectors, out)
 
 
 def barrier_hessian(
     x: NDArray[np.float64], contacts: Contacts, dhat: float, stiffness: float, project: bool, soft: float = 0.0
 ) -> Couplings:
     """The Hessian by the points x (s, 3) [N/m]; with `project`, larger and positive semi-definite."""
-    start = block_starts(contacts.kinds)
-    rows, columns = block_points(contacts.kinds, contacts.points, start)
-    blocks = np.empty((start[-1], 3, 3))
-    with threads_for(len(contacts.kinds), _PARALLEL_FROM):
-        _write_hessians(x, contacts, start, dhat, stiffness, soft, project, blocks)
-    return Couplings(rows, columns, blocks)
-
-
-@njit(cache=True)
-def block_starts(kinds):
-    """(k + 1,) where the blocks of each contact begin: one for each unordered pair of its points."""
-    start = np.zeros(len(kinds) + 1, dtype=np.int64)
-    for k in range(len(kinds)):
-        count = point_count(kinds[k])
-        start[k + 1] = start[k] + count * (count + 1) // 2
-    return start
-
-
-@njit(cache=True)
-def block_points(kinds, points, start):
-    """Rows and columns (t,) of the blocks (i, j), i <= j, of contacts."""
-    rows = np.empty(start[-1], dtype=np.int32)
-    columns = np.empty(start[-1], dtype=np.int32)
-    b = 0
-    for k in range(len(kinds)):
-        count = point_count(kinds[k])
-        for i in range(count):
-            for j in range(i, count):
-                rows[b], columns[b] = points[k, i], points[k, j]
-                b += 1
-    return rows, columns
+    between, start = room_for_blocks(contacts.kinds, contacts.points)
+    with threads_for(len(contacts.kinds), PARALLEL_FROM):
+        _write_hessians(x, contacts, start, dhat, stiffness, soft, project, between.blocks)
+    return between
 
 
 @njit(cache=True, parallel=True)

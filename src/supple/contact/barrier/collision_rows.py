@@ -7,12 +7,12 @@ in the positions. A row keeps it at `target`, with the energy stiffness / 2 (gap
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.barrier.barrier_energy import block_points, block_starts
+from supple.contact.barrier.on_points import add_forces, product_blocks
 from supple.contact.ccd import collision_time, is_clear
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE, corners
 from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle, combine
@@ -46,13 +46,11 @@ class CollisionRows(NamedTuple):
 
     def where(self, chosen: NDArray[np.bool_] | slice) -> CollisionRows:
         """The chosen ones (k,)."""
-        arrays: list[Any] = [array[chosen] for array in self]
-        return CollisionRows(*arrays)
+        return CollisionRows._make(array[chosen] for array in self)
 
     def joined(self, more: CollisionRows) -> CollisionRows:
         """These rows, then others."""
-        arrays: list[Any] = [np.concatenate(both) for both in zip(self, more, strict=True)]
-        return CollisionRows(*arrays)
+        return CollisionRows._make(np.concatenate(both) for both in zip(self, more, strict=True))
 
     def along(self, way: NDArray[np.float64]) -> CollisionRows:
         """The same rows, with the ends of another way (s, 3)."""
@@ -119,33 +117,12 @@ def write_collisions(x, way, triangles, edges, point_pairs, edge_pairs, floor, r
     return count
 
 
-@njit(cache=True)
-def add_row_gradient(rows, stiffness, target, out):
+def add_row_gradient(rows: CollisionRows, stiffness: float, target: float, out: NDArray[np.float64]) -> None:
     """Add the gradient at the beginning of the way [N] to `out` (s, 3)."""
-    for k in range(len(rows.kinds)):
-        size = stiffness * (rows.gaps[k] - target)
-        for i in range(4):
-            for j in range(3):
-                out[rows.points[k, i], j] += size * rows.coefficients[k, i] * rows.normals[k, j]
+    add_forces(*rows[:3], stiffness * (rows.gaps - target), rows.normals, out)
 
 
 def row_hessian(rows: CollisionRows, stiffness: float) -> Couplings:
     """The Hessian by the points [N/m]."""
-    start = block_starts(rows.kinds)
-    blocks = np.empty((start[-1], 3, 3))
-    _write_hessian(rows, stiffness, blocks)
-    first, second = block_points(rows.kinds, rows.points, start)
-    return Couplings(first, second, blocks)
-
-
-@njit(cache=True)
-def _write_hessian(rows, stiffness, out):
-    b = 0
-    for k in range(len(rows.kinds)):
-        for i in range(4):
-            for j in range(i, 4):
-                size = stiffness * rows.coefficients[k, i] * rows.coefficients[k, j]
-                for u in range(3):
-                    for v in range(3):
-                        out[b, u, v] = size * rows.normals[k, u] * rows.normals[k, v]
-                b += 1
+    n = rows.normals
+    return product_blocks(*rows[:3], np.full(len(n), stiffness), n[:, :, None] * n[:, None, :])

@@ -28,15 +28,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.barrier.barrier_energy import block_points, block_starts
+from supple.contact.barrier.on_points import add_forces, product_blocks
 from supple.contact.features.contacts import Contacts
 from supple.contact.features.pair_geometry import EDGE_EDGE, point_count
 from supple.numerics.sparse.couplings import Couplings
-from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
-
-# Contacts from which a second thread pays.
-_PARALLEL_FROM = 300
+from supple.runtime.kernel_cache import njit
 
 
 class Slips(NamedTuple):
@@ -82,53 +78,46 @@ def ratio_slope(y, e):
     return -1.0 / (y * y) if y >= e else -1.0 / (y * (2.0 * e - y))
 
 
-@njit
-def slip_of(x, slips, k):
-    """u [m] of contact k."""
+@njit(cache=True)
+def slips_at(x, slips, reach):
+    """u (k, 3) at x (s, 3) [m]; F(|u|), r(|u|) and `ratio_slope` of it, (k,) each."""
     kinds, points, coefficients, normals, offsets, _ = slips
-    a = b = c = 0.0
-    for i in range(point_count(kinds[k])):
-        a += coefficients[k, i] * x[points[k, i], 0]
-        b += coefficients[k, i] * x[points[k, i], 1]
-        c += coefficients[k, i] * x[points[k, i], 2]
-    a, b, c = a - offsets[k, 0], b - offsets[k, 1], c - offsets[k, 2]
-    n = (normals[k, 0], normals[k, 1], normals[k, 2])
-    along = a * n[0] + b * n[1] + c * n[2]
-    return (a - along * n[0], b - along * n[1], c - along * n[2])
-
-
-@njit(cache=True)
-def friction_energy(x, slips, reach):
-    """E at x (s, 3) [J]."""
-    total = 0.0
-    for k in range(len(slips[0])):
-        u = slip_of(x, slips, k)
-        total += slips[5][k] * friction_potential((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
-    return total
-
-
-@njit(cache=True)
-def add_friction_gradient(x, slips, reach, out):
-    """Add the gradient [N] to `out` (s, 3)."""
-    kinds, points, coefficients, _, _, forces = slips
-    for k in range(len(kinds)):
-        u = slip_of(x, slips, k)
-        size = forces[k] * friction_ratio((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
+    u = np.empty((len(kinds), 3))
+    potentials, ratios, slopes = np.empty(len(u)), np.empty(len(u)), np.empty(len(u))
+    for k in range(len(u)):
+        a = b = c = 0.0
         for i in range(point_count(kinds[k])):
-            for j in range(3):
-                out[points[k, i], j] += size * coefficients[k, i] * u[j]
+            a += coefficients[k, i] * x[points[k, i], 0]
+            b += coefficients[k, i] * x[points[k, i], 1]
+            c += coefficients[k, i] * x[points[k, i], 2]
+        a, b, c = a - offsets[k, 0], b - offsets[k, 1], c - offsets[k, 2]
+        n = (normals[k, 0], normals[k, 1], normals[k, 2])
+        along = a * n[0] + b * n[1] + c * n[2]
+        u[k, 0], u[k, 1], u[k, 2] = a - along * n[0], b - along * n[1], c - along * n[2]
+        y = (u[k, 0] * u[k, 0] + u[k, 1] * u[k, 1] + u[k, 2] * u[k, 2]) ** 0.5
+        potentials[k], ratios[k], slopes[k] = (
+            friction_potential(y, reach),
+            friction_ratio(y, reach),
+            ratio_slope(y, reach),
+        )
+    return u, potentials, ratios, slopes
 
 
-@njit(cache=True)
-def slip_forces(x, slips, reach):
+def friction_energy(x: NDArray[np.float64], slips: Slips, reach: float) -> float:
+    """E at x (s, 3) [J]."""
+    return float(np.cumsum(slips.forces * slips_at(x, slips, reach)[1])[-1]) if len(slips.forces) else 0.0
+
+
+def add_friction_gradient(x: NDArray[np.float64], slips: Slips, reach: float, out: NDArray[np.float64]) -> None:
+    """Add the gradient [N] to `out` (s, 3)."""
+    u, _, ratios, _ = slips_at(x, slips, reach)
+    add_forces(*slips[:3], slips.forces * ratios, u, out)
+
+
+def slip_forces(x: NDArray[np.float64], slips: Slips, reach: float) -> NDArray[np.float64]:
     """(k, 3) the force of friction on the first side of every contact [N]."""
-    out = np.empty((len(slips[0]), 3))
-    for k in range(len(out)):
-        u = slip_of(x, slips, k)
-        size = -slips[5][k] * friction_ratio((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
-        for j in range(3):
-            out[k, j] = size * u[j]
-    return out
+    u, _, ratios, _ = slips_at(x, slips, reach)
+    return (-slips.forces * ratios)[:, None] * u
 
 
 def friction_hessian(x: NDArray[np.float64], slips: Slips, reach: float, duals: NDArray[np.float64]) -> Couplings:
@@ -138,76 +127,31 @@ def friction_hessian(x: NDArray[np.float64], slips: Slips, reach: float, duals: 
     ----------
     duals : (k, 3) w, in the contacts' planes, none longer than 1; see the module
     """
-    start = block_starts(slips.kinds)
-    rows, columns = block_points(slips.kinds, slips.points, start)
-    blocks = np.empty((start[-1], 3, 3))
-    with threads_for(len(slips.kinds), _PARALLEL_FROM):
-        _write_hessians(x, slips, start, reach, duals, blocks)
-    return Couplings(rows, columns, blocks)
+    u, _, ratios, slopes = slips_at(x, slips, reach)
+    n, across = slips.normals, ratios[:, None, None]
+    both = duals[:, :, None] * u[:, None, :] + u[:, :, None] * duals[:, None, :]
+    by_slip = (0.5 * slopes)[:, None, None] * both - across * n[:, :, None] * n[:, None, :] + across * np.eye(3)
+    return product_blocks(*slips[:3], slips.forces, by_slip)
 
 
-@njit(cache=True, parallel=True)
-def _write_hessians(x, slips, start, reach, duals, out):
-    kinds, _, coefficients, normals, _, forces = slips
-    for k in prange(len(kinds)):
-        u = slip_of(x, slips, k)
-        y = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5
-        across = friction_ratio(y, reach)
-        along = 0.5 * ratio_slope(y, reach)
-        count = point_count(kinds[k])
-        b = start[k]
-        for i in range(count):
-            for j in range(i, count):
-                size = forces[k] * coefficients[k, i] * coefficients[k, j]
-                for p in range(3):
-                    for q in range(3):
-                        entry = along * (duals[k, p] * u[q] + u[p] * duals[k, q])
-                        entry -= across * normals[k, p] * normals[k, q]
-                        out[b, p, q] = size * (entry + across if p == q else entry)
-                b += 1
-
-
-@njit(cache=True)
-def held_shares(x, way, slips, reach):
+def held_shares(x: NDArray[np.float64], way: NDArray[np.float64], slips: Slips, reach: float) -> NDArray[np.float64]:
     """(k, 3) f r(|u|) times the slip at the end of all of `way` (s, 3) from x, where u is the one at x, as shares of f:
     the forces that the matrix of the majorizer predicts."""
-    end = x + way
-    out = np.empty((len(slips[0]), 3))
-    for k in range(len(out)):
-        u, v = slip_of(x, slips, k), slip_of(end, slips, k)
-        ratio = friction_ratio((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
-        for j in range(3):
-            out[k, j] = ratio * v[j]
-    return out
+    return slips_at(x, slips, reach)[2][:, None] * slips_at(x + way, slips, reach)[0]
 
 
-@njit(cache=True)
-def renew_duals(x, way, slips, reach, duals):
+def renew_duals(
+    x: NDArray[np.float64], way: NDArray[np.float64], slips: Slips, reach: float, duals: NDArray[np.float64]
+) -> None:
     """Overwrite the duals (k, 3) by those at the end of a primal-dual step from x along all of `way` (s, 3).
 
     They are the forces, as shares of the largest ones, that the matrix of the step predicts, cut to the length 1.
     """
-    kinds, points, coefficients, normals, _, _ = slips
-    for k in range(len(kinds)):
-        u = slip_of(x, slips, k)
-        y = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5
-        across, along = friction_ratio(y, reach), 0.5 * ratio_slope(y, reach)
-        a = b = c = 0.0
-        for i in range(point_count(kinds[k])):
-            a += coefficients[k, i] * way[points[k, i], 0]
-            b += coefficients[k, i] * way[points[k, i], 1]
-            c += coefficients[k, i] * way[points[k, i], 2]
-        high = a * normals[k, 0] + b * normals[k, 1] + c * normals[k, 2]
-        d = (a - high * normals[k, 0], b - high * normals[k, 1], c - high * normals[k, 2])
-        by_slip = along * (u[0] * d[0] + u[1] * d[1] + u[2] * d[2])
-        by_dual = along * (duals[k, 0] * d[0] + duals[k, 1] * d[1] + duals[k, 2] * d[2])
-        length = 0.0
-        for p in range(3):
-            duals[k, p] = across * (u[p] + d[p]) + by_slip * duals[k, p] + by_dual * u[p]
-            length += duals[k, p] * duals[k, p]
-        if length > 1.0:
-            for p in range(3):
-                duals[k, p] /= length**0.5
+    u, _, ratios, slopes = slips_at(x, slips, reach)
+    d = slips_at(way, slips._replace(offsets=np.zeros_like(u)), reach)[0]
+    by_slip, by_dual = (0.5 * slopes * (vectors * d).sum(axis=1) for vectors in (u, duals))
+    duals[:] = ratios[:, None] * (u + d) + by_slip[:, None] * duals + by_dual[:, None] * u
+    duals /= np.sqrt(np.maximum((duals * duals).sum(axis=1), 1.0))[:, None]
 
 
 def lagged_slips(

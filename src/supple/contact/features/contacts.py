@@ -9,7 +9,7 @@ Where it goes over that face, or too far away from the outline to count, the pla
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,13 +38,11 @@ class Contacts(NamedTuple):
 
     def where(self, chosen: NDArray[np.bool_]) -> Contacts:
         """The chosen ones (k,)."""
-        kinds, points, coefficients = self.kinds[chosen], self.points[chosen], self.coefficients[chosen]
-        return Contacts(kinds, points, coefficients, self.vectors[chosen], self.distances[chosen], self.weights[chosen])
+        return Contacts._make(array[chosen] for array in self)
 
     def joined(self, more: Contacts) -> Contacts:
         """These contacts, then others."""
-        arrays: list[Any] = [np.concatenate(both) for both in zip(self, more, strict=True)]
-        return Contacts(*arrays)
+        return Contacts._make(np.concatenate(both) for both in zip(self, more, strict=True))
 
 
 # A weight grows by at least this share of the largest one.
