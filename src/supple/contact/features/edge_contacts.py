@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from supple.contact.features.contacts import has_grown, known_weight
-from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX
+from supple.contact.features.contacts import has_grown, known_weight, put
+from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX, unit
 from supple.contact.features.vertex_contacts import NEARER_SHARE
 from supple.contact.features.vertex_features import nearest_of_edge
 from supple.numerics.mat3 import cross, dot, row, subtract
@@ -118,11 +118,7 @@ def _inward(x, triangles, t, a, b):
     """Unit vector in the plane of triangle t from its edge of the points a and b inwards; zero without area."""
     o = triangles[t, 0] + triangles[t, 1] + triangles[t, 2] - a - b
     along, over = subtract(row(x, b), row(x, a)), subtract(row(x, o), row(x, a))
-    m = cross(cross(along, over), along)
-    length = math.sqrt(dot(m, m))
-    if length == 0.0:
-        return (0.0, 0.0, 0.0)
-    return (m[0] / length, m[1] / length, m[2] / length)
+    return unit(cross(cross(along, over), along))
 
 
 @njit(cache=True)
@@ -139,8 +135,8 @@ def edge_ends(x, pairs, weights, edges):
         ids = _ids(edges, pairs[rows[m], 0], pairs[rows[m], 1])
         least = np.inf
         for end in range(4):
-            one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])
-            _, r = nearest_of_edge(row(x, ids[end]), row(x, one), row(x, other))
+            vertex, one, other = _end(ids, end)
+            _, r = nearest_of_edge(row(x, vertex), row(x, one), row(x, other))
             if dot(r, r) < least:
                 least, ends[m] = dot(r, r), end
     return rows, ends
@@ -176,19 +172,19 @@ def saddle_weights(pairs, weights, rows, ends, edges, s):
 @njit(cache=True)
 def write_edge_contacts(x, pairs, weights, rows, ends, edges, first, out):
     """Write two contacts for each of the pairs of `edge_ends` into the rows of `out`, a `Contacts`, from `first` on."""
-    kinds, points, coefficients, vectors, distances, areas = out
     for m in range(len(rows)):
         k, n = rows[m], first + 2 * m
         ids = _ids(edges, pairs[k, 0], pairs[k, 1])
         s, t, r, _ = crossing_point(row(x, ids[0]), row(x, ids[1]), row(x, ids[2]), row(x, ids[3]))
-        kinds[n] = EDGE_EDGE
-        points[n, 0], points[n, 1], points[n, 2], points[n, 3] = ids
-        coefficients[n, 0], coefficients[n, 1], coefficients[n, 2], coefficients[n, 3] = 1.0 - s, s, t - 1.0, -t
-        vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
-        distances[n] = math.sqrt(dot(r, r))
-        areas[n] = weights[k]
-        _write_end(x, ids, ends[m], n + 1, kinds, points, coefficients, vectors, distances)
-        areas[n + 1] = -weights[k]
+        put(out, n, EDGE_EDGE, ids, (1.0 - s, s, t - 1.0, -t), r)
+        # An end with the other edge, or with an end of that.
+        end, one, other = _end(ids, ends[m])
+        w, r = nearest_of_edge(row(x, end), row(x, one), row(x, other))
+        if 0.0 < w < 1.0:
+            put(out, n + 1, VERTEX_EDGE, (end, one, other, -1), (1.0, w - 1.0, -w, 0.0), r)
+        else:
+            put(out, n + 1, VERTEX_VERTEX, (end, one if w == 0.0 else other, -1, -1), (1.0, -1.0, 0.0, 0.0), r)
+        out.weights[n], out.weights[n + 1] = weights[k], -weights[k]
 
 
 @njit
@@ -197,19 +193,6 @@ def _ids(edges, e, f):
 
 
 @njit
-def _write_end(x, ids, end, n, kinds, points, coefficients, vectors, distances):
-    """Row n: an end of two edges with the other edge, or with an end of that."""
-    one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])
-    w, r = nearest_of_edge(row(x, ids[end]), row(x, one), row(x, other))
-    points[n, 0], points[n, 3] = ids[end], -1
-    coefficients[n, 0], coefficients[n, 3] = 1.0, 0.0
-    if 0.0 < w < 1.0:
-        kinds[n] = VERTEX_EDGE
-        points[n, 1], points[n, 2] = one, other
-        coefficients[n, 1], coefficients[n, 2] = w - 1.0, -w
-    else:
-        kinds[n] = VERTEX_VERTEX
-        points[n, 1], points[n, 2] = (one if w == 0.0 else other), -1
-        coefficients[n, 1], coefficients[n, 2] = -1.0, 0.0
-    vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
-    distances[n] = math.sqrt(dot(r, r))
+def _end(ids, end):
+    """The end of two edges with a number, and the ends of the other edge."""
+    return (ids[end], ids[2], ids[3]) if end < 2 else (ids[end], ids[0], ids[1])

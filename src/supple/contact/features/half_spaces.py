@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.features.contacts import Contacts
+from supple.contact.features.contacts import Contacts, put
 from supple.contact.features.pair_geometry import VERTEX_PLANE
 from supple.contact.features.vertex_contacts import foot_on_plane
 from supple.contact.mesh.contact_mesh import ContactMesh
@@ -57,8 +57,13 @@ class HalfSpaces:
 
         Distances are below zero behind a plane.
         """
-        *arrays, least = _near(x, self.tets, self.areas, reach)
-        return Contacts(*arrays), least
+        heights = np.empty(len(self.tets))
+        _write_heights(x, self.tets, heights)
+        near = np.flatnonzero(heights < reach)
+        out = Contacts.room(len(near))
+        _write(x, self.tets[near], heights[near], out)
+        out.weights[:] = self.areas[near]
+        return out, float(heights.min(initial=np.inf))
 
     def largest_step(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, int]:
         """The largest step along `way` (s + 3 h, 3), at most 1, that keeps a tenth of every distance.
@@ -71,30 +76,20 @@ class HalfSpaces:
 
 
 @njit(cache=True)
-def _near(x, tets, areas, reach):
-    """The fields of `Contacts` of the pairs nearer than `reach`, and the least of all distances."""
-    heights = np.empty(len(tets))
-    least, count = np.inf, 0
+def _write_heights(x, tets, out):
     for k in range(len(tets)):
         a = row(x, tets[k, 0])
         n = area_normal(a, row(x, tets[k, 1]), row(x, tets[k, 2]))
-        heights[k] = dot(subtract(row(x, tets[k, 3]), a), n) / math.sqrt(dot(n, n))
-        least = min(least, heights[k])
-        count += heights[k] < reach
-    kinds, points = np.full(count, VERTEX_PLANE, dtype=np.int8), np.empty((count, 4), dtype=np.int32)
-    coefficients, vectors = np.empty((count, 4)), np.empty((count, 3))
-    distances, weights = np.empty(count), np.empty(count)
-    m = 0
+        out[k] = dot(subtract(row(x, tets[k, 3]), a), n) / math.sqrt(dot(n, n))
+
+
+@njit(cache=True)
+def _write(x, tets, heights, out):
     for k in range(len(tets)):
-        if not heights[k] < reach:
-            continue
-        p, a, b, c = row(x, tets[k, 3]), row(x, tets[k, 0]), row(x, tets[k, 1]), row(x, tets[k, 2])
-        n, u = area_normal(a, b, c), foot_on_plane(p, a, b, c)
-        length = math.sqrt(dot(n, n))
-        points[m, 0], coefficients[m, 0] = tets[k, 3], 1.0
-        for i in range(3):
-            points[m, i + 1], coefficients[m, i + 1] = tets[k, i], -u[i]
-            vectors[m, i] = heights[k] * n[i] / length
-        distances[m], weights[m] = heights[k], areas[k]
-        m += 1
-    return kinds, points, coefficients, vectors, distances, weights, least
+        i, j, m, p = tets[k, 0], tets[k, 1], tets[k, 2], tets[k, 3]
+        a, b, c = row(x, i), row(x, j), row(x, m)
+        n, u = area_normal(a, b, c), foot_on_plane(row(x, p), a, b, c)
+        h, length = heights[k], math.sqrt(dot(n, n))
+        r = (h * n[0] / length, h * n[1] / length, h * n[2] / length)
+        put(out, k, VERTEX_PLANE, (p, i, j, m), (1.0, -u[0], -u[1], -u[2]), r)
+        out.distances[k] = h  # below zero behind the plane

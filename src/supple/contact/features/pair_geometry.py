@@ -38,9 +38,11 @@ def corners(kind, triangles, edges, i, j):
 
 
 @njit
-def normalized(a):
-    """a / |a|"""
+def unit(a):
+    """a / |a|, or zero."""
     length = math.sqrt(dot(a, a))
+    if length == 0.0:
+        return (0.0, 0.0, 0.0)
     return (a[0] / length, a[1] / length, a[2] / length)
 
 
@@ -48,10 +50,10 @@ def normalized(a):
 def any_across(n):
     """A unit vector perpendicular to the unit vector n."""
     if abs(n[0]) <= abs(n[1]) and abs(n[0]) <= abs(n[2]):
-        return normalized((0.0, -n[2], n[1]))
+        return unit((0.0, -n[2], n[1]))
     if abs(n[1]) <= abs(n[2]):
-        return normalized((n[2], 0.0, -n[0]))
-    return normalized((-n[1], n[0], 0.0))
+        return unit((n[2], 0.0, -n[0]))
+    return unit((-n[1], n[0], 0.0))
 
 
 @njit

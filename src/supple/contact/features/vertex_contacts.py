@@ -15,10 +15,10 @@ import math
 
 import numpy as np
 
-from supple.contact.features.contacts import has_grown, known_row, known_weight
+from supple.contact.features.contacts import has_grown, known_row, known_weight, put
 from supple.contact.features.pair_geometry import VERTEX_EDGE, VERTEX_TRIANGLE, VERTEX_VERTEX
 from supple.contact.features.vertex_features import PARTS, beyond, nearest_of_edge, share_between
-from supple.numerics.geometry.closest_points import closest_on_triangle
+from supple.numerics.geometry.closest_points import closest_on_triangle, combine
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 
@@ -50,7 +50,7 @@ def write_vertex_contacts(
     grown : (m,) weights of the vertices that are to be known [m^2], -1 where they do not change
     """
     triangles, edges, near_start, near_items = mesh
-    kinds, points, coefficients, vectors, distances, weights = out
+    kinds, points, _, vectors, distances, weights = out
     height = NEARER_SHARE * dhat
     for g in prange(len(starts) - 1):
         v = pairs[rows[starts[g, 0]], 0]
@@ -60,14 +60,8 @@ def write_vertex_contacts(
         best, nearest = saddles[v], np.inf
         for k in range(first, last):
             sign = signs[offset + k]
-            _write_contact(x, v, codes[offset + k], sign == 0, triangles, edges, kinds, points, coefficients, k)
-            for j in range(3):
-                vectors[k, j] = 0.0
-                for i in range(1, 4):
-                    # Differences of points are as small as triangles.
-                    vectors[k, j] += coefficients[k, i] * (x[points[k, i], j] - x[v, j])
+            _write_contact(x, v, codes[offset + k], sign == 0, triangles, edges, out, k)
             r = row(vectors, k)
-            distances[k] = math.sqrt(dot(r, r))
             if sign > 0:
                 nearest = min(nearest, distances[k])
                 side = 1.0
@@ -115,28 +109,26 @@ def write_vertex_contacts(
 
 
 @njit
-def _write_contact(x, v, code, plane, triangles, edges, kinds, points, coefficients, k):
-    """Kind, points and coefficients of contact k: of vertex v with the feature that a code names, or with its plane."""
-    p = row(x, v)
-    points[k, 0], coefficients[k, 0] = v, 1.0
-    for i in range(1, 4):
-        points[k, i], coefficients[k, i] = -1, 0.0
+def _write_contact(x, v, code, plane, triangles, edges, out, k):
+    """Contact k but its weight: of vertex v with the feature that a code names, or with its plane."""
+    p, zero = row(x, v), (0.0, 0.0, 0.0)
     if code < len(triangles):
-        kinds[k] = VERTEX_TRIANGLE
-        t = code
-        a, b, c = row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
+        i, j, m = triangles[code, 0], triangles[code, 1], triangles[code, 2]
+        a, b, c = row(x, i), row(x, j), row(x, m)
         u = foot_on_plane(p, a, b, c) if plane else closest_on_triangle(p, a, b, c)
-        for i in range(3):
-            points[k, i + 1], coefficients[k, i + 1] = triangles[t, i], -u[i]
+        shares = (-u[0], -u[1], -u[2])
+        # Differences of points are as small as triangles.
+        r = combine(shares, subtract(a, p), subtract(b, p), subtract(c, p))
+        put(out, k, VERTEX_TRIANGLE, (v, i, j, m), (1.0, shares[0], shares[1], shares[2]), r)
     elif code < len(triangles) + len(edges):
-        kinds[k] = VERTEX_EDGE
-        e = code - len(triangles)
-        points[k, 1], points[k, 2] = edges[e, 0], edges[e, 1]
-        w, _ = nearest_of_edge(p, row(x, points[k, 1]), row(x, points[k, 2]))
-        coefficients[k, 1], coefficients[k, 2] = w - 1.0, -w
+        i, j = edges[code - len(triangles), 0], edges[code - len(triangles), 1]
+        a, b = row(x, i), row(x, j)
+        w, _ = nearest_of_edge(p, a, b)
+        r = combine((w - 1.0, -w, 0.0), subtract(a, p), subtract(b, p), zero)
+        put(out, k, VERTEX_EDGE, (v, i, j, -1), (1.0, w - 1.0, -w, 0.0), r)
     else:
-        kinds[k] = VERTEX_VERTEX
-        points[k, 1], coefficients[k, 1] = code - len(triangles) - len(edges), -1.0
+        i = code - len(triangles) - len(edges)
+        put(out, k, VERTEX_VERTEX, (v, i, -1, -1), (1.0, -1.0, 0.0, 0.0), subtract(p, row(x, i)))
 
 
 @njit

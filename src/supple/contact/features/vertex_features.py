@@ -10,13 +10,13 @@ the plane of the face (see `vertex_contacts`).
 Source of the alternating sum: Li et al., "Convergent Incremental Potential Contact" (2023), section 4.
 """
 
-import math
-
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.contact.features.contacts import known_row
-from supple.numerics.geometry.closest_points import closest_on_triangle
-from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.contact.features.pair_geometry import unit
+from supple.numerics.geometry.closest_points import area_normal, closest_on_triangle
+from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 
 # Cosines of the angle between two faces that lie on each other, from none of the weight to all of it.
@@ -68,8 +68,9 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
     return features, squares
 
 
-@njit(cache=True)
-def grouped(pairs, features, triangles, owner):
+def grouped(
+    pairs: NDArray[np.int32], features: NDArray[np.int32], triangles: NDArray[np.int32], owner: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """The rows (m,) of the pairs that have a feature, by vertex and owner of the triangle.
 
     Parameters
@@ -80,47 +81,11 @@ def grouped(pairs, features, triangles, owner):
     -------
     rows : (m,); start : (groups + 1,) where each vertex with each owner begins
     """
-    count = np.zeros(len(owner), dtype=np.int32)
-    order = np.empty(len(owner), dtype=np.int32)
-    vertices = total = 0
-    for k in range(len(pairs)):
-        if features[k] >= 0:
-            if count[pairs[k, 0]] == 0:
-                order[vertices] = pairs[k, 0]
-                vertices += 1
-            count[pairs[k, 0]] += 1
-            total += 1
-    first = 0
-    begin = np.empty(len(owner), dtype=np.int32)
-    for g in range(vertices):
-        begin[order[g]] = first
-        first, count[order[g]] = first + count[order[g]], first
-    rows = np.empty(total, dtype=np.int32)
-    for k in range(len(pairs)):
-        if features[k] >= 0:
-            v = pairs[k, 0]
-            # Behind those of the vertex with the same owner, or a smaller one.
-            place = count[v]
-            while (
-                place > begin[v]  # rows of other vertices may not be written yet
-                and _owner(pairs, rows[place - 1], triangles, owner) > _owner(pairs, k, triangles, owner)
-            ):
-                rows[place] = rows[place - 1]
-                place -= 1
-            rows[place] = k
-            count[v] += 1
-    start = np.empty(total + 1, dtype=np.int32)
-    groups = 0
-    for i in range(total):
-        k, before = rows[i], rows[i - 1]
-        if i == 0 or (
-            pairs[k, 0] != pairs[before, 0]
-            or _owner(pairs, k, triangles, owner) != _owner(pairs, before, triangles, owner)
-        ):
-            start[groups] = i
-            groups += 1
-    start[groups] = total
-    return rows, start[: groups + 1]
+    rows = np.flatnonzero(features >= 0).astype(np.int32)
+    keys = pairs[rows, 0] * np.int64(len(owner)) + owner[triangles[pairs[rows, 1], 0]]
+    order = np.argsort(keys, kind="stable")  # most often, they are in order
+    start = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    return rows[order], np.append(start, len(rows)).astype(np.int32)
 
 
 @njit
@@ -196,12 +161,7 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reac
 @njit
 def _normal(x, triangles, t):
     """Unit normal of a triangle; zero without area."""
-    a = row(x, triangles[t, 0])
-    n = cross(subtract(row(x, triangles[t, 1]), a), subtract(row(x, triangles[t, 2]), a))
-    length = math.sqrt(dot(n, n))
-    if length == 0.0:
-        return (0.0, 0.0, 0.0)
-    return (n[0] / length, n[1] / length, n[2] / length)
+    return unit(area_normal(row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])))
 
 
 @njit
