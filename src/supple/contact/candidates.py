@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import ContactMesh
-from supple.contact.search.distances import nearer
+from supple.contact.search.distances import edge_edge_square, point_triangle_square
 from supple.contact.search.patch_search import PatchSearch
-from supple.runtime.kernel_cache import njit
+from supple.runtime.kernel_cache import njit, prange
 
 # Margins are this share of the present motion, between these shares of dhat and of the mean edge: points that move
 # little do not need a new search for several steps, and points that move far need one for any margin.
@@ -137,3 +137,14 @@ def _distance_from_way(x: NDArray[np.float64], begin: NDArray[np.float64], way: 
     part = min(max(float(np.vdot(moved, way)) / square, 0.0), 1.0) if square > 0.0 else 0.0
     moved -= part * way
     return float(np.sqrt(np.einsum("ij,ij->i", moved, moved).max(initial=0.0)))
+
+
+@njit(cache=True, parallel=True)
+def nearer(x, kind, triangles, edges, pairs, reach):
+    """Which pairs (k, 2) of points and triangles, or of edges, are nearer than `reach`."""
+    near = np.empty(len(pairs), dtype=np.bool_)
+    for k in prange(len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        square = edge_edge_square(x, edges, i, j) if kind == EDGE_EDGE else point_triangle_square(x, i, triangles, j)
+        near[k] = square < reach * reach
+    return near

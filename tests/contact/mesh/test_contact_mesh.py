@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.contact.candidates import nearer
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import contact_mesh, intersects, mesh_of_triangles
 from supple.contact.mesh.obstacles import obstacle_positions, with_obstacles
-from supple.contact.search.distances import nearer
 from supple.model.system import build_system, initial_state
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.contact_pairs import pair_table

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.candidates import CandidateFinder
+from supple.contact.candidates import CandidateFinder, nearer
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import mesh_of_triangles
-from supple.contact.search.distances import nearer
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 DHAT = 0.02

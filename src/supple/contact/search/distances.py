@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from supple.contact.features.pair_geometry import EDGE_EDGE
 from supple.numerics.geometry.closest_points import between, closest_on_segments, closest_on_triangle, combine
 from supple.numerics.mat3 import dot, row, subtract
-from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.kernel_cache import njit
 
 
 @njit(forceinline=True)
@@ -25,14 +22,3 @@ def edge_edge_square(x, edges, e, f):
     s, t = closest_on_segments(a, b, c, d)
     r = subtract(between(a, b, s), between(c, d, t))
     return dot(r, r)
-
-
-@njit(cache=True, parallel=True)
-def nearer(x, kind, triangles, edges, pairs, reach):
-    """Which pairs (k, 2) of points and triangles, or of edges, are nearer than `reach`."""
-    near = np.empty(len(pairs), dtype=np.bool_)
-    for k in prange(len(pairs)):
-        i, j = pairs[k, 0], pairs[k, 1]
-        square = edge_edge_square(x, edges, i, j) if kind == EDGE_EDGE else point_triangle_square(x, i, triangles, j)
-        near[k] = square < reach * reach
-    return near
