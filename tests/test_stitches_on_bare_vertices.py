@@ -10,9 +10,9 @@ from supple.model.state import Status
 from supple.model.system import PinRange, System
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitching import no_stitching
-from supple.solvers.implicit.energies.inertia import Inertia
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.stitches import StitchEnergy
+from supple.solvers.implicit.energies.vertex_potential import inertia as inertia_of
 from supple.solvers.implicit.inversion_guard import InversionGuard
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
@@ -71,7 +71,7 @@ def by_newton(system, x, h=0.05, steps=200):
     v = np.zeros_like(x)
     path = [x]
     for _ in range(steps):
-        objective = Objective([stitches, Inertia(system.masses, x + h * v, h * h)])
+        objective = Objective([stitches, inertia_of(system.masses, x + h * v, h * h)])
         outcome = minimize(Problem(objective, h * h, Convergence(1e-10, 1e-4), 60, 1.0), x, limits, tools)
         assert outcome.status is Status.CONVERGED, outcome.message
         v = (outcome.end.positions - x) / h

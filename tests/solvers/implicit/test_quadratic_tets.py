@@ -104,8 +104,6 @@ def test_derivatives_of_damping_and_of_the_barrier():
     assert viscosity is not None
     rate = StrainRate(50.0, viscosity.strains(system.rest_positions))
     assert_derivatives(viscosity.damping(rate), system, x, 1.0)
-    turning = np.cross([0.3, -0.2, 0.9], system.rest_positions)
-    np.testing.assert_allclose(viscosity.strain_rates(system.rest_positions, turning), 0.0, atol=1e-12)
     barrier = InversionGuard.at(system, x).quadratic_barrier(0.9)
     assert barrier is not None
     assert barrier.value(x) > 0.0

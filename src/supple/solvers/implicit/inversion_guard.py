@@ -19,9 +19,9 @@ from supple.numerics.noninverting_step import KEEP, noninverting_step, volume_si
 from supple.numerics.quadratic_noninverting_step import noninverting_step as quadratic_noninverting_step
 from supple.runtime.kernel_cache import njit, prange, read_only
 from supple.runtime.threads import threads_for
-from supple.solvers.implicit.energies.elasticity import SERIAL_TETS
 from supple.solvers.implicit.energies.quadratic.bernstein_barrier import BernsteinBarrier
 from supple.solvers.implicit.energies.quadratic.term import SERIAL_ELEMENTS
+from supple.solvers.implicit.energies.tet_elements import SERIAL_TETS
 
 
 @dataclass(frozen=True, eq=False)

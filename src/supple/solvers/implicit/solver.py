@@ -26,11 +26,12 @@ from supple.solvers.implicit.contact.points import forces_on_owners
 from supple.solvers.implicit.contact.settings import IPCContact, smallest_diagonal
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.energies.damping import quadratic_viscosity_of, viscosity_of
-from supple.solvers.implicit.energies.elasticity import SERIAL_TETS, elasticity_of
+from supple.solvers.implicit.energies.elasticity import elasticity_of
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.regularization import regularization_of
 from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
 from supple.solvers.implicit.energies.stitches import StitchEnergy
+from supple.solvers.implicit.energies.tet_elements import SERIAL_TETS
 from supple.solvers.implicit.inversion_guard import refuse_inverted
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
@@ -149,19 +150,16 @@ class Implicit(Solver):
             free_motion,
         )
         stitches = StitchEnergy.of(system.stitching, 0.0) if len(system.stitching) else None
-        viscosity = viscosity_of(elasticity)
-        damped = StitchViscosity.of(system.stitching)
+        dampers = viscosity_of(elasticity), quadratic_viscosity_of(elasticity), StitchViscosity.of(system.stitching)
         return Workspace(
             system,
             contact,
             elasticity,
-            viscosity,
             tools,
             smallest_diagonal(system),
-            regularization_of(elasticity),
+            regularization_of(system),
             stitches,
-            damped,
-            quadratic_viscosity_of(elasticity),
+            tuple(damper for damper in dampers if damper is not None),
             JointGeometry.of(system) if system.scene.joints else None,
         )
 

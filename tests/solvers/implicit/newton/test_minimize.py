@@ -12,8 +12,8 @@ from supple.model.state import Status
 from supple.model.system import System, build_system
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.solvers.implicit.contact.friction import Friction
-from supple.solvers.implicit.energies.inertia import Inertia
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.solvers.implicit.energies.vertex_potential import inertia as inertia_of
 from supple.solvers.implicit.inversion_guard import InversionGuard
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
@@ -94,7 +94,7 @@ def test_vertices_that_stick_beside_vertices_that_slide_are_found_in_few_iterati
         forces=np.array([0.3, 0.6, 3.0, 5.0]) * load,
     )
     friction = Friction(EmbeddedPoints.at_vertices(np.arange(n, dtype=np.int32)), slips, reach)
-    terms: list[Potential] = [Inertia(masses, system.rest_positions + pull, H * H), springs, friction]
+    terms: list[Potential] = [inertia_of(masses, system.rest_positions + pull, H * H), springs, friction]
     outcome = minimum(system, terms, 1e-2 * reach, system.rest_positions + pull)
     assert outcome.status is Status.CONVERGED
     moved = (outcome.end.positions - system.rest_positions)[:4, 0]
@@ -140,7 +140,7 @@ class Counting(Potential):
 def test_hessians_are_made_where_a_step_was_accepted_alone():
     system = two_tets(held=(1, 2, 3))  # what nothing holds must not feel where it is
     counted = Counting(system.rest_positions, 1e-3)
-    inertia = Inertia(np.full(len(system.masses), 1e-3), system.rest_positions, H * H)
+    inertia = inertia_of(np.full(len(system.masses), 1e-3), system.rest_positions, H * H)
     outcome = minimum(system, [inertia, counted], 1e-9, system.rest_positions)
     assert outcome.status is Status.CONVERGED
     cuts = sum(row.cuts for row in outcome.rows)

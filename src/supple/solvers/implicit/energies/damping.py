@@ -13,6 +13,7 @@ which is often used, takes the chord of a rotation for a compression, and damps 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,12 @@ from numpy.typing import NDArray
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.stretch_energies.stretches import green_strain
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
-from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
+from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
-from supple.solvers.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
-from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.solvers.implicit.energies.elasticity import Elasticity
+from supple.solvers.implicit.energies.potential import Potential
 from supple.solvers.implicit.energies.quadratic.term import OfQuadraticTets, VirtualTets
+from supple.solvers.implicit.energies.tet_elements import TetElements, TetPotential
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,115 +35,6 @@ class StrainRate:
 
     factor: float
     reference: NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Viscosity:
-    """Viscous moduli of every tet.
-
-    Attributes
-    ----------
-    mu, lam : (m,) tau times the Lamé parameters of the material's linearization at rest [Pa s]
-    """
-
-    elasticity: Elasticity
-    mu: NDArray[np.float64]
-    lam: NDArray[np.float64]
-
-    def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, 6) Green strain of every tet at positions x."""
-        return self._of_tets(x, x, False)
-
-    def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, 6) rate of the Green strain of every tet at positions x moving with v [1/s]."""
-        return self._of_tets(x, v, True)
-
-    def _of_tets(self, x: NDArray[np.float64], v: NDArray[np.float64], rates: bool) -> NDArray[np.float64]:
-        system = self.elasticity.system
-        out = np.empty((len(system.tets), 6))
-        _strains(x, v, system.tets, system.rest_shape_inverse, rates, out)
-        return out
-
-
-def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
-    """The viscosity of a system's linear tets; None where no material is damped."""
-    tau = elasticity.material.damping
-    if elasticity.quadratic is not None:
-        tau = tau.copy()
-        tau[elasticity.quadratic.rows] = 0.0
-    if not tau.any():
-        return None
-    # At the points of quadratic tets, without the part of the mean volume: it would lock them.
-    mu, lam = rest_lame_parameters(elasticity.material)
-    return Viscosity(elasticity, tau * mu, tau * lam)
-
-
-@dataclass(frozen=True, eq=False)
-class QuadraticViscosity:
-    """The viscosity at the quadrature points of quadratic tets, under the names of `Viscosity`."""
-
-    virtual: VirtualTets
-    inner: Viscosity
-
-    def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, 6) Green strain at every point."""
-        return self.inner.strains(self.virtual.corners(x))
-
-    def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, 6) its rate [1/s]."""
-        return self.inner.strain_rates(self.virtual.corners(x), self.virtual.corners(v))
-
-    def damping(self, rate: StrainRate) -> OfQuadraticTets:
-        """The dissipation potential of one step."""
-        return OfQuadraticTets(Damping(self.inner, rate), self.virtual)
-
-
-def quadratic_viscosity_of(elasticity: Elasticity) -> QuadraticViscosity | None:
-    """The viscosity of a system's quadratic tets; None where no material is damped."""
-    quadratic = elasticity.quadratic
-    inner = None if quadratic is None else viscosity_of(quadratic.at_points)
-    return None if quadratic is None or inner is None else QuadraticViscosity(quadratic.virtual, inner)
-
-
-@dataclass(frozen=True, eq=False)
-class Damping(Potential):
-    """The dissipation potential of one step."""
-
-    viscosity: Viscosity
-    rate: StrainRate
-    label = "elasticity"
-    work = "damping"
-    projection = Projection.RELEASED_FIRST
-
-    def value(self, x: NDArray[np.float64]) -> float:
-        s = self.viscosity.elasticity.system
-        out = np.empty(len(s.tets))
-        with threads_for(len(s.tets), SERIAL_TETS):
-            _energies(x, s.tets, s.rest_shape_inverse, *self._parameters(), out)
-        return float(out.sum())
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        s = self.viscosity.elasticity.system
-        gradients = np.empty((len(s.tets), 4, 3))
-        with threads_for(len(s.tets), SERIAL_TETS):
-            _gradients(x, s.tets, s.rest_shape_inverse, *self._parameters(), gradients)
-            gather_gradients(self.viscosity.elasticity.start, self.viscosity.elasticity.incidence, gradients, out)
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """With `project`, without the term of the viscous stress: what remains is positive semi-definite
-        (Gauss-Newton)."""
-        s = self.viscosity.elasticity.system
-        with threads_for(len(s.tets), SERIAL_TETS):
-            _hessians(x, s.tets, s.rest_shape_inverse, *self._parameters(), project, out.tets)
-
-    def _parameters(self):
-        volumes = self.viscosity.elasticity.system.rest_volumes
-        return volumes, self.viscosity.mu, self.viscosity.lam, self.rate.factor, self.rate.reference
-
-
-@njit
-def _symmetric_part(M):
-    return (M[0], M[4], M[8], 0.5 * (M[5] + M[7]), 0.5 * (M[2] + M[6]), 0.5 * (M[1] + M[3]))
 
 
 @njit
@@ -168,14 +60,9 @@ def _full(S):
 
 
 @njit(cache=True)
-def _strains(x, v, tets, Dm_inv, rates, out):
+def _strains(x, tets, Dm_inv, out):
     for e in range(len(tets)):
-        B = load_mat(Dm_inv, e)
-        F = mat_mul(edge_matrix(x, tets, e), B)
-        if rates:
-            E = _symmetric_part(mat_mul(transpose(F), mat_mul(edge_matrix(v, tets, e), B)))
-        else:
-            E = green_strain(F)
+        E = green_strain(deformation_gradient(x, tets, Dm_inv, e))
         for k in range(6):
             out[e, k] = E[k]
 
@@ -232,3 +119,86 @@ def _hessians(x, tets, Dm_inv, volumes, mu, lam, factor, reference, project, out
                     for j in range(3):
                         value = lam[e] * a[p, i] * a[q, j] + mu[e] * (gh * FFt[3 * i + j] + a[q, i] * a[p, j])
                         out[e, 3 * p + i, 3 * q + j] += c * value + (stress if i == j else 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Damping(TetPotential):
+    """The dissipation potential of one step.
+
+    With `project`, the Hessian is without the term of the viscous stress: what remains is positive semi-definite
+    (Gauss-Newton).
+    """
+
+    viscosity: Viscosity
+    rate: StrainRate
+    work = "damping"
+    kernels = _energies, _gradients, _hessians
+
+    @property
+    def elements(self) -> TetElements:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.viscosity.elements
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        volumes = self.viscosity.elements.rest_volumes
+        return volumes, self.viscosity.mu, self.viscosity.lam, self.rate.factor, self.rate.reference
+
+
+@dataclass(frozen=True, eq=False)
+class Viscosity:
+    """Viscous moduli of every tet.
+
+    Attributes
+    ----------
+    mu, lam : (m,) tau times the Lamé parameters of the material's linearization at rest [Pa s]
+    """
+
+    elements: TetElements
+    mu: NDArray[np.float64]
+    lam: NDArray[np.float64]
+
+    def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, 6) Green strain of every tet at positions x."""
+        out = np.empty((len(self.elements), 6))
+        _strains(x, self.elements.tets, self.elements.rest_shape_inverse, out)
+        return out
+
+    def damping(self, rate: StrainRate) -> Potential:
+        """The dissipation potential of one step."""
+        return Damping(self, rate)
+
+
+def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
+    """The viscosity of a system's linear tets; None where no material is damped."""
+    tau = elasticity.material.damping
+    if elasticity.quadratic is not None:
+        tau = tau.copy()
+        tau[elasticity.quadratic.rows] = 0.0
+    if not tau.any():
+        return None
+    # At the points of quadratic tets, without the part of the mean volume: it would lock them.
+    mu, lam = rest_lame_parameters(elasticity.material)
+    return Viscosity(elasticity.elements, tau * mu, tau * lam)
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticViscosity:
+    """The viscosity at the quadrature points of quadratic tets, under the names of `Viscosity`."""
+
+    virtual: VirtualTets
+    inner: Viscosity
+
+    def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, 6) Green strain at every point."""
+        return self.inner.strains(self.virtual.corners(x))
+
+    def damping(self, rate: StrainRate) -> Potential:
+        """The dissipation potential of one step."""
+        return OfQuadraticTets(Damping(self.inner, rate), self.virtual)
+
+
+def quadratic_viscosity_of(elasticity: Elasticity) -> QuadraticViscosity | None:
+    """The viscosity of a system's quadratic tets; None where no material is damped."""
+    quadratic = elasticity.quadratic
+    inner = None if quadratic is None else viscosity_of(quadratic.at_points)
+    return None if quadratic is None or inner is None else QuadraticViscosity(quadratic.virtual, inner)

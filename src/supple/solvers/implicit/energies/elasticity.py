@@ -18,15 +18,10 @@ from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import BY_LAW, TetMaterial
 from supple.materials.tet_energies import element_energies, element_models
 from supple.model.system import System
-from supple.numerics.sparse.block_csr import incidences
-from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.law_elasticity import NO_PRESSURES, LawElasticity, LawElements
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
 from supple.solvers.implicit.energies.quadratic.term import Gathering, OfQuadraticTets, VirtualTets
-
-# Fewer tets than this are processed by one thread: a pass of 1 ms is too short to share.
-SERIAL_TETS = 2_000
+from supple.solvers.implicit.energies.tet_elements import TetElements
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +44,8 @@ class QuadraticElasticity(OfQuadraticTets):
         """With the laws of all tets; `vertices` : their number."""
         virtual = VirtualTets(tets.quadrature, Gathering.of(tets.nodes, vertices))
         means, own = laws.at_points
-        each = np.arange(4 * virtual.count + 1, dtype=np.int32)
-        system = virtual.system()
-        every = np.ones(virtual.count, dtype=bool)
-        at_points = Elasticity(system, own, each, each[:-1], laws=_law_elasticity(system, own, every))
+        elements = virtual.elements()
+        at_points = Elasticity(elements, own, _law_elasticity(elements, own, np.ones(virtual.count, dtype=bool)))
         return cls(at_points, virtual, tets.rows, at_points, rows_of_points(laws.material), means)
 
     def value(self, x: NDArray[np.float64]) -> float:
@@ -100,15 +93,12 @@ class Elasticity(JointlyEvaluated):
     Attributes
     ----------
     material : one row per tet
-    start, incidence : for every vertex the (tet, node) pairs that name it, coded 4 tet + node
     laws : the energies of tets that are given by laws, or None
     quadratic : the energy of the quadratic tets, or None
     """
 
-    system: System
+    elements: TetElements
     material: TetMaterial
-    start: NDArray[np.int32]
-    incidence: NDArray[np.int32]
     laws: LawElasticity | None = None
     quadratic: QuadraticElasticity | None = None
     label = "elasticity"
@@ -129,9 +119,9 @@ class Elasticity(JointlyEvaluated):
         return energies
 
     def _own_energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        s = self.system
-        energies = np.empty(len(s.tets))
-        with threads_for(len(s.tets), SERIAL_TETS):
+        s = self.elements
+        energies = np.empty(len(s))
+        with s.threads():
             element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, energies)
         return energies
 
@@ -144,17 +134,17 @@ class Elasticity(JointlyEvaluated):
         pressures: NDArray[np.float64] = NO_PRESSURES,
     ) -> float:
         """See `Potential.add_model`; with pressures (m,), derivatives are of psi + pressure J, the energy of psi."""
-        s = self.system
-        energies = np.empty(len(s.tets))
-        gradients = np.empty((len(s.tets), 4, 3))
+        s = self.elements
+        energies = np.empty(len(s))
+        gradients = np.empty((len(s), 4, 3))
         of_own = np.where(self.own, pressures, 0.0) if len(pressures) else pressures
         tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, of_own
-        with threads_for(len(s.tets), SERIAL_TETS):
+        with s.threads():
             if hessian is None:
                 element_models(*tets, False, project, energies, gradients, _NO_HESSIANS)
             else:
                 hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
-            gather_gradients(self.start, self.incidence, gradients, gradient)
+            s.gather(gradients, gradient)
         total = float(energies.sum())
         if self.laws is not None:
             total += self.laws.add_model(x, gradient, hessian, project, pressures)
@@ -209,38 +199,23 @@ def elasticity_of(system: System) -> Elasticity:
                 f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
                 "give it an elastic one such as StableNeoHookean"
             )
-    start, incidence = incidences(system.tets, len(system.rest_positions))
+    elements = TetElements.of_system(system)
     material, quadratic = system.laws.material, None
     own = np.ones(len(system.tets), dtype=bool)
     if system.quadratic is not None:
         quadratic = QuadraticElasticity.of(system.quadratic, system.laws, len(system.rest_positions))
         own[system.quadratic.rows] = False
-    laws = _law_elasticity(system, material, own)
-    return Elasticity(system, material, start, incidence, laws, quadratic)
+    return Elasticity(elements, material, _law_elasticity(elements, material, own), quadratic)
 
 
-def _law_elasticity(system: System, material: TetMaterial, own: NDArray[np.bool_]) -> LawElasticity | None:
+def _law_elasticity(elements: TetElements, material: TetMaterial, own: NDArray[np.bool_]) -> LawElasticity | None:
     """The laws of all tets of a material; of elastic ones, those of the tets (m,) that have an energy of their own."""
-    arrays = system.tets, system.rest_shape_inverse, system.rest_volumes
+    arrays = elements.tets, elements.rest_shape_inverse, elements.rest_volumes
     elastic = [LawElements.of(part.selected(own), *arrays) for part in material.elastic_laws]
     flowing = [
         (LawElements.of(part, *arrays), part.flow, rows)
         for part, rows in material.flowing_laws
         if part.flow is not None and part.points == 1 and len(part.rows)
     ]
-    elements = tuple(each for each in elastic if len(each.rows))
-    return LawElasticity(elements, tuple(flowing)) if elements or flowing else None
-
-
-@njit(cache=True, parallel=True)
-def gather_gradients(start, incidence, gradients, out):
-    """Add every tet's gradient (m, 4, 3) to its nodes' rows of out (n, 3), in the order of the tets."""
-    for i in prange(len(start) - 1):
-        a, b, c = out[i, 0], out[i, 1], out[i, 2]
-        for p in range(start[i], start[i + 1]):
-            e = incidence[p] >> 2
-            k = incidence[p] & 3
-            a += gradients[e, k, 0]
-            b += gradients[e, k, 1]
-            c += gradients[e, k, 2]
-        out[i, 0], out[i, 1], out[i, 2] = a, b, c
+    parts = tuple(each for each in elastic if len(each.rows))
+    return LawElasticity(parts, tuple(flowing)) if parts or flowing else None

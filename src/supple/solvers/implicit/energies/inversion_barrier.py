@@ -22,71 +22,10 @@ from supple.materials.kinds import infinite_when_flat
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.mat3 import cross, det, dot, load_mat
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
-from supple.solvers.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
-from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.solvers.implicit.energies.elasticity import Elasticity
+from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.quadratic.bernstein_barrier import barrier_derivatives
-
-
-@dataclass(frozen=True, eq=False)
-class InversionBarrier(Potential):
-    """The barrier of the tets that have a stiffness here.
-
-    Attributes
-    ----------
-    stiffness : (m,) kappa V [J], zero for tets without a barrier
-    onset : J0 [-]
-    """
-
-    elasticity: Elasticity
-    stiffness: NDArray[np.float64]
-    onset: float
-    label = "elasticity"
-    projection = Projection.RELEASED_FIRST
-
-    def value(self, x: NDArray[np.float64]) -> float:
-        s = self.elasticity.system
-        out = np.empty(len(s.tets))
-        with threads_for(len(s.tets), SERIAL_TETS):
-            _energies(x, s.tets, s.rest_shape_inverse, self.stiffness, self.onset, out)
-        return float(out.sum())
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        s = self.elasticity.system
-        gradients = np.empty((len(s.tets), 4, 3))
-        with threads_for(len(s.tets), SERIAL_TETS):
-            _gradients(x, s.tets, s.rest_shape_inverse, self.stiffness, self.onset, gradients)
-            gather_gradients(self.elasticity.start, self.elasticity.incidence, gradients, out)
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """With `project`, without the term of the second derivative of J, whose factor is negative."""
-        s = self.elasticity.system
-        with threads_for(len(s.tets), SERIAL_TETS):
-            _hessians(x, s.tets, s.rest_shape_inverse, self.stiffness, self.onset, project, out.tets)
-
-    def add_model(
-        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
-    ) -> float:
-        """See `Potential.add_model`; most often no tet is below the onset, and the energy alone shows that."""
-        energy = self.value(x)
-        if energy:
-            self.add_gradient(x, gradient)
-            if hessian is not None:
-                self.add_hessian(x, hessian, project)
-        return energy
-
-
-def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset: float) -> InversionBarrier | None:
-    """The barrier below J = `onset` of the guarded tets whose energy has none; None where no such tet exists."""
-    material = elasticity.material
-    if elasticity.quadratic is not None:
-        guarded = guarded.copy()
-        guarded[elasticity.quadratic.rows] = False
-    wanted = guarded & ~infinite_when_flat(material)
-    if not wanted.any():
-        return None
-    kappa = onset * (material.mu + np.abs(material.lam))
-    return InversionBarrier(elasticity, np.where(wanted, kappa * elasticity.system.rest_volumes, 0.0), onset)
+from supple.solvers.implicit.energies.tet_elements import TetElements, TetPotential
 
 
 @njit
@@ -147,3 +86,50 @@ def _cofactors(F):
 @njit(cache=True)
 def _times(A, v):
     return (dot(A[:3], v), dot(A[3:6], v), dot(A[6:], v))
+
+
+@dataclass(frozen=True, eq=False)
+class InversionBarrier(TetPotential):
+    """The barrier of the tets that have a stiffness here.
+
+    With `project`, the Hessian is without the term of the second derivative of J, whose factor is negative.
+
+    Attributes
+    ----------
+    stiffness : (m,) kappa V [J], zero for tets without a barrier
+    onset : J0 [-]
+    """
+
+    elements: TetElements
+    stiffness: NDArray[np.float64]
+    onset: float
+    kernels = _energies, _gradients, _hessians
+
+    @property
+    def parameters(self) -> tuple[NDArray[np.float64], float]:
+        return self.stiffness, self.onset
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        """See `Potential.add_model`; most often no tet is below the onset, and the energy alone shows that."""
+        energy = self.value(x)
+        if energy:
+            self.add_gradient(x, gradient)
+            if hessian is not None:
+                self.add_hessian(x, hessian, project)
+        return energy
+
+
+def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset: float) -> InversionBarrier | None:
+    """The barrier below J = `onset` of the guarded tets whose energy has none; None where no such tet exists."""
+    material = elasticity.material
+    if elasticity.quadratic is not None:
+        guarded = guarded.copy()
+        guarded[elasticity.quadratic.rows] = False
+    wanted = guarded & ~infinite_when_flat(material)
+    if not wanted.any():
+        return None
+    kappa = onset * (material.mu + np.abs(material.lam))
+    elements = elasticity.elements
+    return InversionBarrier(elements, np.where(wanted, kappa * elements.rest_volumes, 0.0), onset)

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from supple.materials.laws.internal import inverse_flow
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.per_tet import Flow, Law, LawTets
+from supple.materials.tet_energies import put_gradient
 from supple.numerics.deformation import deformation_gradients
+from supple.numerics.mat3 import load_mat
 from supple.runtime.kernel_cache import njit, prange
 from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
+from supple.solvers.implicit.energies.tet_elements import SERIAL_TETS
 
-_SERIAL_TETS = 2_000
 NO_PRESSURES = np.zeros(0)
 
 
@@ -117,7 +119,7 @@ class LawElasticity(JointlyEvaluated):
                 psi, P, H = each.law.models(*arguments)
             total += float((each.volumes * psi).sum())
             forces = np.empty((len(psi), 4, 3))
-            with threads_for(len(psi), _SERIAL_TETS):
+            with threads_for(len(psi), SERIAL_TETS):
                 element_forces(P, each.B, each.volumes, forces)
                 if hessian is not None:
                     blocks = np.empty((len(psi), 12, 12))
@@ -133,13 +135,7 @@ class LawElasticity(JointlyEvaluated):
 def element_forces(P, B, volumes, out):
     """The gradients (k, 4, 3) by the nodes [N] of stresses P (k, 3, 3), with B (k, 3, 3) and volumes (k,)."""
     for e in prange(len(P)):
-        for i in range(3):
-            total = 0.0
-            for p in range(3):
-                force = volumes[e] * (P[e, i, 0] * B[e, p, 0] + P[e, i, 1] * B[e, p, 1] + P[e, i, 2] * B[e, p, 2])
-                out[e, p + 1, i] = force
-                total += force
-            out[e, 0, i] = -total
+        put_gradient(load_mat(P, e), load_mat(B, e), volumes[e], out, e)
 
 
 @njit(parallel=True, cache=True)

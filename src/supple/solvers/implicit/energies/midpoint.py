@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Wrapped
 
 
 @dataclass(frozen=True, eq=False)
-class ActingWithin(Potential):
+class ActingWithin(Wrapped):
     """A potential V whose force acts at x_n + p (x - x_n), as a potential V / p^2 of the end x of the step.
 
     Its gradient is grad V / p, and its Hessian is that of V. The factor 1 / p of the force is that of the whole
@@ -19,49 +19,34 @@ class ActingWithin(Potential):
 
     Parameters
     ----------
-    term : V; start : x_n (n, 3) [m]; place : p, above 0 and at most 1
+    inner : V; start : x_n (n, 3) [m]; place : p, above 0 and at most 1
     """
 
-    term: Potential
+    inner: Potential
     start: NDArray[np.float64]
     place: float
 
-    @property
-    def label(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """The label of V."""
-        return self.term.label
-
-    @property
-    def work(self) -> str | None:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """That of V."""
-        return self.term.work
-
-    @property
-    def projection(self) -> Projection:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """That of V."""
-        return self.term.projection
-
     def value(self, x: NDArray[np.float64]) -> float:
-        return self.term.value(self._within(x)) / self.place**2
+        return self.inner.value(self._within(x)) / self.place**2
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         gradient = np.zeros_like(out)
-        self.term.add_gradient(self._within(x), gradient)
+        self.inner.add_gradient(self._within(x), gradient)
         out += gradient / self.place
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        self.term.add_hessian(self._within(x), out, project)
+        self.inner.add_hessian(self._within(x), out, project)
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float:
         own = np.zeros_like(gradient)
-        value = self.term.add_model(self._within(x), own, hessian, project)
+        value = self.inner.add_model(self._within(x), own, hessian, project)
         gradient += own / self.place
         return value / self.place**2
 
     def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
-        self.term.renew(self._within(x), self.place * direction)
+        self.inner.renew(self._within(x), self.place * direction)
 
     def _within(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.start + self.place * (x - self.start)

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,9 +113,9 @@ class Potential(ABC):
         store, for actuators, whose work is that of their generalized forces, and for numerical aids
     """
 
-    label: ClassVar[str] = "other"
-    projection: ClassVar[Projection]
-    work: ClassVar[str | None] = None
+    label: str = "other"
+    projection: Projection
+    work: str | None = None
 
     @abstractmethod
     def value(self, x: NDArray[np.float64]) -> float:
@@ -164,6 +163,24 @@ class JointlyEvaluated(Potential):
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float: ...
+
+
+class Wrapped(Potential):
+    """A potential made of an inner one, with the label, work and projection of that."""
+
+    inner: Potential
+
+    @property
+    def label(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.inner.label
+
+    @property
+    def work(self) -> str | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.inner.work
+
+    @property
+    def projection(self) -> Projection:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.inner.projection
 
 
 class ContactPotential(Potential):

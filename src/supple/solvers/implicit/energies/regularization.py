@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.solvers.implicit.energies.elasticity import Elasticity
+from supple.model.system import System
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
 
 # Relative to the vertex's own elastic stiffness: far above its round-off (1e-16), and far below what slows Newton's
@@ -38,16 +38,16 @@ class Regularization(Potential):
                 out.vertices[:, k, k] += self.stiffness
 
 
-def regularization_of(elasticity: Elasticity) -> Regularization:
+def regularization_of(system: System) -> Regularization:
     """In proportion to mu V |g|^2, summed over a vertex's tets, with shape gradients g."""
-    system = elasticity.system
+    mu = system.laws.material.mu
     squares = np.einsum("eij,eij->e", system.rest_shape_inverse, system.rest_shape_inverse)
-    share = _SHARE * elasticity.material.mu * system.rest_volumes * squares
+    share = _SHARE * mu * system.rest_volumes * squares
     stiffness = np.bincount(system.tets.ravel(), weights=np.repeat(share, 4), minlength=len(system.rest_positions))
     stiffness = stiffness.astype(np.float64)
     if system.quadratic is not None:
         points = system.quadratic.quadrature
         squares = np.einsum("ks,ksai,ksai->ka", points.volumes, points.gradients, points.gradients)
-        share = _SHARE * elasticity.material.mu[system.quadratic.rows, None] * squares
+        share = _SHARE * mu[system.quadratic.rows, None] * squares
         stiffness += np.bincount(points.nodes.ravel(), weights=share.ravel(), minlength=len(stiffness))
     return Regularization(stiffness)

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.sparse.block_csr import incidences
 from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.stitching import Stitching
-from supple.solvers.implicit.energies.damping import Damping, StrainRate, Viscosity
-from supple.solvers.implicit.energies.elasticity import Elasticity
+from supple.solvers.implicit.energies.damping import Damping, QuadraticViscosity, StrainRate, Viscosity
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.solvers.implicit.energies.stitches import spring_energies, spring_gradients, spring_hessians
+from supple.solvers.implicit.energies.tet_elements import TetElements
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +33,11 @@ class StitchViscosity:
         tets, springs = stitching.tets, stitching.springs
         if not tets.damping.any() and not springs.damping.any():
             return None
-        # Stitch tets under the names of a system's tets.
-        elements: Any = SimpleNamespace(
-            tets=tets.vertices, rest_shape_inverse=tets.rest_shape_inverse, rest_volumes=tets.rest_volumes
-        )
-        gathering = incidences(tets.vertices, stitching.body_vertices)
-        elasticity = Elasticity(elements, cast(Any, None), *gathering)
+        arrays = tets.vertices, tets.rest_shape_inverse, tets.rest_volumes
+        elements = TetElements.of(*arrays, stitching.body_vertices)
         # The Lamé parameters of small strains; the viscous bulk modulus is not below zero.
         mu, lam = tets.mu, np.maximum(tets.lam - tets.mu, -2.0 / 3.0 * tets.mu)
-        viscosity = Viscosity(elasticity, tets.damping * mu, tets.damping * lam)
+        viscosity = Viscosity(elements, tets.damping * mu, tets.damping * lam)
         return cls(viscosity, replace(springs, stiffness=springs.stiffness * springs.damping))
 
     def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -52,12 +45,16 @@ class StitchViscosity:
         lengths = np.linalg.norm(self.springs.extensions(x), axis=1)
         return np.concatenate([self.tets.strains(x).ravel(), lengths])
 
-    def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Their rates at positions x moving with v [1/s], [m/s]."""
-        d = self.springs.extensions(x)
-        lengths = np.linalg.norm(d, axis=1)
-        along = np.einsum("ki,ki->k", d, self.springs.extensions(v)) / np.where(lengths > 0.0, lengths, 1.0)
-        return np.concatenate([self.tets.strain_rates(x, v).ravel(), along])
+    def damping(self, rate: StrainRate) -> StitchDamping:
+        """The dissipation potential of one step, with the rates of `strains`."""
+        count = 6 * len(self.tets.mu)
+        tets = StrainRate(rate.factor, np.ascontiguousarray(rate.reference[:count].reshape(-1, 6)))
+        stiffness = rate.factor * self.springs.stiffness
+        springs = replace(self.springs, stiffness=stiffness, rest_lengths=rate.reference[count:])
+        return StitchDamping(Damping(self.tets, tets), springs)
+
+
+Damper = Viscosity | QuadraticViscosity | StitchViscosity
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,18 +65,6 @@ class StitchDamping(Potential):
     springs: Springs
     projection = Projection.RELEASED_FIRST
     work = "damping"
-
-    @classmethod
-    def of(cls, viscosity: StitchViscosity, rate: StrainRate) -> StitchDamping:
-        """With the rates of `viscosity.strains`."""
-        count = 6 * len(viscosity.tets.mu)
-        tets = StrainRate(rate.factor, np.ascontiguousarray(rate.reference[:count].reshape(-1, 6)))
-        springs = replace(
-            viscosity.springs,
-            stiffness=rate.factor * viscosity.springs.stiffness,
-            rest_lengths=rate.reference[count:],
-        )
-        return cls(Damping(viscosity.tets, tets), springs)
 
     def value(self, x: NDArray[np.float64]) -> float:
         return self.tets.value(x) + float(spring_energies(self.springs, x).sum())

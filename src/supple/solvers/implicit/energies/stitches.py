@@ -21,8 +21,8 @@ from supple.numerics.sparse.block_csr import incidences
 from supple.runtime.threads import threads_for
 from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.stitching import Stitching
-from supple.solvers.implicit.energies.elasticity import SERIAL_TETS, gather_gradients
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.solvers.implicit.energies.tet_elements import SERIAL_TETS, add_by_vertex
 
 # Energy, gradient and Hessian of springs between vertices and points of edges: k/2 (|d| - l)^2.
 #
@@ -108,7 +108,7 @@ class StitchEnergy(Potential):
         with threads_for(count, SERIAL_TETS):
             element_gradients(points, *self._tets, gradients[:count])
             spring_gradients(self.stitching.springs, points, gradients[count:])
-            gather_gradients(*self.gathering, gradients, out)
+            add_by_vertex(*self.gathering, gradients.reshape(-1, 3), out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         points, count = self._points(x), len(self.stitching.tets)

@@ -66,8 +66,9 @@ class Conservation:
     latest: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @classmethod
-    def of(cls, elasticity: Elasticity, stitches: StitchEnergy | None, free: FreeMotion) -> Conservation:
-        system = elasticity.system
+    def of(
+        cls, system: System, elasticity: Elasticity, stitches: StitchEnergy | None, free: FreeMotion
+    ) -> Conservation:
         return cls(system, elasticity, stitches, system.joined_components, free)
 
     def restore_momentum(self, before: State, end: State, residual: NDArray[np.float64]) -> None:

@@ -23,11 +23,9 @@ from supple.model.state import State
 from supple.model.system import System
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.motors import VelocityMotor
-from supple.solvers.implicit.energies.damping import QuadraticViscosity, StrainRate, Viscosity
-from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
+from supple.solvers.implicit.energies.damping import StrainRate
+from supple.solvers.implicit.energies.stitch_damping import Damper
 from supple.solvers.implicit.stepping.conservation import Conservation
-
-Damped = Viscosity | QuadraticViscosity | StitchViscosity
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +46,7 @@ class Plan:
     scale: float | None
     predicted: NDArray[np.float64]
     velocity: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    strain_rate: Callable[[Damped], StrainRate]
+    strain_rate: Callable[[Damper], StrainRate]
     memory: History | None = None
     place: float = 1.0
 
@@ -170,7 +168,7 @@ class BDF2(Integrator):
         old_x = one * x - two * past.positions
         old_v = one * v - two * past.velocities
 
-        def strain_rate(damped: Damped) -> StrainRate:
+        def strain_rate(damped: Damper) -> StrainRate:
             return StrainRate(1.0 / b, one * damped.strains(x) - two * damped.strains(past.positions))
 
         return Plan(
@@ -218,10 +216,11 @@ class Newmark(Integrator):
             at_end[pinned] = (end[pinned] - x[pinned]) / h
             return at_end
 
-        def strain_rate(damped: Damped) -> StrainRate:
-            # The difference quotient over half a step belongs to its middle. The last terms move the rate to its end.
+        def strain_rate(damped: Damper) -> StrainRate:
+            # The difference quotient over half a step belongs to its middle. The curvature of strains along v, half of
+            # their second difference, moves the rate to its end.
             strains = damped.strains(x)
-            curvature = damped.strains(half) - strains - 0.5 * h * damped.strain_rates(x, v)
+            curvature = 0.5 * (damped.strains(half) + damped.strains(x - 0.5 * h * v)) - strains
             return StrainRate(2.0 / h, strains - curvature)
 
         return Plan(scale=0.25 * h * h, predicted=x + h * v, velocity=velocity, strain_rate=strain_rate, place=0.5)

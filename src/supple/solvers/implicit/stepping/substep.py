@@ -10,17 +10,15 @@ from numpy.typing import NDArray
 
 from supple.model.state import State, Status
 from supple.model.system import System
-from supple.solvers.implicit.energies.damping import Damping
 from supple.solvers.implicit.energies.elasticity import Elasticity
-from supple.solvers.implicit.energies.inertia import Inertia
 from supple.solvers.implicit.energies.inversion_barrier import inversion_barrier
 from supple.solvers.implicit.energies.loads.actuators import actuators_at, muscles_at
-from supple.solvers.implicit.energies.loads.external_forces import ExternalForces, total_forces
+from supple.solvers.implicit.energies.loads.external_forces import total_forces
 from supple.solvers.implicit.energies.loads.pressure import drags_at, pressures_at
 from supple.solvers.implicit.energies.loads.springs import soft_targets_at, springs_at
 from supple.solvers.implicit.energies.midpoint import ActingWithin
 from supple.solvers.implicit.energies.potential import Potential
-from supple.solvers.implicit.energies.stitch_damping import StitchDamping
+from supple.solvers.implicit.energies.vertex_potential import VertexPotential, inertia
 from supple.solvers.implicit.inversion_guard import InversionGuard
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
 from supple.solvers.implicit.newton.linearize import FEW, linearize
@@ -226,23 +224,17 @@ def _objective(
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
     if forces.any():
-        terms.append(ExternalForces(forces, x))
-    if system.soft_targets:
-        terms.append(soft_targets_at(system, time))
+        terms.append(VertexPotential(x, np.zeros(len(x)), forces))
+    terms += soft_targets_at(system, time)
     terms += pressures_at(system, x, time)
     terms += springs_at(system, time)
     terms += muscles_at(system, time)
     terms += more
-    if plan.scale is not None and workspace.viscosity is not None:
-        terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
-    if plan.scale is not None and workspace.quadratic_viscosity is not None:
-        terms.append(workspace.quadratic_viscosity.damping(plan.strain_rate(workspace.quadratic_viscosity)))
-    if plan.scale is not None and workspace.stitch_viscosity is not None:
-        rate = plan.strain_rate(workspace.stitch_viscosity)
-        terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
+    if plan.scale is not None:
+        terms += [damper.damping(plan.strain_rate(damper)) for damper in workspace.dampers]
     if plan.place != 1.0:
         terms = [ActingWithin(term, x, plan.place) for term in terms]
-    terms.append(workspace.regularization if plan.scale is None else Inertia(system.masses, plan.predicted, plan.scale))
+    terms.append(workspace.regularization if plan.scale is None else inertia(system.masses, plan.predicted, plan.scale))
     return Objective(terms, workspace.tools.clock)
 
 

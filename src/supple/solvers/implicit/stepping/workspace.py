@@ -13,10 +13,9 @@ from supple.model.state import State
 from supple.model.stitched_points import stitched_state
 from supple.model.system import System
 from supple.solvers.implicit.contact.model import ContactModel
-from supple.solvers.implicit.energies.damping import QuadraticViscosity, Viscosity
 from supple.solvers.implicit.energies.elasticity import Elasticity, elasticity_of
 from supple.solvers.implicit.energies.regularization import Regularization
-from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
+from supple.solvers.implicit.energies.stitch_damping import Damper
 from supple.solvers.implicit.energies.stitches import StitchEnergy
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.stepping.conservation import Conservation
@@ -37,20 +36,18 @@ class Workspace:
     system: System
     contact: ContactModel | None
     elasticity: Elasticity
-    viscosity: Viscosity | None
     tools: Tools
     diagonal: float
     regularization: Regularization
     stitches: StitchEnergy | None
-    stitch_viscosity: StitchViscosity | None
-    quadratic_viscosity: QuadraticViscosity | None
+    dampers: tuple[Damper, ...]
     joints: JointGeometry | None
     checked: State | None = None
     grown: tuple[Growth, Elasticity] | None = None
     conservation: Conservation = field(init=False)
 
     def __post_init__(self) -> None:
-        self.conservation = Conservation.of(self.elasticity, self.stitches, self.tools.free_motion)
+        self.conservation = Conservation.of(self.system, self.elasticity, self.stitches, self.tools.free_motion)
 
     @property
     def bodies_end(self) -> int:

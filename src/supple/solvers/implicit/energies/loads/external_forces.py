@@ -1,8 +1,6 @@
-"""Loads that do not change within a step, gravity among them, as a potential: -f . x."""
+"""Loads that do not change within a step, gravity among them, and their works."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,30 +9,6 @@ from supple.model.loads.applied import DeadLoad, MassLoad
 from supple.model.loads.muscles import FibreTension
 from supple.model.state import State
 from supple.model.system import System
-from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
-
-
-@dataclass(frozen=True, eq=False)
-class ExternalForces(Potential):
-    """Forces that do not depend on where the vertices are.
-
-    Parameters
-    ----------
-    forces : (n, 3) [N]; origin : (n, 3) where the energy is zero [m]
-    """
-
-    forces: NDArray[np.float64]
-    origin: NDArray[np.float64]
-    projection = Projection.UNNEEDED
-
-    def value(self, x: NDArray[np.float64]) -> float:
-        return -float(np.einsum("ij,ij->", self.forces, x - self.origin))
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        out -= self.forces
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """Zero."""
 
 
 def works_of_loads(

@@ -32,15 +32,6 @@ def element_forces(gradients, forces, out):
 
 
 @njit(cache=True, parallel=True)
-def add_by_vertex(start, entries, forces, out):
-    """Add forces (m, 3) to the vertices' rows of out: those of vertex v are entries[start[v] : start[v + 1]]."""
-    for v in prange(len(start) - 1):
-        for p in range(start[v], start[v + 1]):
-            for i in range(3):
-                out[v, i] += forces[entries[p], i]
-
-
-@njit(cache=True, parallel=True)
 def element_blocks(gradients, hessians, out):
     """(k, 10, 10, 3, 3) blocks of nodes a <= b of each element, from the Hessians (k s, 12, 12) of virtual tets."""
     for e in prange(len(gradients)):

@@ -9,8 +9,6 @@ so the gradient is W^T g, and the Hessian W^T H W.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +16,8 @@ from numpy.typing import NDArray
 from supple.materials.elastic_tets.quadratic import PointsInTets
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.threads import threads_for
-from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Potential, Projection
+from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Potential, Wrapped
 from supple.solvers.implicit.energies.quadratic.kernels import (
-    add_by_vertex,
     add_products,
     determinants_of,
     element_blocks,
@@ -29,6 +26,7 @@ from supple.solvers.implicit.energies.quadratic.kernels import (
     sum_pairs,
     volume_pushes,
 )
+from supple.solvers.implicit.energies.tet_elements import TetElements, add_by_vertex
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +78,11 @@ class VirtualTets:
     def count(self) -> int:
         return self.points.volumes.size
 
-    def system(self) -> Any:
-        """The virtual tets under the names of a system's tets."""
+    def elements(self) -> TetElements:
+        """The virtual tets."""
         unit = np.ascontiguousarray(np.broadcast_to(np.eye(3), (self.count, 3, 3)))
-        tets = np.arange(4 * self.count, dtype=np.int32).reshape(-1, 4)
-        return SimpleNamespace(tets=tets, rest_shape_inverse=unit, rest_volumes=self.points.volumes.ravel())
+        each = np.arange(4 * self.count + 1, dtype=np.int32)
+        return TetElements(each[:-1].reshape(-1, 4), unit, self.points.volumes.ravel(), each, each[:-1])
 
     def corners(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(4 m, 3) corners of the virtual tets for positions, or velocities, x (n, 3)."""
@@ -141,31 +139,16 @@ class VirtualTets:
 
 
 @dataclass(frozen=True, eq=False)
-class OfQuadraticTets(JointlyEvaluated):
+class OfQuadraticTets(Wrapped, JointlyEvaluated):
     """A potential of tets, acting on the virtual tets of quadratic ones.
 
     Parameters
     ----------
-    inner : made for `virtual.system()`; it may add nothing but matrices of tets to a Hessian.
+    inner : made for `virtual.elements()`; it may add nothing but matrices of tets to a Hessian.
     """
 
     inner: Potential
     virtual: VirtualTets
-
-    @property
-    def label(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """The label of the inner potential."""
-        return self.inner.label
-
-    @property
-    def work(self) -> str | None:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """That of the inner potential."""
-        return self.inner.work
-
-    @property
-    def projection(self) -> Projection:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """That of the inner potential."""
-        return self.inner.projection
 
     def value(self, x: NDArray[np.float64]) -> float:
         return self.inner.value(self.virtual.corners(x))
