@@ -6,6 +6,7 @@ import sys
 
 import numba
 import pytest
+from threadpoolctl import ThreadpoolController
 
 from supple.runtime.threads import is_alone, numba_threads
 
@@ -51,3 +52,38 @@ def test_one_thread_is_known_without_a_question_until_the_block_ends():
         assert is_alone()
         assert numba.get_num_threads() == 1
     assert (numba.get_num_threads(), is_alone()) == before
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="there is one thread")  # pyright: ignore
+def test_where_several_threads_run_blas_has_one():
+    blas = ThreadpoolController().select(internal_api="openblas")
+
+    def counts() -> set[int]:
+        return {library["num_threads"] for library in blas.info()}
+
+    with blas.limit(limits=2):
+        with numba_threads(1):
+            assert counts() == {2}
+        with numba_threads(2):
+            with numba_threads(None):
+                assert counts() == {1}
+            assert counts() == {1}
+        assert counts() == {2}
+
+
+def test_the_thread_pool_is_that_of_openmp_where_it_can_be_had():
+    code = (
+        "import numba, numpy as np, supple.runtime.threads\n"
+        "from numba.np.ufunc.omppool import openmp_vendor\n"
+        "@numba.njit(parallel=True)\n"
+        "def fill(out):\n"
+        "    for i in numba.prange(len(out)):\n"
+        "        out[i] = i\n"
+        "fill(np.zeros(10))\n"
+        "print(numba.threading_layer())"
+    )
+    chosen = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_THREADING")}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=chosen)
+    if "omppool" in done.stderr:
+        pytest.skip("Numba has no OpenMP here")
+    assert done.stdout == "omp\n", done.stderr

@@ -16,7 +16,6 @@ from supple.materials.fit_curves import MODES, Curve, nominal_stresses, read_cur
 from supple.materials.fit_families import Family, family_of
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.runtime.figures import paper_figure
-from supple.runtime.threads import threads_for
 
 _COLORS = {"uniaxial": "#30638e", "equibiaxial": "#d1495b", "pure_shear": "#3a7d44"}
 
@@ -51,8 +50,6 @@ Source = str | Path | ArrayLike
 _BULK_RATIO = 500.0
 # Evaluations of a fit from each start; the best one goes on.
 _ROUGH = 200
-# Curves have too few points to be shared among threads.
-_SERIAL_CURVES = 1_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,10 +189,9 @@ def _solved(family: Family, curves: Sequence[Curve], scale: float, confidence: f
         return np.nan_to_num(np.concatenate(parts), nan=1e6, posinf=1e6, neginf=-1e6)
 
     accurate = {"method": "lm", "x_scale": "jac", "xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
-    with threads_for(len(curves), _SERIAL_CURVES):
-        starts = list(family.starts(residuals, units))
-        rough = [least_squares(residuals, start, method="lm", max_nfev=_ROUGH) for start in starts]
-        best = least_squares(residuals, min(rough, key=lambda found: found.cost).x, **accurate)
+    starts = list(family.starts(residuals, units))
+    rough = [least_squares(residuals, start, method="lm", max_nfev=_ROUGH) for start in starts]
+    best = least_squares(residuals, min(rough, key=lambda found: found.cost).x, **accurate)
     freedom = len(best.fun) - len(best.x)
     R = np.linalg.qr(best.jac, mode="r")
     if np.linalg.cond(R) > 1e12:

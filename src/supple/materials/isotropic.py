@@ -190,6 +190,9 @@ def functions_of(kind: int) -> dict[str, Any]:
     return names
 
 
+# Tets from which several threads evaluate what is cheap, once a frame; fewer compile no second form of a kernel.
+_SHARED_FROM = 20_000
+
 _FUNCTIONS = {kind: functions_of(kind) for kind in (UNKNOWN, *range(len(STRETCH_ENERGIES)))}
 
 
@@ -241,7 +244,7 @@ def _rest_moduli(kind, mu, lam, rest_mu, rest_lam):
             rest_lam[e] = A[3]
 
 
-@kernel_of_kinds(parallel=True)
+@kernel_of_kinds(parallel=True, rows=_SHARED_FROM)
 def densities(F, kind, mu, lam, out):
     """Energy densities (m,) of F (m, 3, 3), into `out`."""
     for e in prange(len(F)):
@@ -249,7 +252,7 @@ def densities(F, kind, mu, lam, out):
             out[e] = energy_density(load_mat(F, e), mu[e], lam[e])
 
 
-@kernel_of_kinds(parallel=True)
+@kernel_of_kinds(parallel=True, rows=_SHARED_FROM)
 def piolas(F, kind, mu, lam, out):
     """Stresses (m, 3, 3) of F (m, 3, 3), into `out`."""
     for e in prange(len(F)):

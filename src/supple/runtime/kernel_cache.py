@@ -39,7 +39,7 @@ from supple.runtime.parallel_kernel import ParallelKernel
 from supple.runtime.reached_code import code_of_module, reached_code
 
 # Below this many rows, a loop ends before a second thread has started.
-ROWS = 2_000
+ROWS = 500
 # Bytes of bytecode, with those of inlined calls, up to which an inner function is always inlined. A call that remains
 # passes the arrays of a tuple one by one and counts their references: a sweep over rows of contacts takes four times as
 # long. Functions with exact sums have `forceinline=False`: their code is long, and exact tests of triangles would take

@@ -2,7 +2,7 @@
 
 Threads that synchronize forty times a frame are faster on an idle machine. Where another process uses one of the
 cores, a frame can take ten times as long. This cannot be predicted. Both modes give the same bits, so the faster one
-is used. The unit that is timed is called a task here: a substep of XPBD, or a linear system of Newton's method.
+is used. The unit that is timed is called a task here: a substep of XPBD, or the assembly of a Newton matrix.
 """
 
 from __future__ import annotations
@@ -80,6 +80,13 @@ class ThreadTuner:
         if parallel:
             return numba_threads(threads)
         return one_thread() if self.choice else numba_threads(1)
+
+    def blocks(self, count: int, threads: int) -> Iterator[int]:
+        """The numbers of this many blocks, each in the present mode. It can be interrupted before each."""
+        for k in range(count):
+            interruption_point()
+            with self.threads(self.parallel, threads):
+                yield k
 
     def tasks(self, count: int, threads: int) -> Iterator[int]:
         """The numbers of this many tasks, each on several threads or on one; their times are noted.

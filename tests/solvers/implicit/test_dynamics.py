@@ -7,6 +7,8 @@ import pytest
 from tests.scenes import at_start, converged
 
 import supple as sp
+from supple.runtime import parallel_kernel
+from supple.solvers.implicit import solver
 from supple.solvers.implicit.solver import Implicit
 
 DYNAMIC = ("backward_euler", "bdf2", "newmark")
@@ -158,36 +160,22 @@ def test_a_restart_without_memory_begins_bdf2_with_backward_euler():
     assert np.array_equal(restarted.positions["cube"], euler.positions["cube"])
 
 
-def test_same_bits_on_one_and_two_threads():
+def test_same_bits_on_one_and_two_threads(monkeypatch):
     import numba
 
     if numba.config.NUMBA_NUM_THREADS < 2:
         pytest.skip("this machine has one core")
-    from supple.numerics.sparse import block_csr, pcg
-    from supple.solvers.implicit.energies import tet_elements
-
     body = cube(divisions=(5, 5, 5), damping=0.001, youngs=5e3)
     scene = sp.Scene([body], pins=[sp.Pin("cube", [0, 1, 2, 3])])
-    thresholds = [
-        (tet_elements, "SERIAL_TETS"),
-        (block_csr, "SERIAL_BLOCKS"),
-        (pcg, "_SERIAL_BLOCKS"),
-    ]
-    from supple.numerics.sparse import preconditioner
-
-    thresholds.append((preconditioner, "SERIAL_BLOCKS"))
+    monkeypatch.setattr(solver, "_SHARED_FROM", 0)
+    monkeypatch.setattr(parallel_kernel, "_has_rows", lambda arguments, least: True)
     before = numba.get_num_threads()
-    kept = [getattr(module, name) for module, name in thresholds]
     found = []
     try:
-        for module, name in thresholds:
-            setattr(module, name, 0)
         for threads in (1, 2):
             numba.set_num_threads(threads)
             found.append(run(scene, Implicit(), 1 / 60, 5)[-1].state)
     finally:
         numba.set_num_threads(before)
-        for (module, name), value in zip(thresholds, kept, strict=True):
-            setattr(module, name, value)
     assert found[0].positions.tobytes() == found[1].positions.tobytes()
     assert found[0].velocities.tobytes() == found[1].velocities.tobytes()

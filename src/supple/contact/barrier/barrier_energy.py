@@ -21,14 +21,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.barrier.on_points import PARALLEL_FROM, add_forces, room_for_blocks
+from supple.contact.barrier.on_points import add_forces, room_for_blocks
 from supple.contact.barrier.pair_hessian import write_pair_hessian
 from supple.contact.features.contacts import Contacts
 from supple.contact.features.pair_geometry import EDGE_EDGE, point_count
 from supple.numerics.mat3 import row
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
 
 
 @njit
@@ -120,8 +119,7 @@ def barrier_hessian(
 ) -> Couplings:
     """The Hessian by the points x (s, 3) [N/m]; with `project`, larger and positive semi-definite."""
     between, start = room_for_blocks(contacts.kinds, contacts.points)
-    with threads_for(len(contacts.kinds), PARALLEL_FROM):
-        _write_hessians(x, contacts, start, dhat, stiffness, soft, project, between.blocks)
+    _write_hessians(x, contacts, start, dhat, stiffness, soft, project, between.blocks)
     return between
 
 

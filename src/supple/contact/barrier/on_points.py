@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from supple.contact.features.pair_geometry import point_count
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
 
 # Pairs from which a second thread pays.
 PARALLEL_FROM = 300
@@ -59,8 +58,7 @@ def product_blocks(
 ) -> Couplings:
     """The matrix by the points of sizes (k,) times matrices (k, 3, 3)."""
     between, start = room_for_blocks(kinds, points)
-    with threads_for(len(kinds), PARALLEL_FROM):
-        _write_products(kinds, coefficients, sizes, matrices, start, between.blocks)
+    _write_products(kinds, coefficients, sizes, matrices, start, between.blocks)
     return between
 
 

@@ -17,10 +17,6 @@ from supple.contact.features.edge_contacts import (
 from supple.contact.features.vertex_contacts import REACH, write_vertex_contacts
 from supple.contact.features.vertex_features import alternating_sums, grouped, near_features
 from supple.contact.mesh.contact_mesh import ContactMesh
-from supple.runtime.threads import threads_for
-
-# Pairs from which a second thread pays.
-_PARALLEL_FROM = 2000
 
 
 class Found(NamedTuple):
@@ -73,40 +69,39 @@ class ContactSet:
             return _NOTHING
         mesh, dhat, reach = self._mesh, self.dhat, REACH * self.dhat
         triangles, edges = mesh.triangles, mesh.edges
-        with threads_for(len(vertex_triangle) + len(edge_edge), _PARALLEL_FROM):
-            features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
-            areas, edge_squares, edge_keys, edges_grown = edge_weights(
-                x, edge_edge, self._of_edges, mesh.edge_areas, dhat, known
-            )
-            rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
-            codes, signs, counts, shares = alternating_sums(
-                x, vertex_triangle, features, squares, rows, start, self._of_sums, known, reach
-            )
-            starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
-            count = int(starts[-1, 1])
-            crossing, ends = edge_ends(x, edge_edge, areas, edges)
-            saddles = saddle_weights(edge_edge, areas, crossing, ends, edges, len(x))
-            out = Contacts.room(count + 2 * len(crossing))
-            keys, planes, grown = np.empty(count, np.int64), np.empty(count, np.int32), np.empty(count)
-            write_vertex_contacts(
-                x,
-                vertex_triangle,
-                rows,
-                starts,
-                codes,
-                signs,
-                shares,
-                self._of_vertices,
-                mesh.owner,
-                mesh.areas,
-                saddles,
-                dhat,
-                known,
-                out,
-                keys,
-                planes,
-                grown,
-            )
+        features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
+        areas, edge_squares, edge_keys, edges_grown = edge_weights(
+            x, edge_edge, self._of_edges, mesh.edge_areas, dhat, known
+        )
+        rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
+        codes, signs, counts, shares = alternating_sums(
+            x, vertex_triangle, features, squares, rows, start, self._of_sums, known, reach
+        )
+        starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
+        count = int(starts[-1, 1])
+        crossing, ends = edge_ends(x, edge_edge, areas, edges)
+        saddles = saddle_weights(edge_edge, areas, crossing, ends, edges, len(x))
+        out = Contacts.room(count + 2 * len(crossing))
+        keys, planes, grown = np.empty(count, np.int64), np.empty(count, np.int32), np.empty(count)
+        write_vertex_contacts(
+            x,
+            vertex_triangle,
+            rows,
+            starts,
+            codes,
+            signs,
+            shares,
+            self._of_vertices,
+            mesh.owner,
+            mesh.areas,
+            saddles,
+            dhat,
+            known,
+            out,
+            keys,
+            planes,
+            grown,
+        )
         write_edge_contacts(x, edge_edge, areas, crossing, ends, edges, count, out)
         least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
         new = _new(keys, grown, planes).with_more(_new(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32)))

@@ -15,8 +15,6 @@ from supple.model.system import System
 from supple.numerics.adjacency import Adjacency, adjacency, no_lists
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.geometry.triangle_crossings import crossing_triangles
-from supple.runtime.kernel_cache import ROWS
-from supple.runtime.threads import threads_for
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,5 +201,4 @@ def intersects(mesh: ContactMesh, points: NDArray[np.float64]) -> bool:
     """
     owner = mesh.owner[mesh.triangles[:, 0]]
     ignored = None if mesh.stitched is None else mesh.stitched.crossing
-    with threads_for(len(mesh.triangles), ROWS):
-        return len(crossing_triangles(points, mesh.triangles, owner, mesh.collide, 1, ignored)[0]) > 0
+    return len(crossing_triangles(points, mesh.triangles, owner, mesh.collide, 1, ignored)[0]) > 0

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from supple.contact.start.surfaces import StartSurfaces, winding_number
 from supple.numerics.geometry.box_tree import boxes_of_labels, boxes_of_triangles
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
-from supple.runtime.kernel_cache import ROWS
-from supple.runtime.threads import threads_for
 from supple.scene.contact_pairs import PairTable
 
 # How far a surface is moved inwards to test whether it only touches, as a share of its size.
@@ -58,8 +56,7 @@ def intersections_of(surfaces: StartSurfaces, table: PairTable) -> list[Intersec
 
 def _meeting(s: StartSurfaces, table: PairTable) -> tuple[set[tuple[int, int]], list[Intersection]]:
     """Pairs of things whose triangles meet; and where they do."""
-    with threads_for(len(s.triangles), ROWS):
-        pairs, kinds = crossing_triangles(s.points, s.triangles, s.owner, table.collide)
+    pairs, kinds = crossing_triangles(s.points, s.triangles, s.owner, table.collide)
     things = np.sort(s.owner[pairs], axis=1)
     met = {(int(a), int(b)) for a, b in np.unique(things, axis=0)} if len(things) else set()
     found = []

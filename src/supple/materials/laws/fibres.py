@@ -26,9 +26,6 @@ from numpy.typing import NDArray
 from supple.materials.per_tet import Law
 from supple.numerics.mat3 import det, load_mat
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
-
-_SERIAL_TETS = 2_000
 
 
 class FibreLaw(Law):
@@ -45,8 +42,7 @@ class FibreLaw(Law):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         psi, P = np.empty(len(F)), np.empty((len(F), 3, 3))
         H = np.empty((len(F) if second else 0, 9, 9))
-        with threads_for(len(F), _SERIAL_TETS):
-            _models(np.ascontiguousarray(F), np.ascontiguousarray(p), second, psi, P, H)
+        _models(np.ascontiguousarray(F), np.ascontiguousarray(p), second, psi, P, H)
         return psi, P, H
 
 

@@ -15,10 +15,6 @@ from supple.materials.per_tet import Law
 from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
 from supple.numerics.svd3 import svd3 as decompose
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
-
-# Fewer tets than this are processed by one thread.
-_SERIAL_TETS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +33,7 @@ class IsotropicLaw(Law):
     bulk: int | None = None
 
     def densities(self, F: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
-        with threads_for(len(F), _SERIAL_TETS):
-            return self.decomposed(F, p)[3][:, 0].copy()
+        return self.decomposed(F, p)[3][:, 0].copy()
 
     def models(
         self,
@@ -50,11 +45,10 @@ class IsotropicLaw(Law):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """As of `Law`; with pressures (k,), P and the Hessian are those of psi + pressure J."""
         P, H = np.empty((len(F), 3, 3)), np.empty((len(F) if second else 0, 9, 9))
-        with threads_for(len(F), _SERIAL_TETS):
-            U, s, V, values = self.decomposed(F, p)
-            if pressures is not None:
-                _add_pressures(s, pressures, values)
-            _models(U, V, values, second, project, P, H)
+        U, s, V, values = self.decomposed(F, p)
+        if pressures is not None:
+            _add_pressures(s, pressures, values)
+        _models(U, V, values, second, project, P, H)
         return values[:, 0].copy(), P, H
 
     def stretch_values(self, s: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:

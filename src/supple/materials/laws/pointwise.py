@@ -10,17 +10,12 @@ from numpy.typing import NDArray
 
 from supple.materials.isotropic import densities, hessians, piolas
 from supple.materials.per_tet import BY_LAW, TetMaterial
-from supple.runtime.threads import threads_for
-
-# One pass over this many tets takes half a millisecond; waiting for a second thread on a busy machine takes several.
-_SERIAL_TETS = 20_000
 
 
 def densities_at(material: TetMaterial, F: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m,) energy densities [Pa] of F (m, 3, 3)."""
     out = np.empty(len(F))
-    with threads_for(len(F), _SERIAL_TETS):
-        densities(F, material.kind, material.mu, material.lam, out)
+    densities(F, material.kind, material.mu, material.lam, out)
     out[material.kind == BY_LAW] = 0.0
     for tets in material.elastic_laws:
         out[tets.rows] += tets.law.densities(F[tets.rows], tets.parameters)
@@ -30,8 +25,7 @@ def densities_at(material: TetMaterial, F: NDArray[np.float64]) -> NDArray[np.fl
 def piolas_at(material: TetMaterial, F: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m, 3, 3) first Piola stresses [Pa] of F (m, 3, 3)."""
     out = np.empty((len(F), 3, 3))
-    with threads_for(len(F), _SERIAL_TETS):
-        piolas(F, material.kind, material.mu, material.lam, out)
+    piolas(F, material.kind, material.mu, material.lam, out)
     out[material.kind == BY_LAW] = 0.0
     for tets in material.elastic_laws:
         out[tets.rows] += tets.law.models(F[tets.rows], tets.parameters, False, False)[1]

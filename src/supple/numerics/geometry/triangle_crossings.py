@@ -173,7 +173,7 @@ def _near_of_run(r, x, triangles, rules, ignored, tree, found):
     return count
 
 
-@njit(cache=True, parallel=True, rows=0)
+@njit(cache=True, parallel=True, rows=2_000)
 def _near_pairs(x, triangles, rules, ignored, tree, room, pairs, counts):
     """The pairs of triangles that are not clearly apart, of all runs; rows room[r] .. room[r + 1] are for run r."""
     owner, collide, simple = rules

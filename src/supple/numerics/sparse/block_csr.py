@@ -14,10 +14,6 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
-
-# Fewer blocks than this are worked on by one thread.
-SERIAL_BLOCKS = 15_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,17 +70,16 @@ class BlockPattern(BlockRows):
         diagonal_blocks : (n, 3, 3) symmetric, added to the diagonal
         data : (b, 3, 3) overwritten
         """
-        with threads_for(self.blocks, SERIAL_BLOCKS):
-            _assemble(
-                self.row_start,
-                self.columns,
-                self.mirror,
-                self.entry_start,
-                self.entries,
-                element_blocks,
-                diagonal_blocks,
-                data,
-            )
+        _assemble(
+            self.row_start,
+            self.columns,
+            self.mirror,
+            self.entry_start,
+            self.entries,
+            element_blocks,
+            diagonal_blocks,
+            data,
+        )
 
 
 def build_pattern(elements: NDArray[np.int32], rows: int) -> BlockPattern:

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, assemble_row
+from supple.numerics.sparse.block_csr import BlockPattern, assemble_row
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,20 +82,19 @@ class JointPattern:
         coupling_blocks : (t, 3, 3)
         """
         p = self.pattern
-        with threads_for(p.blocks, SERIAL_BLOCKS):
-            _assemble(
-                p.row_start,
-                p.columns,
-                p.mirror,
-                p.entry_start,
-                p.entries,
-                element_blocks,
-                diagonal_blocks,
-                places.start,
-                places.entries,
-                coupling_blocks,
-                data,
-            )
+        _assemble(
+            p.row_start,
+            p.columns,
+            p.mirror,
+            p.entry_start,
+            p.entries,
+            element_blocks,
+            diagonal_blocks,
+            places.start,
+            places.entries,
+            coupling_blocks,
+            data,
+        )
 
 
 @njit

@@ -19,10 +19,9 @@ from supple.numerics.sparse.gauss_seidel import backward, forward, update
 from supple.numerics.sparse.preconditioner import TwoLevel
 from supple.numerics.sparse.skyline_cholesky import solve
 from supple.runtime.kernel_cache import njit
-from supple.runtime.threads import threads_for
 
-# Short passes in each iteration: fewer blocks than this are worked on by one thread.
-_SERIAL_BLOCKS = 50_000
+# Blocks of half a matrix: the passes of an iteration over fewer are too short to be shared by threads.
+_SHARED_FROM = 10_000
 
 NOTHING_MORE, _NO_MATRIX = np.zeros((0, 0, 3)), np.zeros((0, 0))
 
@@ -76,13 +75,12 @@ def conjugate_gradients(
         preconditioner.coarse,
     )
     more = (low_rank, low_rank, low_rank, low_rank, _NO_MATRIX)
-    with threads_for(preconditioner.pattern.blocks, _SERIAL_BLOCKS):
-        if len(low_rank):
-            low = np.take(low_rank, order.rows, axis=1)
-            more = (low, np.zeros_like(low), np.zeros_like(low), np.zeros_like(low), np.eye(len(low)))
-            _prepare(*inverse, *more)
-        rhs = b[order.rows]
-        iterations, converged, indefinite, first = _solve(*inverse, rhs, solution, tolerance, max_iterations, more)
+    if len(low_rank):
+        low = np.take(low_rank, order.rows, axis=1)
+        more = (low, np.zeros_like(low), np.zeros_like(low), np.zeros_like(low), np.eye(len(low)))
+        _prepare(*inverse, *more)
+    rhs = b[order.rows]
+    iterations, converged, indefinite, first = _solve(*inverse, rhs, solution, tolerance, max_iterations, more)
     x[order.rows] = solution
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
 
@@ -126,7 +124,7 @@ def _coarse_solution(restricted, coarse, first, coefficients):
     solve(coarse, first, coefficients)
 
 
-@njit(cache=True)
+@njit(cache=True, rows=_SHARED_FROM)
 def _prepare(clusters, lower, upper, diagonal, inverse, coarse_groups, first, coarse, low, W, Y, UY, S_inverse):
     """(M + G G^T)^-1 = M^-1 - Y S^-1 Y^T with Y = M^-1 G and S = 1 + G^T Y. W = (D + L)^-1 G."""
     sums = np.zeros(len(clusters[1]) - 1)
@@ -147,7 +145,7 @@ def _prepare(clusters, lower, upper, diagonal, inverse, coarse_groups, first, co
     _invert(S, S_inverse)
 
 
-@njit(cache=True)
+@njit(cache=True, rows=_SHARED_FROM)
 def _solve(
     clusters, lower, upper, diagonal, inverse, coarse_groups, first, coarse, rhs, x, tolerance, max_iterations, more
 ):

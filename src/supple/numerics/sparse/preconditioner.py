@@ -25,13 +25,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockRows
+from supple.numerics.sparse.block_csr import BlockRows
 from supple.numerics.sparse.clusters import MOST_ROWS, strong_clusters
 from supple.numerics.sparse.partition import bisected_groups
 from supple.numerics.sparse.skyline_cholesky import factorize
 from supple.numerics.sparse.sweep_order import SweepOrder
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
 
 _GROUP_SIZE = 96
 _MOST_GROUPS = 128
@@ -154,9 +153,8 @@ class TwoLevel:
         _invert_diagonal(*starts, order.dense_source, data, self.diagonal, self.inverse_diagonal)
         if coarse:
             p = self.pattern
-            with threads_for(p.blocks, SERIAL_BLOCKS):
-                _project_matrix(p.row_start, p.columns, data, self.group_start, self.affine, self.coarse)
-                factorize(self.coarse, self.first)
+            _project_matrix(p.row_start, p.columns, data, self.group_start, self.affine, self.coarse)
+            factorize(self.coarse, self.first)
 
     def on(self, pattern: BlockRows, data: NDArray[np.float64]) -> TwoLevel:
         """The same groups and memory for a matrix with other blocks, with clusters of its strongly coupled rows. It has

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockRows
+from supple.numerics.sparse.block_csr import BlockRows
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +101,8 @@ class SweepOrder:
 
     def take(self, data: NDArray[np.float64]) -> None:
         """Copy the blocks (b, 3, 3) of a matrix beside the diagonal."""
-        with threads_for(len(data), SERIAL_BLOCKS):
-            for triangle in (self.lower, self.upper):
-                _take(triangle.source, data, triangle.blocks)
+        for triangle in (self.lower, self.upper):
+            _take(triangle.source, data, triangle.blocks)
 
 
 @njit(cache=True)

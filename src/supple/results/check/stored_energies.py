@@ -18,9 +18,7 @@ from supple.materials.tet_energies import element_energies
 from supple.results.check.geometry.quadratic_tets import at_quadrature_points
 from supple.results.recording.physics import RecordedPhysics
 from supple.results.recording.reader import Recording
-from supple.runtime.threads import threads_for
 
-_TETS_PER_THREAD = 5_000
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 
@@ -75,8 +73,7 @@ def elastic_energy(
         if pair is None:
             out = np.empty(len(tets))
             laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
-            with threads_for(len(tets), _TETS_PER_THREAD):
-                element_energies(x, tets, rest_inverse[body.tets], volumes, *laws, out)
+            element_energies(x, tets, rest_inverse[body.tets], volumes, *laws, out)
             own = [_of_body(part, body.tets) for part in physics.laws if part.flow is None]
             out[laws[0] == BY_LAW] = 0.0
             F = _gradients(x, tets, rest_inverse[body.tets])

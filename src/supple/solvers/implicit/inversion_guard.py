@@ -18,10 +18,7 @@ from supple.numerics.mat3 import det
 from supple.numerics.noninverting_step import KEEP, noninverting_step, volume_signs
 from supple.numerics.quadratic_noninverting_step import noninverting_step as quadratic_noninverting_step
 from supple.runtime.kernel_cache import njit, prange, read_only
-from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.quadratic.bernstein_barrier import BernsteinBarrier
-from supple.solvers.implicit.energies.quadratic.term import SERIAL_ELEMENTS
-from supple.solvers.implicit.energies.tet_elements import SERIAL_TETS
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,23 +39,20 @@ class QuadraticGuard:
     def at(cls, tets: QuadraticTets, x: NDArray[np.float64]) -> QuadraticGuard:
         """For a step from x (n, 3)."""
         here = np.empty(len(tets.rows), dtype=np.bool_)
-        with threads_for(len(here), SERIAL_ELEMENTS):
-            positive_coefficients(x, tets.nodes, here)
+        positive_coefficients(x, tets.nodes, here)
         return cls(tets, here & (tets.rest_coefficients > 0.0).all(axis=1))
 
     def largest_step(
         self, x: NDArray[np.float64], direction: NDArray[np.float64], guarded: NDArray[np.bool_], keep: float
     ) -> tuple[float, int]:
         """The largest step for the `guarded` (k,) elements, and which of all tets limits it (-1 where none does)."""
-        with threads_for(len(guarded), SERIAL_ELEMENTS):
-            step, k = quadratic_noninverting_step(x, direction, self.tets.nodes, guarded, self.by_coefficients, keep)
+        step, k = quadratic_noninverting_step(x, direction, self.tets.nodes, guarded, self.by_coefficients, keep)
         return float(step), -1 if k < 0 else int(self.tets.rows[k])
 
     def allows(self, x: NDArray[np.float64], guarded: NDArray[np.bool_]) -> bool:
         """Whether all guarded elements are positive everywhere at x."""
         positive = np.empty(len(guarded), dtype=np.bool_)
-        with threads_for(len(guarded), SERIAL_ELEMENTS):
-            positive_coefficients(x, self.tets.nodes, positive)
+        positive_coefficients(x, self.tets.nodes, positive)
         if (positive | ~guarded).all():
             return True
         if (guarded & self.by_coefficients & ~positive).any():
@@ -69,8 +63,7 @@ class QuadraticGuard:
 def are_positive(tets: QuadraticTets, x: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(k,) whether J is positive everywhere in a quadratic tet."""
     positive = np.empty(len(tets.rows), dtype=np.bool_)
-    with threads_for(len(positive), SERIAL_ELEMENTS):
-        positive_elements(read_only(x), read_only(tets.nodes), positive)
+    positive_elements(read_only(x), read_only(tets.nodes), positive)
     return positive
 
 
@@ -106,8 +99,7 @@ class InversionGuard:
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
         """The largest step along `direction`, at most 1, and the tet that limits it (-1 where none does)."""
-        with threads_for(len(self.system.tets), SERIAL_TETS):
-            step, tet = noninverting_step(x, direction, self.system.tets, self._linear, self.keep)
+        step, tet = noninverting_step(x, direction, self.system.tets, self._linear, self.keep)
         if self.quadratic is None:
             return float(step), int(tet)
         own, which = self.quadratic.largest_step(x, direction, self.guarded[self.quadratic.tets.rows], self.keep)
@@ -131,8 +123,7 @@ class InversionGuard:
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every guarded tet has a positive volume at x, a quadratic one everywhere in it."""
-        with threads_for(len(self.system.tets), SERIAL_TETS):
-            kept = bool(keeps_volume(x, self.system.tets, self.system.rest_shape_inverse, self._linear))
+        kept = bool(keeps_volume(x, self.system.tets, self.system.rest_shape_inverse, self._linear))
         if self.quadratic is None or not kept:
             return kept
         return self.quadratic.allows(x, self.guarded[self.quadratic.tets.rows])

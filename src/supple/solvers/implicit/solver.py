@@ -31,7 +31,6 @@ from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.regularization import regularization_of
 from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
 from supple.solvers.implicit.energies.stitches import StitchEnergy
-from supple.solvers.implicit.energies.tet_elements import SERIAL_TETS
 from supple.solvers.implicit.inversion_guard import refuse_inverted
 from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
@@ -54,6 +53,8 @@ _BYTES_PER_TET = 5000
 _BYTES_OF_FACTOR = 1200
 # Beyond the above, for the matrices of its quadrature points and its blocks: 45,000 on a cube of 6,000.
 _BYTES_PER_QUADRATIC_TET = 50_000
+# Tets from which two threads pay for the time that it takes to compile the kernels' parallel forms.
+_SHARED_FROM = 1_500
 
 
 @dataclass(frozen=True)
@@ -143,8 +144,10 @@ class Implicit(Solver):
                 f"body {body.name!r}: nothing holds it, so that it has no static equilibrium; pin some of its "
                 "vertices, or use another integrator"
             )
+        with threads_for(len(system.tets), _SHARED_FROM):
+            linear_solver = LinearSolver.of(system, self.linear_solver)
         tools = Tools(
-            LinearSolver.of(system, self.linear_solver),
+            linear_solver,
             HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching)),
             system.pinned_vertices,
             free_motion,
@@ -229,8 +232,7 @@ class Implicit(Solver):
         energy, residual = no_works(system), 0.0
         time_errors: list[float] = []
         while not substepping.over:
-            # For a small scene all at once: changing the number of threads takes longer than its kernels.
-            with threads_for(len(system.tets), SERIAL_TETS):
+            with threads_for(len(system.tets), _SHARED_FROM), workspace.tools.linear_solver.own_threads():
                 taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
             if taken.outcome.status is not Status.CONVERGED:

@@ -121,8 +121,7 @@ class Elasticity(JointlyEvaluated):
     def _own_energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         s = self.elements
         energies = np.empty(len(s))
-        with s.threads():
-            element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, energies)
+        element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, energies)
         return energies
 
     def add_model(
@@ -139,12 +138,11 @@ class Elasticity(JointlyEvaluated):
         gradients = np.empty((len(s), 4, 3))
         of_own = np.where(self.own, pressures, 0.0) if len(pressures) else pressures
         tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, of_own
-        with s.threads():
-            if hessian is None:
-                element_models(*tets, False, project, energies, gradients, _NO_HESSIANS)
-            else:
-                hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
-            s.gather(gradients, gradient)
+        if hessian is None:
+            element_models(*tets, False, project, energies, gradients, _NO_HESSIANS)
+        else:
+            hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
+        s.gather(gradients, gradient)
         total = float(energies.sum())
         if self.laws is not None:
             total += self.laws.add_model(x, gradient, hessian, project, pressures)

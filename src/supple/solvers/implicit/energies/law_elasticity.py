@@ -18,9 +18,7 @@ from supple.materials.tet_energies import put_gradient
 from supple.numerics.deformation import deformation_gradients
 from supple.numerics.mat3 import load_mat
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
-from supple.solvers.implicit.energies.tet_elements import SERIAL_TETS
 
 NO_PRESSURES = np.zeros(0)
 
@@ -119,12 +117,11 @@ class LawElasticity(JointlyEvaluated):
                 psi, P, H = each.law.models(*arguments)
             total += float((each.volumes * psi).sum())
             forces = np.empty((len(psi), 4, 3))
-            with threads_for(len(psi), SERIAL_TETS):
-                element_forces(P, each.B, each.volumes, forces)
-                if hessian is not None:
-                    blocks = np.empty((len(psi), 12, 12))
-                    element_stiffness(H, each.B, each.volumes, blocks)
-                    hessian.tets[each.rows] += blocks
+            element_forces(P, each.B, each.volumes, forces)
+            if hessian is not None:
+                blocks = np.empty((len(psi), 12, 12))
+                element_stiffness(H, each.B, each.volumes, blocks)
+                hessian.tets[each.rows] += blocks
             for k in range(3):
                 weights = forces[:, :, k].ravel()
                 gradient[:, k] += np.bincount(each.tets.ravel(), weights=weights, minlength=len(gradient))

@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from supple.materials.elastic import StableNeoHookean
 from supple.materials.tet_energies import element_energies, element_gradients, element_hessians
 from supple.numerics.sparse.block_csr import incidences
-from supple.runtime.threads import threads_for
 from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.stitching import Stitching
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
-from supple.solvers.implicit.energies.tet_elements import SERIAL_TETS, add_by_vertex
+from supple.solvers.implicit.energies.tet_elements import add_by_vertex
 
 # Energy, gradient and Hessian of springs between vertices and points of edges: k/2 (|d| - l)^2.
 #
@@ -98,23 +97,20 @@ class StitchEnergy(Potential):
         """(k,) of each stitch, tets first [J]."""
         points = self._points(x)
         out = np.empty(len(self.stitching.tets))
-        with threads_for(len(out), SERIAL_TETS):
-            element_energies(points, *self._tets, out)
+        element_energies(points, *self._tets, out)
         return np.concatenate([out, spring_energies(self.stitching.springs, points)])
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         points, count = self._points(x), len(self.stitching.tets)
         gradients = np.empty((len(self.stitching), 4, 3))
-        with threads_for(count, SERIAL_TETS):
-            element_gradients(points, *self._tets, gradients[:count])
-            spring_gradients(self.stitching.springs, points, gradients[count:])
-            add_by_vertex(*self.gathering, gradients.reshape(-1, 3), out)
+        element_gradients(points, *self._tets, gradients[:count])
+        spring_gradients(self.stitching.springs, points, gradients[count:])
+        add_by_vertex(*self.gathering, gradients.reshape(-1, 3), out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         points, count = self._points(x), len(self.stitching.tets)
         blocks = np.empty((len(self.stitching), 12, 12))
-        with threads_for(count, SERIAL_TETS):
-            element_hessians(points, *self._tets, project, blocks[:count])
+        element_hessians(points, *self._tets, project, blocks[:count])
         spring_hessians(self.stitching.springs, points, project, blocks[count:])
         out.stitches[:] += blocks
 

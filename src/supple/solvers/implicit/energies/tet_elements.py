@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -14,11 +13,7 @@ from numpy.typing import NDArray
 from supple.model.system import System
 from supple.numerics.sparse.block_csr import incidences
 from supple.runtime.kernel_cache import njit, prange
-from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
-
-# Fewer tets than this are processed by one thread: a pass of 1 ms is too short to share.
-SERIAL_TETS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +41,6 @@ class TetElements:
 
     def __len__(self) -> int:
         return len(self.tets)
-
-    def threads(self) -> AbstractContextManager[Any]:
-        return threads_for(len(self), SERIAL_TETS)
 
     def gather(self, gradients: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         """Add every tet's gradient (m, 4, 3) to its nodes' rows of out (n, 3), in the order of the tets."""
@@ -78,19 +70,16 @@ class TetPotential(Potential):
 
     def value(self, x: NDArray[np.float64]) -> float:
         out = np.empty(len(self.elements))
-        with self.elements.threads():
-            self.kernels[0](*self._arguments(x), out)
+        self.kernels[0](*self._arguments(x), out)
         return float(out.sum())
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         gradients = np.empty((len(self.elements), 4, 3))
-        with self.elements.threads():
-            self.kernels[1](*self._arguments(x), gradients)
-            self.elements.gather(gradients, out)
+        self.kernels[1](*self._arguments(x), gradients)
+        self.elements.gather(gradients, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        with self.elements.threads():
-            self.kernels[2](*self._arguments(x), project, out.tets)
+        self.kernels[2](*self._arguments(x), project, out.tets)
 
 
 @njit(cache=True, parallel=True)

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from time import perf_counter
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
-from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, build_pattern
+from supple.numerics.sparse.block_csr import BlockPattern, build_pattern
 from supple.numerics.sparse.block_sum import JointPattern
 from supple.numerics.sparse.couplings import Couplings
 from supple.numerics.sparse.pcg import CGResult, conjugate_gradients
 from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
 from supple.runtime.thread_tuning import ThreadTuner
+from supple.runtime.threads import has_several
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.newton.direct_solver import solve_directly
 from supple.solvers.implicit.newton.reduction import Reduction
@@ -27,10 +29,8 @@ logger = logging.getLogger(__name__)
 # thin bodies of nearly incompressible material more than 500 (docs/theory/implicit.md).
 _STALLED = 400
 
-# After this many systems the slower number of threads is tried again (see `ThreadTuner`). The work of a system is
-# counted in iterations of CG; its assembly is worth about ten.
+# After this many systems the slower number of threads is tried again, see `ThreadTuner`.
 _REST = 40
-_ASSEMBLY = 10
 
 # The coarse level of the preconditioner is renewed where CG takes this factor times its first number of iterations, and
 # this many more: a renewal costs about as much as the iterations that it saves.
@@ -58,6 +58,8 @@ class LinearSolver:
     matrix : the sparse part; low_rank : (k, rows, 3) vectors g, of which g g^T is added to it
     age, fresh_iterations : the number of runs of CG on the present coarse level (-1: none), and the iterations of the
         first one
+    pace : the number of threads of an iteration, one or `most_threads`, chosen by the times of assemblies, whose work
+        hardly varies
     """
 
     kind: str
@@ -74,8 +76,7 @@ class LinearSolver:
     age: int = -1
     fresh_iterations: int = 0
     pace: ThreadTuner = field(init=False)
-    parallel: bool = True
-    spent: float = 0.0
+    most_threads: int = 1
 
     @classmethod
     def of(cls, system: System, kind: str) -> LinearSolver:
@@ -94,18 +95,24 @@ class LinearSolver:
     def __post_init__(self) -> None:
         self.matrix, self.preconditioner = self.elements, self.elements_only
         self.low_rank = np.zeros((0, len(self.order.vertices), 3))
-        choice = numba.get_num_threads() > 1 and self.pattern.blocks >= SERIAL_BLOCKS
-        self.pace = ThreadTuner(choice, choice, _REST)
+        self.pace = ThreadTuner(has_several(), has_several(), _REST)
 
     def begin_step(self) -> None:
         """Discard what earlier steps have left, so that a step depends on its state alone."""
         self.age, self.joint = -1, None
 
+    def own_threads(self) -> AbstractContextManager[None]:
+        """A substep's block. What is outside of iterations runs in the mode that was faster so far."""
+        self.most_threads = numba.get_num_threads()
+        return self.pace.threads(self.pace.parallel, self.most_threads)
+
+    def blocks(self, count: int) -> Iterator[int]:
+        """The numbers of this many iterations, each on the number of threads that is best for assemblies."""
+        return self.pace.blocks(count, self.most_threads)
+
     def assemble(self, hessian: HessianBlocks) -> None:
         """Assemble the matrix of a new Hessian, and update the preconditioner."""
-        began = perf_counter()
-        self.parallel = self.pace.choose()
-        with self.pace.threads(self.parallel):
+        for _ in self.pace.tasks(1, self.most_threads):
             diagonal = hessian.vertices[self.order.vertices]
             reduction = self.reduction
             if couplings := (hessian.beyond_elements if reduction is None else reduction.couplings(hessian)):
@@ -121,7 +128,6 @@ class LinearSolver:
                 self.low_rank[k] = part.in_rows(self.row_of, count)
             if self.kind != "direct":
                 self.preconditioner.update(self.matrix, coarse=self.age < 0)
-        self.spent = perf_counter() - began
 
     def _assemble_joint(
         self, elements: NDArray[np.float64], diagonal: NDArray[np.float64], couplings: Couplings
@@ -157,13 +163,9 @@ class LinearSolver:
         p : (n, 3), zero where pinned, and welded vertices with their rigid bodies; None where the system could not be
             solved, or was found to be indefinite
         """
-        began = perf_counter()
-        with self.pace.threads(self.parallel):
-            p, report = self._solve(force, tolerance, convex)
+        p, report = self._solve(force, tolerance, convex)
         if p is not None and self.reduction is not None:
             self.reduction.welding.follow(p)
-        seconds = self.spent + perf_counter() - began
-        self.pace.note(self.parallel, seconds / (_ASSEMBLY + report.iterations))
         return p, report
 
     def _solve(

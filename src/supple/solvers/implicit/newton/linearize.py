@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.state import Status
-from supple.runtime.interruption import interruption_point
 from supple.solvers.implicit.contact.approach import Approach
 from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
@@ -52,8 +51,7 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
     rows: list[NewtonRow] = []
     if not np.isfinite(here.energy):
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
-    for iteration in range(FEW):
-        interruption_point()
+    for iteration in tools.linear_solver.blocks(FEW):
         solved = _direction(directions, here, limits, approach)
         if solved is None:
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.state import Status
-from supple.runtime.interruption import interruption_point
 from supple.solvers.implicit.newton.direction import DirectionFinder, Tools, newton_row
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
 from supple.solvers.implicit.newton.line_search import Jumps, extended, search
@@ -131,8 +130,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
     last_length = 0.0
     settled = 0
-    for iteration in range(problem.max_iterations):
-        interruption_point()
+    for iteration in tools.linear_solver.blocks(problem.max_iterations):
         found = directions.find(here)
         if found is None:
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.quadratic import PointsInTets
 from supple.numerics.sparse.couplings import Couplings
-from supple.runtime.threads import threads_for
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Potential, Wrapped
 from supple.solvers.implicit.energies.quadratic.kernels import (
     add_products,
@@ -63,10 +62,6 @@ class Gathering:
         return cls(start, entries, rows.astype(np.int32), columns.astype(np.int32), pair_start, codes[order])
 
 
-# Fewer elements than this are processed by one thread.
-SERIAL_ELEMENTS = 300
-
-
 @dataclass(frozen=True, eq=False)
 class VirtualTets:
     """The virtual tets of points in quadratic tets, and how they add up."""
@@ -86,17 +81,15 @@ class VirtualTets:
 
     def corners(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(4 m, 3) corners of the virtual tets for positions, or velocities, x (n, 3)."""
-        with self._threads():
-            out = np.empty((self.count, 4, 3))
-            place_virtual_tets(self.points.deformation_gradients(x).reshape(-1, 3, 3), out)
+        out = np.empty((self.count, 4, 3))
+        place_virtual_tets(self.points.deformation_gradients(x).reshape(-1, 3, 3), out)
         return out.reshape(-1, 3)
 
     def add_forces(self, forces: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         """Add W^T f, of forces (4 m, 3) on the corners, to `out` (n, 3)."""
-        with self._threads():
-            of_nodes = np.empty((len(self.points.nodes), 10, 3))
-            element_forces(self.points.gradients, forces.reshape(-1, 4, 3), of_nodes)
-            add_by_vertex(self.gathering.start, self.gathering.entries, of_nodes.reshape(-1, 3), out)
+        of_nodes = np.empty((len(self.points.nodes), 10, 3))
+        element_forces(self.points.gradients, forces.reshape(-1, 4, 3), of_nodes)
+        add_by_vertex(self.gathering.start, self.gathering.entries, of_nodes.reshape(-1, 3), out)
 
     def blocks(self, wanted: HessianBlocks | None) -> HessianBlocks | None:
         """Room for the matrices of the virtual tets, where a Hessian is wanted."""
@@ -112,10 +105,9 @@ class VirtualTets:
 
     def volume_gradients(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k, 10, 3) the derivatives of the elements' volumes, sums over their points, by the nodes [m^2]."""
-        with self._threads():
-            pushes, out = np.empty((self.count, 4, 3)), np.empty((len(self.points.nodes), 10, 3))
-            volume_pushes(y.reshape(-1, 4, 3), self.points.volumes.ravel(), pushes)
-            element_forces(self.points.gradients, pushes, out)
+        pushes, out = np.empty((self.count, 4, 3)), np.empty((len(self.points.nodes), 10, 3))
+        volume_pushes(y.reshape(-1, 4, 3), self.points.volumes.ravel(), pushes)
+        element_forces(self.points.gradients, pushes, out)
         return out
 
     def couplings(
@@ -126,16 +118,12 @@ class VirtualTets:
         """W^T H W of matrices (m, 12, 12) of the virtual tets, and c g g^T of products c (k,), g (k, 10, 3)."""
         pairs = self.gathering
         sums = np.empty((len(pairs.rows), 3, 3))
-        with self._threads():
-            blocks = np.empty((len(self.points.nodes), 10, 10, 3, 3))
-            element_blocks(self.points.gradients, hessians, blocks)
-            if products is not None:
-                add_products(*products, blocks)
-            sum_pairs(pairs.pair_start, pairs.pair_entries, blocks.reshape(-1, 3, 3), sums)
+        blocks = np.empty((len(self.points.nodes), 10, 10, 3, 3))
+        element_blocks(self.points.gradients, hessians, blocks)
+        if products is not None:
+            add_products(*products, blocks)
+        sum_pairs(pairs.pair_start, pairs.pair_entries, blocks.reshape(-1, 3, 3), sums)
         return Couplings(pairs.rows, pairs.columns, sums)
-
-    def _threads(self):
-        return threads_for(len(self.points.nodes), SERIAL_ELEMENTS)
 
 
 @dataclass(frozen=True, eq=False)
