@@ -3,7 +3,7 @@
 usage: python -m benchmarks.contact_scenes [SCENE ...] [--quick] [--steps N] [--against PATH]
 
 SCENE is a name such as `stack`, or `stack:small`, `stack:full`, `stack:large`, or `tumbling`, 27 cubes that fall on
-each other; without any, all full and large ones and `tumbling` are run. Means are over the steps that have contacts,
+each other, or `pull`, a ball between two spheres; without any, all full and large ones and those two are run. Means are over the steps that have contacts,
 without the first of them, which loads compiled kernels; times are of the processor, shares of the wall time.
 
 With --against, every scene also runs on the package of another checkout, whose folder `src` is PATH. The two run one
@@ -32,7 +32,7 @@ from supple.solvers.implicit.details import ImplicitDetails
 ROOT = Path(__file__).resolve().parents[1]
 MAX_STEPS = 100
 PARTS = ("contact", "elasticity", "linear_solve")
-TUMBLING = "tumbling"
+SIDES = ("left", -0.13), ("right", 0.13)
 
 
 class Case(NamedTuple):
@@ -58,15 +58,30 @@ def tumbling() -> Case:
     return Case(sp.Scene(bodies, [sp.HalfSpace(friction=0.4)]), sp.Implicit(), 1 / 60, 60)
 
 
+def pull() -> Case:
+    """A ball of 10 cm, E = 50 kPa, that a pin pulls through a gap of 6 cm between two spheres of 20 cm, mu = .9."""
+    mesh = sp.shapes.sphere(0.05, 0.014)
+    ball = sp.StableNeoHookean(youngs=5e4, poisson=0.4, density=1000.0)
+    spheres = [sp.Sphere(name=name, center=(x, 0, 0), radius=0.1, friction=0.9) for name, x in SIDES]
+    grip = np.flatnonzero(np.linalg.norm(mesh.vertices - (0, -0.05, 0), axis=1) < 0.025)
+    way = sp.Keyframes([0.0, 1.0], displacements=[(0, 0, 0), (0, -0.25, 0)])
+    height = 0.001 + float(np.sqrt(0.15**2 - 0.13**2))
+    body = sp.Body("ball", mesh, ball, position=(0, height, 0))
+    return Case(sp.Scene([body], spheres, pins=[sp.Pin("ball", grip, way)]), sp.Implicit(), 1 / 40, 40)
+
+
+SCENES = {"tumbling": tumbling, "pull": pull}
+
+
 def case(item: str) -> Case:
     """The scene of a name such as `stack:small`."""
-    if item == TUMBLING:
-        return tumbling()
+    if item in SCENES:
+        return SCENES[item]()
     name, _, size = item.partition(":")
     demo = getattr(TORTURE.get(name), size or "full", None)
     if demo is None:
         raise SystemExit(
-            f"there is no scene {item!r}; there are {TUMBLING}, {', '.join(TORTURE)}, with :small, :full, some :large"
+            f"there is no scene {item!r}; there are {', '.join([*SCENES, *TORTURE])}, with :small, :full, some :large"
         )
     return Case(demo.scene(), demo.solver(), demo.dt, demo.steps)
 
@@ -129,7 +144,7 @@ def main(
     if not chosen:
         sizes = ("small",) if quick else ("full", "large")
         chosen = [f"{name}:{size}" for size in sizes for name, scene in TORTURE.items() if getattr(scene, size)]
-        chosen.append(TUMBLING)
+        chosen += SCENES
     other = Path(against).resolve() if against is not None else None
     if other is not None and not (other / "supple" / "__init__.py").exists():
         raise SystemExit(f"--against {against}: the package supple is missing in it; give the folder src of a checkout")
