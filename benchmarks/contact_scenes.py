@@ -3,8 +3,9 @@
 usage: python -m benchmarks.contact_scenes [SCENE ...] [--quick] [--steps N] [--against PATH]
 
 SCENE is a name such as `stack`, or `stack:small`, `stack:full`, `stack:large`, or `tumbling`, 27 cubes that fall on
-each other, or `pull`, a ball between two spheres; without any, all full and large ones and those two are run. Means are over the steps that have contacts,
-without the first of them, which loads compiled kernels; times are of the processor, shares of the wall time.
+each other, or `pull`, a ball between two spheres; without any, all full and large ones and those two are run. Means are
+over the steps that have contacts, without the first of them, which loads compiled kernels; times are of the processor,
+shares of the wall time.
 
 With --against, every scene also runs on the package of another checkout, whose folder `src` is PATH. The two run one
 after the other in processes of their own, and ratios are given: other / this.
@@ -62,7 +63,7 @@ def pull() -> Case:
     """A ball of 10 cm, E = 50 kPa, that a pin pulls through a gap of 6 cm between two spheres of 20 cm, mu = .9."""
     mesh = sp.shapes.sphere(0.05, 0.014)
     ball = sp.StableNeoHookean(youngs=5e4, poisson=0.4, density=1000.0)
-    spheres = [sp.Sphere(name=name, center=(x, 0, 0), radius=0.1, friction=0.9) for name, x in SIDES]
+    spheres = [sp.obstacles.Sphere(name=name, center=(x, 0, 0), radius=0.1, friction=0.9) for name, x in SIDES]
     grip = np.flatnonzero(np.linalg.norm(mesh.vertices - (0, -0.05, 0), axis=1) < 0.025)
     way = sp.Keyframes([0.0, 1.0], displacements=[(0, 0, 0), (0, -0.25, 0)])
     height = 0.001 + float(np.sqrt(0.15**2 - 0.13**2))

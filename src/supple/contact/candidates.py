@@ -12,6 +12,7 @@ from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import ContactMesh
 from supple.contact.search.distances import edge_edge_square, point_triangle_square
 from supple.contact.search.patch_search import PatchSearch
+from supple.numerics.inner_product import inner
 from supple.runtime.kernel_cache import njit, prange
 
 # Margins are this share of the present motion, between these shares of dhat and of the mean edge: points that move
@@ -133,8 +134,8 @@ def _ascending(pairs: NDArray[np.int32]) -> NDArray[np.int32]:
 def _distance_from_way(x: NDArray[np.float64], begin: NDArray[np.float64], way: NDArray[np.float64]) -> float:
     """The largest distance of a point from its place at the moment of a common motion that suits all best [m]."""
     moved = x - begin
-    square = float(np.vdot(way, way))
-    part = min(max(float(np.vdot(moved, way)) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    square = inner(way, way)
+    part = min(max(inner(moved, way) / square, 0.0), 1.0) if square > 0.0 else 0.0
     moved -= part * way
     return float(np.sqrt(np.einsum("ij,ij->i", moved, moved).max(initial=0.0)))
 

@@ -18,6 +18,7 @@ from supple.model.joints.geometry import JointGeometry
 from supple.model.state import State, Status, StepReport
 from supple.model.stitched_points import with_stitched_points
 from supple.model.system import System
+from supple.numerics.inner_product import norm
 from supple.numerics.noninverting_step import KEEP
 from supple.runtime.threads import threads_for
 from supple.scene.scene import Scene
@@ -262,7 +263,7 @@ class Implicit(Solver):
         nearest, contacts = None, None
         if last is not None:
             gradient = last.outcome.end.gradient / last.contact.weight
-            left = float(np.linalg.norm(workspace.tools.freed(gradient)))
+            left = norm(workspace.tools.freed(gradient))
             details = replace(details, unbalanced_force=left)
             details = replace(details, weld_forces=weld_forces(system, gradient))
             if workspace.tools.linear_solver.reduction is not None:

@@ -126,7 +126,7 @@ def test_a_scene_in_millimetres_has_the_shapes_of_the_scene_in_metres():
     assert large[-1].report.details.contacts > 0
     for a, b in zip(large, small, strict=True):
         # Where a contact is first met, and so its weight, depends on Newton's method up to its tolerance.
-        assert np.abs(1e3 * b.state.positions - a.state.positions).max() < 1e-5
+        assert np.abs(1e3 * b.state.positions - a.state.positions).max() < 3e-5
 
 
 def test_the_same_bits_whatever_the_number_of_threads():

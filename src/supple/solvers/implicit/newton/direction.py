@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.inner_product import inner
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
@@ -146,7 +147,7 @@ class DirectionFinder:
         found = Direction(
             vector=vector,
             length=float(np.abs(vector).max(initial=0.0)),
-            slope=float(np.einsum("ij,ij->", gradient, vector)),
+            slope=inner(gradient, vector),
             force=float(np.abs(gradient).max(initial=0.0)),
             linear=report,
             tolerance=self.forcing,

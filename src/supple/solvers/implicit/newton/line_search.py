@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.inner_product import inner
 from supple.solvers.implicit.newton.objective import Model, Objective
 from supple.solvers.implicit.step_limits import StepLimits
 
@@ -97,14 +98,14 @@ def search(
         elif enough:
             uphill = 0.0
             if -step * slope < _UNCLEAR * size:
-                uphill = float(np.vdot(objective.gradient(moved), direction)) / -slope
+                uphill = inner(objective.gradient(moved), direction) / -slope
             if uphill <= _STEEPEST:
                 return moved, step, cuts
             step /= 1.0 + uphill
         else:
             rise = energy - start.energy
             if step <= _SHORT * largest and 0.0 < rise < np.inf:
-                uphill = step * float(np.vdot(objective.gradient(moved), direction))
+                uphill = step * inner(objective.gradient(moved), direction)
                 if jumps.cross(rise, uphill, _ROUND_OFF * size):
                     return moved, step, cuts
             step *= _SHRINK
@@ -127,7 +128,7 @@ def extended(
     ----------
     start, direction, slope, limits : see `search`; end : (n, 3) of the whole step
     """
-    left = float(np.vdot(objective.gradient(end), direction)) / slope
+    left = inner(objective.gradient(end), direction) / slope
     if not left > _LEFT:
         return end, 1.0
     more = (1.0 / (1.0 - left) if left < 1.0 else np.inf) - 1.0

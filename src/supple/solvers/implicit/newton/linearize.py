@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.state import Status
+from supple.numerics.inner_product import inner
 from supple.solvers.implicit.contact.approach import Approach
 from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
@@ -57,7 +58,7 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         here, found = solved
         way, limit = limits.shortened(here.positions, found.vector)
-        slope = found.slope if limit.step == 1.0 else float(np.vdot(tools.freed(here.gradient), way))
+        slope = found.slope if limit.step == 1.0 else inner(tools.freed(here.gradient), way)
         end, step, cuts = search(objective, here, way, slope, 1.0, limits, jumps)
         if step == 0.0 and limit.step < 1.0:
             # Parts of a direction need not lead down.
@@ -121,7 +122,7 @@ def _direction(
         return None
     here = _balanced(here, sliding, found.vector)
     gradient = directions.tools.freed(here.gradient)
-    return here, replace(found, slope=float(np.vdot(gradient, found.vector)))
+    return here, replace(found, slope=inner(gradient, found.vector))
 
 
 def _balanced(here: Model, sliding: list[Sliding], way: NDArray[np.float64]) -> Model:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.state import Status
+from supple.numerics.inner_product import norm
 from supple.solvers.implicit.newton.direction import DirectionFinder, Tools, newton_row
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
 from supple.solvers.implicit.newton.line_search import Jumps, extended, search
@@ -203,4 +204,4 @@ def is_converged(problem: Problem, length: float, here: Model, tools: Tools, tou
 
 def free_norm(gradient: NDArray[np.float64], tools: Tools) -> float:
     """Of a gradient (n, 3) by the free vertices."""
-    return float(np.linalg.norm(tools.freed(gradient)))
+    return norm(tools.freed(gradient))

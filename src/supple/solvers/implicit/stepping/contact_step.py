@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.state import ContactPoints, Status
+from supple.numerics.inner_product import norm
 from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.contact.model import ContactModel
@@ -129,10 +130,10 @@ class ContactStep:
         if wanted is not None:
             return True
         now = Objective([self.barrier]).gradient(x)
-        change = float(np.linalg.norm(now - self.normal_gradient))
+        change = norm(now - self.normal_gradient)
         early = unbalanced <= _BALANCED < self.unbalanced
         allowed = _EARLY_CHANGE if early else _FORCE_CHANGE
-        return change > allowed * float(np.linalg.norm(now))
+        return change > allowed * norm(now)
 
     def verified(self, outcome: Outcome) -> Outcome:
         """The outcome, or a failure where surfaces intersect because of rounding.

@@ -22,6 +22,7 @@ from supple.model.energy_balance import (
     works_of_actuators,
 )
 from supple.model.state import State
+from supple.numerics.inner_product import inner
 from supple.solvers.implicit.energies.loads.external_forces import works_of_loads
 from supple.solvers.implicit.newton.minimize import Outcome
 from supple.solvers.implicit.newton.objective import Objective
@@ -100,7 +101,7 @@ def works_of_step(
         if term.work is not None:
             gradient = np.zeros_like(x)
             term.add_gradient(x, gradient)
-            add_works(works, {term.work: -plan.place * float(np.einsum("ij,ij->", gradient, moved))})
+            add_works(works, {term.work: -plan.place * inner(gradient, moved)})
     left = plan.place * np.einsum("ij,ij->i", outcome.end.gradient, moved)
     held = system.pinned_vertices
     pins = float(left[held].sum())

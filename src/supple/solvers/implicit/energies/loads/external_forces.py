@@ -9,6 +9,7 @@ from supple.model.loads.applied import DeadLoad, MassLoad
 from supple.model.loads.muscles import FibreTension
 from supple.model.state import State
 from supple.model.system import System
+from supple.numerics.inner_product import inner
 
 
 def works_of_loads(
@@ -29,7 +30,7 @@ def works_of_loads(
         if isinstance(load, (DeadLoad, MassLoad)):
             forces = np.zeros_like(x)
             load.add_forces(x, middle, forces)
-            works[load.work] = works.get(load.work, 0.0) + float(np.einsum("ij,ij->", forces, displacements))
+            works[load.work] = works.get(load.work, 0.0) + inner(forces, displacements)
     return works
 
 
