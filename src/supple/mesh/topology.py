@@ -87,7 +87,7 @@ def graph_components(n: int, first: NDArray[np.integer], second: NDArray[np.inte
     """The connected piece of each of n nodes (n,), where edge k joins first[k] and second[k]."""
     from scipy.sparse import coo_array, csgraph
 
-    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(n, n))
+    graph = coo_array((np.ones(len(first), dtype=np.bool_), (first, second)), shape=(n, n))
     return csgraph.connected_components(graph.tocsr(), directed=False)[1]
 
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from supple.contact.barrier.barrier_energy import barrier_forces
 from supple.contact.barrier.friction_energy import lagged_slips, sides
@@ -17,6 +15,7 @@ from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
 from supple.contact.mesh.obstacles import ObstacleRange, obstacle_positions, with_obstacles
 from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
+from supple.mesh.topology import graph_components
 from supple.model.stitched_points import stitched_state
 from supple.model.system import System, initial_state
 from supple.scene.contact_pairs import PairTable, pair_table
@@ -87,9 +86,7 @@ class ContactModel:
         between = np.maximum(points.owner[one], points.owner[other]) < self.mesh.body_count
         piece = pieces[points.points.vertices[points.points.start[:-1]]]
         count = int(pieces.max(initial=0)) + 1
-        ends = piece[one[between]], piece[other[between]]
-        touching = coo_array((np.ones(len(ends[0])), ends), shape=(count, count))
-        return connected_components(touching, directed=False)[1][pieces]
+        return graph_components(count, piece[one[between]], piece[other[between]])[pieces]
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every vertex is in front of every plane."""

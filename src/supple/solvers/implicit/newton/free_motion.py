@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.mesh.topology import graph_components
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
-from supple.numerics.joined_sets import root_of
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit
 
@@ -62,11 +62,18 @@ class FreeMotion:
         """The same with pieces in contact as one piece, without those in contact with something held."""
         if not couplings or len(self.totals) == 0:
             return self
-        parent = np.arange(len(self.totals) + 1, dtype=np.int32)
-        for part in couplings:
-            _unite(part.rows, part.columns, self.piece, parent)
-        piece, totals = _numbered(parent, self.piece, self.totals)
-        return FreeMotion(piece, self.masses, totals)
+        held, ends = len(self.totals), []  # one piece more stands for all that is held
+        for numbers in ([part.rows for part in couplings], [part.columns for part in couplings]):
+            piece = self.piece[np.concatenate(numbers)]
+            ends.append(np.where(piece < 0, held, piece))
+        apart = ends[0] != ends[1]
+        of_piece = graph_components(held + 1, ends[0][apart], ends[1][apart])
+        free = np.flatnonzero(of_piece != of_piece[held])
+        _, joined = np.unique(of_piece[free], return_inverse=True)
+        number = np.full(held + 1, -1, dtype=np.int32)
+        number[free] = joined
+        totals = np.bincount(joined, weights=self.totals[free]).astype(np.float64)
+        return FreeMotion(number[self.piece], self.masses, totals)
 
     def correct(self, direction: NDArray[np.float64], gradient: NDArray[np.float64], scale: float) -> None:
         """Replace, in place, the translation of every free piece in a Newton direction by the exact one.
@@ -77,40 +84,6 @@ class FreeMotion:
         """
         if len(self.totals):
             _correct(self.piece, self.masses, self.totals, gradient, scale, direction)
-
-
-@njit(cache=True)
-def _unite(rows, columns, piece, parent):
-    """Join the pieces of coupled vertices. The last one stands for everything that is held; the larger root wins."""
-    held = len(parent) - 1
-    for t in range(len(rows)):
-        i, j = piece[rows[t]], piece[columns[t]]
-        if i == j:
-            continue
-        a, b = root_of(parent, held if i < 0 else i), root_of(parent, held if j < 0 else j)
-        parent[min(a, b)] = max(a, b)
-
-
-@njit(cache=True)
-def _numbered(parent, piece, masses):
-    """The number of each vertex's joined piece, or -1, and the masses of the joined pieces."""
-    held = len(parent) - 1
-    number = np.full(held + 1, -1, dtype=np.int32)
-    count = 0
-    for k in range(held):
-        root = root_of(parent, k)
-        if root != held and number[root] < 0:
-            number[root] = count
-            count += 1
-    totals = np.zeros(count)
-    for k in range(held):
-        number[k] = number[root_of(parent, k)]
-        if number[k] >= 0:
-            totals[number[k]] += masses[k]
-    joined = np.empty(len(piece), dtype=np.int32)
-    for v in range(len(piece)):
-        joined[v] = number[piece[v]] if piece[v] >= 0 else -1
-    return joined, totals
 
 
 @njit(cache=True)

@@ -1,11 +1,11 @@
 """The substeps of a step: pieces in which scripts go straight, and halves of them where a substep fails.
 
-Everything is counted in units of the shortest substep that is possible, of which a step has a power of two.
+All are the step divided by a power of two.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,9 +44,9 @@ def turns(system: System, begin: float, end: float, tolerance: float) -> bool:
     return False
 
 
-# A script that never goes straight, such as one that jumps, is followed in at most this many pieces of the step. With
-# less than half a turn in each, that follows up to 500 turns in a step.
-_MOST_PIECES = 1024
+# A script that never goes straight, such as one that jumps, is followed in pieces no shorter than this share of
+# the step. With less than half a turn in each, that follows up to 500 turns in a step.
+_SHORTEST_PIECE = 1.0 / 1024.0
 
 
 @dataclass(eq=False)
@@ -57,7 +57,8 @@ class Substepping:
     ----------
     tolerance : how far a script may go off the straight line within a piece [m]
     halves : a power of two, the number of substeps that one piece may take
-    done, size : units that are behind, and that the next substep takes; piece : (first, last) unit of the present piece
+    ahead : what is left of the step, the next substep last: where each begins and ends, and how short it may become, 0
+        where it may still be divided into pieces; all as shares of the step
     """
 
     system: System
@@ -65,9 +66,7 @@ class Substepping:
     dt: float
     tolerance: float
     halves: int
-    done: int = 0
-    size: int = 0
-    piece: tuple[int, int] = (0, 0)
+    ahead: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 1.0, 0.0)])
 
     @classmethod
     def of(cls, system: System, begin: float, dt: float, tolerance: float, max_substeps: int) -> Substepping:
@@ -77,49 +76,41 @@ class Substepping:
         return substepping
 
     @property
-    def units(self) -> int:
-        return self.halves * _MOST_PIECES if self.halves > 1 else 1
-
-    @property
     def over(self) -> bool:
-        return self.done >= self.units
+        return not self.ahead
 
     @property
     def end(self) -> float:
         """Time at the end of the next substep [s]."""
-        return self.time(self.done + self.size)
+        return self.begin + self.dt * self.ahead[-1][1]
 
     @property
     def length(self) -> float:
         """Of the next substep [s]."""
-        return self.dt * (self.size / self.units)
-
-    def time(self, unit: int) -> float:
-        return self.begin + self.dt * (unit / self.units)
+        first, last, _ = self.ahead[-1]
+        return self.dt * (last - first)
 
     def halve(self) -> bool:
         """Make the next substep half as long; False where it may not be shorter."""
-        first, last = self.piece
-        if self.size * self.halves <= last - first:
+        first, last, shortest = self.ahead[-1]
+        if last - first <= shortest:
             return False
-        self.size //= 2
+        middle = 0.5 * (first + last)
+        self.ahead[-1:] = [(middle, last, shortest), (first, middle, shortest)]
         return True
 
     def advance(self) -> None:
-        """After a substep: the next one is twice as long where that fits the piece."""
-        self.done += self.size
-        first, last = self.piece
-        if self.done == last:
-            if not self.over:
-                self._find_piece()
-            return
-        while (self.done - first) % (2 * self.size) == 0 and self.done + 2 * self.size <= last:
-            self.size *= 2
+        """After a substep: the next one is as long as what is left of those that were halved."""
+        self.ahead.pop()
+        self._find_piece()
 
     def _find_piece(self) -> None:
-        """The longest straight piece from here on, of those that repeated halving of the step gives."""
-        size = self.done & -self.done or self.units
-        begin = self.time(self.done)
-        while size > self.halves and turns(self.system, begin, self.time(self.done + size), self.tolerance):
-            size //= 2
-        self.piece, self.size = (self.done, self.done + size), size
+        """Halve what comes next until it is a straight piece, if it is not known to be one."""
+        while self.ahead and self.ahead[-1][2] == 0.0:
+            first, last, _ = self.ahead[-1]
+            begin, end = self.begin + self.dt * first, self.end
+            divisible = self.halves > 1 and last - first > _SHORTEST_PIECE
+            if divisible and turns(self.system, begin, end, self.tolerance):
+                self.halve()
+            else:
+                self.ahead[-1] = first, last, (last - first) / self.halves
