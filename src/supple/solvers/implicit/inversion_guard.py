@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,52 +22,6 @@ from supple.runtime.kernel_cache import njit, prange, read_only
 from supple.solvers.implicit.energies.quadratic.bernstein_barrier import BernsteinBarrier
 
 
-@dataclass(frozen=True, eq=False)
-class QuadraticGuard:
-    """The step filter on quadratic tets.
-
-    Attributes
-    ----------
-    by_coefficients : (k,) where all Bernstein coefficients of the determinant are positive at the start of a step, and
-        at rest. They have a barrier and stay positive. In the other elements, which are strongly curved, the
-        determinant itself is kept positive.
-    """
-
-    tets: QuadraticTets
-    by_coefficients: NDArray[np.bool_]
-
-    @classmethod
-    def at(cls, tets: QuadraticTets, x: NDArray[np.float64]) -> QuadraticGuard:
-        """For a step from x (n, 3)."""
-        here = np.empty(len(tets.rows), dtype=np.bool_)
-        positive_coefficients(x, tets.nodes, here)
-        return cls(tets, here & (tets.rest_coefficients > 0.0).all(axis=1))
-
-    def largest_step(
-        self, x: NDArray[np.float64], direction: NDArray[np.float64], guarded: NDArray[np.bool_], keep: float
-    ) -> tuple[float, int]:
-        """The largest step for the `guarded` (k,) elements, and which of all tets limits it (-1 where none does)."""
-        step, k = quadratic_noninverting_step(x, direction, self.tets.nodes, guarded, self.by_coefficients, keep)
-        return float(step), -1 if k < 0 else int(self.tets.rows[k])
-
-    def allows(self, x: NDArray[np.float64], guarded: NDArray[np.bool_]) -> bool:
-        """Whether all guarded elements are positive everywhere at x."""
-        positive = np.empty(len(guarded), dtype=np.bool_)
-        positive_coefficients(x, self.tets.nodes, positive)
-        if (positive | ~guarded).all():
-            return True
-        if (guarded & self.by_coefficients & ~positive).any():
-            return False
-        return bool((are_positive(self.tets, x) | ~guarded).all())
-
-
-def are_positive(tets: QuadraticTets, x: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(k,) whether J is positive everywhere in a quadratic tet."""
-    positive = np.empty(len(tets.rows), dtype=np.bool_)
-    positive_elements(read_only(x), read_only(tets.nodes), positive)
-    return positive
-
-
 @dataclass(eq=False)
 class InversionGuard:
     """The step filter on all tets of every body that has no inverted one. Other bodies may recover first.
@@ -79,39 +34,44 @@ class InversionGuard:
     Attributes
     ----------
     guarded : (m,) bool; keep : share of its volume that a tet keeps at least in one step, in (0, 1)
-    complete : whether all tets are guarded; quadratic : how the quadratic ones are, or None
+    complete : whether all tets are guarded
+    by_coefficients : (k,) quadratic tets where all Bernstein coefficients of the determinant are positive at the start
+        of a step, and at rest. They have a barrier and stay positive. In the others, which are strongly curved, the
+        determinant itself is kept positive.
     """
 
     system: System
     guarded: NDArray[np.bool_]
     keep: float = KEEP
     complete: bool = False
-    quadratic: QuadraticGuard | None = None
+    by_coefficients: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     @classmethod
     def at(cls, system: System, x: NDArray[np.float64], keep: float = KEEP) -> InversionGuard:
         """Guard the bodies that have no flat or inverted tet at x."""
         guard = cls(system, np.zeros(len(system.tets), dtype=np.bool_), keep)
-        if system.quadratic is not None:
-            guard.quadratic = QuadraticGuard.at(system.quadratic, x)
+        if (tets := system.quadratic) is not None:
+            at_rest = (tets.rest_coefficients > 0.0).all(axis=1)
+            guard.by_coefficients = _of_elements(positive_coefficients, tets, x) & at_rest
         guard.widen(x)
         return guard
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
         """The largest step along `direction`, at most 1, and the tet that limits it (-1 where none does)."""
         step, tet = noninverting_step(x, direction, self.system.tets, self._linear, self.keep)
-        if self.quadratic is None:
+        if (tets := self.system.quadratic) is None:
             return float(step), int(tet)
-        own, which = self.quadratic.largest_step(x, direction, self.guarded[self.quadratic.tets.rows], self.keep)
-        return (own, which) if own < step else (float(step), int(tet))
+        guarded = self.guarded[tets.rows]
+        own, k = quadratic_noninverting_step(x, direction, tets.nodes, guarded, self.by_coefficients, self.keep)
+        return (float(own), int(tets.rows[k])) if own < step else (float(step), int(tet))
 
     @property
     def _linear(self) -> NDArray[np.bool_]:
         """(m,) the guarded linear tets."""
-        if self.quadratic is None:
+        if self.system.quadratic is None:
             return self.guarded
         linear = self.guarded.copy()
-        linear[self.quadratic.tets.rows] = False
+        linear[self.system.quadratic.rows] = False
         return linear
 
     def name(self, tet: int) -> str:
@@ -124,16 +84,19 @@ class InversionGuard:
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every guarded tet has a positive volume at x, a quadratic one everywhere in it."""
         kept = bool(keeps_volume(x, self.system.tets, self.system.rest_shape_inverse, self._linear))
-        if self.quadratic is None or not kept:
+        if (tets := self.system.quadratic) is None or not kept:
             return kept
-        return self.quadratic.allows(x, self.guarded[self.quadratic.tets.rows])
+        inverted = self.guarded[tets.rows] & ~_of_elements(positive_coefficients, tets, x)
+        if not inverted.any():
+            return True
+        return not ((inverted & self.by_coefficients).any() or (inverted & ~are_positive(tets, x)).any())
 
     def quadratic_barrier(self, onset: float) -> BernsteinBarrier | None:
         """The barrier below J = `onset` of the guarded quadratic tets; None where there is none."""
-        if self.quadratic is None:
+        if (tets := self.system.quadratic) is None:
             return None
-        tets, material = self.quadratic.tets, self.system.laws.material
-        chosen = np.flatnonzero(self.guarded[tets.rows] & self.quadratic.by_coefficients)
+        material = self.system.laws.material
+        chosen = np.flatnonzero(self.guarded[tets.rows] & self.by_coefficients)
         if len(chosen) == 0:
             return None
         rows = tets.rows[chosen]
@@ -178,6 +141,18 @@ def _are_positive(system: System, x: NDArray[np.float64]) -> NDArray[np.bool_]:
     if system.quadratic is not None:
         positive[system.quadratic.rows] = are_positive(system.quadratic, x)
     return positive
+
+
+def are_positive(tets: QuadraticTets, x: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(k,) whether J is positive everywhere in a quadratic tet."""
+    return _of_elements(positive_elements, tets, x)
+
+
+def _of_elements(kernel: Callable[..., None], tets: QuadraticTets, x: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(k,) what a kernel writes for each quadratic tet."""
+    out = np.empty(len(tets.rows), dtype=np.bool_)
+    kernel(read_only(x), read_only(tets.nodes), out)
+    return out
 
 
 @njit(parallel=True, cache=True)

@@ -52,13 +52,23 @@ def spring_hessians(springs: Springs, points: NDArray[np.float64], project: bool
     d = springs.extensions(points)
     lengths = np.linalg.norm(d, axis=1)
     n = d / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-    aside = 1.0 - springs.rest_lengths / np.where(lengths > 0.0, lengths, np.inf)
+    c, K = _coefficients(springs), spring_matrices(springs.stiffness, springs.rest_lengths, lengths, n, project)
+    out[:] = np.einsum("kp,kq,kij->kpiqj", c, c, K).reshape(-1, 12, 12)
+
+
+def spring_matrices(
+    stiffness: NDArray[np.float64],
+    rest_lengths: NDArray[np.float64],
+    lengths: NDArray[np.float64],
+    n: NDArray[np.float64],
+    project: bool,
+) -> NDArray[np.float64]:
+    """K (k, 3, 3) of springs with unit vectors n (k, 3); see above."""
+    aside = 1.0 - rest_lengths / np.where(lengths > 0.0, lengths, np.inf)
     if project:
         aside = np.maximum(aside, 0.0)
     both = np.einsum("ki,kj->kij", n, n)
-    K = springs.stiffness[:, None, None] * (both + aside[:, None, None] * (np.eye(3) - both))
-    c = _coefficients(springs)
-    out[:] = np.einsum("kp,kq,kij->kpiqj", c, c, K).reshape(-1, 12, 12)
+    return stiffness[:, None, None] * (both + aside[:, None, None] * (np.eye(3) - both))
 
 
 def _coefficients(springs: Springs) -> NDArray[np.float64]:

@@ -32,25 +32,6 @@ class _BlockMap:
     columns: NDArray[np.int32]
     factors: csr_array
 
-    @classmethod
-    def of(
-        cls,
-        ends: tuple[NDArray[np.int32], NDArray[np.int32]],
-        factors: NDArray[np.float64],
-        blocks: NDArray[np.int64],
-        count: int,
-    ) -> _BlockMap:
-        """Of the upper half of a symmetric matrix: `blocks[q]` times `factors[q]` is added to the pair `ends[.][q]`."""
-        first, second = ends
-        kept = (factors != 0.0) & (first <= second)
-        first, second = first[kept].astype(np.int64), second[kept].astype(np.int64)
-        n = int(max(second.max(initial=0), 0)) + 1
-        keys, place = np.unique(first * n + second, return_inverse=True)
-        rows, columns = np.divmod(keys, n)
-        shape = (len(keys), count)
-        matrix = csr_array((factors[kept], (place.ravel(), blocks[kept])), shape=shape)
-        return cls(rows.astype(np.int32), columns.astype(np.int32), matrix)
-
     def couplings(self, blocks: NDArray[np.float64]) -> Couplings:
         """Of blocks (b, 3, 3)."""
         sums = self.factors @ blocks.reshape(-1, 9)
@@ -119,30 +100,12 @@ class Reduction:
         if not moved.any():
             return given
         rows, columns, blocks = given.rows[moved], given.columns[moved], given.blocks[moved]
-        i, j, factors, number = _pairs(self.stands_for, self.weights, rows, columns)
         # A block of a vertex with itself is whole; between two vertices it stands for its transpose, too.
-        alone = rows == columns
-        kept = (factors != 0.0) & (~alone[number] | (i <= j))
-        i, j, factors, number = i[kept], j[kept], factors[kept], number[kept]
-        made = factors[:, None, None] * blocks[number]
-        both = (i == j) & ~alone[number]
-        made[both] += made[both].transpose(0, 2, 1)
-        return Couplings(
-            np.concatenate([given.rows[~moved], i]),
-            np.concatenate([given.columns[~moved], j]),
-            np.concatenate([given.blocks[~moved], made]),
-        )
-
-
-def _pairs(
-    stands_for: NDArray[np.int32], weights: NDArray[np.float64], p: NDArray[np.int32], q: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64], NDArray[np.int64]]:
-    """The pairs of vertices that pairs p (k,) and q (k,) stand for, 16 each: both ends, factors, and rows of p."""
-    shape = (len(p), 4, 4)
-    i = np.broadcast_to(stands_for[p][:, :, None], shape).ravel()
-    j = np.broadcast_to(stands_for[q][:, None, :], shape).ravel()
-    factors = (weights[p][:, :, None] * weights[q][:, None, :]).ravel()
-    return i, j, factors, np.repeat(np.arange(len(p)), 16)
+        two = rows != columns
+        blocks = np.concatenate([blocks, blocks[two].transpose(0, 2, 1)])
+        ends = np.append(rows, columns[two]), np.append(columns, rows[two])
+        made = _expanded(self.stands_for, self.weights, *ends, np.arange(len(blocks)), len(blocks)).couplings(blocks)
+        return Couplings.joined([Couplings(given.rows[~moved], given.columns[~moved], given.blocks[~moved]), made])
 
 
 def _expanded(
@@ -153,6 +116,17 @@ def _expanded(
     blocks: NDArray[np.int64],
     count: int,
 ) -> _BlockMap:
-    """Of ordered pairs of vertices p (k,) and q (k,), whose blocks have the numbers (k,) among `count`."""
-    i, j, factors, number = _pairs(stands_for, weights, p, q)
-    return _BlockMap.of((i, j), factors, blocks[number], count)
+    """Of all ordered pairs of vertices p (k,) and q (k,), whose blocks have the numbers (k,) among `count`: the upper
+    half of the symmetric matrix between the vertices that they stand for."""
+    shape = (len(p), 4, 4)
+    i = np.broadcast_to(stands_for[p][:, :, None], shape).ravel()
+    j = np.broadcast_to(stands_for[q][:, None, :], shape).ravel()
+    factors = (weights[p][:, :, None] * weights[q][:, None, :]).ravel()
+    kept = (factors != 0.0) & (i <= j)
+    first, second = i[kept].astype(np.int64), j[kept].astype(np.int64)
+    n = int(max(second.max(initial=0), 0)) + 1
+    keys, place = np.unique(first * n + second, return_inverse=True)
+    rows, columns = np.divmod(keys, n)
+    of_blocks = np.repeat(blocks, 16)[kept]
+    matrix = csr_array((factors[kept], (place.ravel(), of_blocks)), shape=(len(keys), count))
+    return _BlockMap(rows.astype(np.int32), columns.astype(np.int32), matrix)

@@ -17,42 +17,34 @@ from supple.model.loads.actuators.laws import ForceLaw
 from supple.model.loads.muscles import FibreTension
 from supple.model.system import System
 from supple.numerics.sparse.couplings import RankOne
+from supple.solvers.implicit.energies.loads.springs import LoadPotential
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
 
 
 @dataclass(frozen=True, eq=False)
-class MusclePotential(Potential):
-    """One muscle at one time."""
+class MusclePotential(LoadPotential):
+    """The muscles of a scene."""
 
-    muscle: FibreTension
-    time: float
-    projection = Projection.RELEASED_FIRST
-
-    def value(self, x: NDArray[np.float64]) -> float:
-        return self.muscle.energy(x, self.time)
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        pull = np.zeros_like(out)
-        self.muscle.add_forces(x, self.time, pull)
-        out -= pull
+    loads: tuple[FibreTension, ...]
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         """By F d: a S (f' n n^T + f / s (1 - n n^T)); with `project`, the first term where it is positive."""
-        m = self.muscle
-        stretches, n = m.fibres(x)
-        along, across = m.slope(stretches), m.share(stretches) / np.where(stretches > 0.0, stretches, np.inf)
-        if project:
-            along = np.maximum(along, 0.0)
-        factors = m.activation(self.time) * m.strengths
-        by_way = (factors * (along - across))[:, None, None] * n[:, :, None] * n[:, None, :]
-        by_way += (factors * across)[:, None, None] * np.eye(3)
-        blocks = np.einsum("mp,mq,mij->mpiqj", m.coefficients, m.coefficients, by_way)
-        out.tets[m.fibres_at_rest.rows] += blocks.reshape(-1, 12, 12)
+        for m in self.loads:
+            stretches, n = m.fibres(x)
+            along, across = m.slope(stretches), m.share(stretches) / np.where(stretches > 0.0, stretches, np.inf)
+            if project:
+                along = np.maximum(along, 0.0)
+            factors = m.activation(self.time) * m.strengths
+            by_way = (factors * (along - across))[:, None, None] * n[:, :, None] * n[:, None, :]
+            by_way += (factors * across)[:, None, None] * np.eye(3)
+            blocks = np.einsum("mp,mq,mij->mpiqj", m.coefficients, m.coefficients, by_way)
+            out.tets[m.fibres_at_rest.rows] += blocks.reshape(-1, 12, 12)
 
 
 def muscles_at(system: System, time: float) -> list[MusclePotential]:
-    """The muscles of a system at `time` [s]."""
-    return [MusclePotential(load, time) for load in system.loads if isinstance(load, FibreTension)]
+    """The muscles of a system at `time` [s]; no term where there are none."""
+    muscles = tuple(load for load in system.loads if isinstance(load, FibreTension))
+    return [MusclePotential(muscles, time)] if muscles else []
 
 
 # How much stiffer than the body a prescribed coordinate is held within a minimization: the error of the constraint

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.model.loads.muscles import FibreTension
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
 from supple.numerics.sparse.couplings import Couplings
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.solvers.implicit.energies.stitches import spring_matrices
 from supple.solvers.implicit.energies.vertex_potential import VertexPotential
 
 
@@ -27,32 +29,36 @@ def soft_targets_at(system: System, time: float) -> list[VertexPotential]:
 
 
 @dataclass(frozen=True, eq=False)
-class SpringPotential(Potential):
-    """The springs with their rest lengths at `time` [s]."""
+class LoadPotential(Potential):
+    """Loads with an energy at `time` [s]."""
 
-    springs: tuple[PointSpring, ...]
+    loads: tuple[PointSpring | FibreTension, ...]
     time: float
     projection = Projection.RELEASED_FIRST
-    work = "springs"
 
     def value(self, x: NDArray[np.float64]) -> float:
-        return sum(spring.energy(x, self.time) for spring in self.springs)
+        return sum(load.energy(x, self.time) for load in self.loads)
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         pull = np.zeros_like(out)
-        for spring in self.springs:
-            spring.add_forces(x, self.time, pull)
+        for load in self.loads:
+            load.add_forces(x, self.time, pull)
         out -= pull
+
+
+@dataclass(frozen=True, eq=False)
+class SpringPotential(LoadPotential):
+    """The springs of a scene."""
+
+    loads: tuple[PointSpring, ...]
+    work = "springs"
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         """By r: k n n^T + k (1 - l0 / l) (I - n n^T); with `project`, the second term only where it is positive."""
-        for spring in self.springs:
+        for spring in self.loads:
             length, n = spring.length(x)
-            across = 1.0 - spring.rest_length(self.time) / length if length > 0.0 else 0.0
-            if project:
-                across = max(across, 0.0)
-            along = np.outer(n, n)
-            by_r = spring.stiffness * (along + across * (np.eye(3) - along))
+            rest = np.array([spring.rest_length(self.time)])
+            by_r = spring_matrices(np.array([spring.stiffness]), rest, np.array([length]), n[None], project)
             c, (i, j) = spring.coefficients, np.triu_indices(len(spring.vertices))
             blocks = (c[i] * c[j])[:, None, None] * by_r
             out.loads.append(Couplings(spring.vertices[i], spring.vertices[j], blocks))
