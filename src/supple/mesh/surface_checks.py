@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from supple.mesh.checked_arrays import frozen, place
 from supple.mesh.topology import Components, edge_keys, facet_keys
 from supple.numerics.geometry.triangle_crossings import crossing_triangles
+from supple.numerics.geometry.winding_number import winding_number
 
 # Unconnected triangles can have millions of intersections; a few are enough to find the fault.
 MAX_INTERSECTIONS = 100
@@ -260,29 +261,18 @@ def _wrong_facing(surface: CheckedSurface, nested: bool) -> NDArray[np.int32]:
     corners = corners - corners.mean(axis=(0, 1))
     signed = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
     volumes = np.bincount(labels, weights=signed, minlength=count)
-    members = [corners[labels == k] for k in range(count)] if count > 1 else [corners]
-    lows = np.array([m.min(axis=(0, 1)) for m in members])
-    highs = np.array([m.max(axis=(0, 1)) for m in members])
+    members = [np.flatnonzero(labels == k) for k in range(count)]
+    lows = np.array([corners[rows].min(axis=(0, 1)) for rows in members])
+    highs = np.array([corners[rows].max(axis=(0, 1)) for rows in members])
+    points, triangles = corners.reshape(-1, 3), np.arange(corners.size // 3, dtype=np.int32).reshape(-1, 3)
     wrong = []
     for k in range(count):
-        point = members[k][0, 0]
+        point = corners[members[k][0], 0]
         around = np.flatnonzero(((lows < point) & (highs > point)).all(axis=1))
         depth = 0
         if nested:
-            depth = sum(abs(winding_number(members[other], point)) > 0.5 for other in around if other != k)
+            of = [triangles[members[other]] for other in around if other != k]
+            depth = sum(abs(winding_number(points, piece, tuple(point))) > 0.5 for piece in of)
         if (volumes[k] > 0.0) != (depth % 2 == 0):
             wrong.append(k)
     return np.array(wrong, dtype=np.int32)
-
-
-def winding_number(triangles: NDArray[np.float64], point: NDArray[np.float64]) -> float:
-    """How many times closed triangles (m, 3, 3) wind around a point: 1 inside, 0 outside, -1 inside an inward surface.
-
-    Sum of signed solid angles (Van Oosterom & Strackee 1983, eq. 8) over 4 pi.
-    """
-    a, b, c = (triangles - point).transpose(1, 0, 2)
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    det = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dots = [np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a))]
-    below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
-    return float(np.arctan2(det, below).sum() / (2.0 * np.pi))

@@ -9,8 +9,9 @@ start than the longest edge there: welded points stay where they are on the rigi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,11 +74,24 @@ def stitch_filter(
     s, e, f = len(owner), len(edges), len(triangles)
     points, faces = stitched_triangles(nodes, triangles, s)
     one, other = stitched_edges(nodes, edges, s)
-    near_triangles, near_edges = _touching(mesh, nodes, start, owner, collide, touching)
+    lengths = np.linalg.norm(start[edges[:, 1]] - start[edges[:, 0]], axis=1)
+    stitched = np.zeros(s, dtype=np.bool_)
+    stitched[nodes[nodes >= 0]] = True
+    joined = np.zeros_like(collide)
+    for k in range(1, nodes.shape[1]):
+        both = (nodes[:, 0] >= 0) & (nodes[:, k] >= 0)
+        joined[owner[nodes[both, 0]], owner[nodes[both, k]]] = True
+    joined = (joined | joined.T) & collide
+    near = [_near(mesh, start, joined, touching or _TOUCHING * float(lengths.mean()), stitched, np.any)]
     if welded is not None:
-        more_triangles, more_edges = _welded(mesh, welded, start, owner)
-        near_triangles = np.concatenate([near_triangles, more_triangles])
-        near_edges = np.concatenate([near_edges, more_edges])
+        marked = np.zeros(s, dtype=np.bool_)
+        marked[welded.points] = True
+        ring = marked[edges].any(axis=1)
+        marked[edges[ring]] = True
+        joined = np.zeros_like(collide)
+        joined[tuple(welded.joined.T)] = True
+        near.append(_near(mesh, start, joined | joined.T, float(lengths[ring].max(initial=0.0)), marked, np.all))
+    near_triangles, near_edges = (np.concatenate(kind) for kind in zip(*near, strict=True))
     crossing = stitched_crossings(nodes, triangles, s)
     crossing = crossing + _crossings((triangles, triangle_edges), near_triangles, near_edges, (s, e))
     t, u = crossing.nonzero()
@@ -111,59 +125,20 @@ def _crossings(
     return csr_array(near + edges @ incidence(near_edges[:, 0], near_edges[:, 1], (e, e)) @ edges.T)
 
 
-def _touching(
+def _near(
     mesh: Mesh,
-    nodes: NDArray[np.int32],
-    start: NDArray[np.float64],
-    owner: NDArray[np.int32],
-    collide: NDArray[np.bool_],
-    reach: float | None,
+    x: NDArray[np.float64],
+    joined: NDArray[np.bool_],
+    reach: float,
+    marked: NDArray[np.bool_],
+    of: Callable[..., Any],
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Pairs (k, 2) of points with triangles, and of edges with edges, that touch at the start; see the module."""
-    triangles, edges, _, _ = mesh
-    reach = reach or _TOUCHING * float(np.linalg.norm(start[edges[:, 1]] - start[edges[:, 0]], axis=1).mean())
-    stitched = np.zeros(len(owner), dtype=np.bool_)
-    stitched[nodes[nodes >= 0]] = True
-    joined = np.zeros_like(collide)
-    for k in range(1, nodes.shape[1]):
-        both = (nodes[:, 0] >= 0) & (nodes[:, k] >= 0)
-        one, other = owner[nodes[both, 0]], owner[nodes[both, k]]
-        joined[one, other] = joined[other, one] = True
-    near_triangles, near_edges = _nearer(mesh, start, joined & collide, reach)
-    of_triangles = stitched[near_triangles[:, 0]] | stitched[triangles[near_triangles[:, 1]]].any(axis=1)
-    of_edges = stitched[edges[near_edges]].any(axis=(1, 2))
-    return near_triangles[of_triangles], near_edges[of_edges]
+    """Pairs (k, 2) of points with triangles, and of edges with edges, of owners that are joined, nearer than `reach`.
 
-
-def _welded(
-    mesh: Mesh,
-    welded: WeldedPoints,
-    start: NDArray[np.float64],
-    owner: NDArray[np.int32],
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Pairs (k, 2) of points with triangles, and of edges with edges, that welds exclude; see the module."""
-    triangles, edges, _, _ = mesh
-    is_welded = np.zeros(len(owner), dtype=np.bool_)
-    is_welded[welded.points] = True
-    ring = edges[is_welded[edges].any(axis=1)]
-    near = is_welded.copy()
-    near[ring] = True
-    reach = float(np.linalg.norm(start[ring[:, 1]] - start[ring[:, 0]], axis=1).max(initial=0.0))
-    count = int(max(owner.max(), welded.joined.max())) + 1
-    joined = np.zeros((count, count), dtype=np.bool_)
-    joined[tuple(welded.joined.T)] = joined[tuple(welded.joined[:, ::-1].T)] = True
-    near_triangles, near_edges = _nearer(mesh, start, joined, reach)
-    of_triangles = near[near_triangles[:, 0]] | near[triangles[near_triangles[:, 1]]].all(axis=1)
-    whole = np.asarray(near[edges].all(axis=1))
-    of_edges = whole[near_edges[:, 0]] | whole[near_edges[:, 1]]
-    return near_triangles[of_triangles], near_edges[of_edges]
-
-
-def _nearer(
-    mesh: Mesh, x: NDArray[np.float64], collide: NDArray[np.bool_], reach: float
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Pairs (k, 2) of points with triangles, and of edges with edges, of the owners that `collide` (p, p)."""
+    One of both is a marked point, or any or all (`of`) of its points are marked.
+    """
     triangles, edges, _, patches = mesh
-    every = np.arange(len(x), dtype=np.int32)
-    parts = Parts(every, triangles, edges, collide, no_lists(len(x)), no_lists(len(edges)))
-    return pairs_nearer(np.ascontiguousarray(x), parts, patches, reach)
+    parts = Parts(np.arange(len(x), dtype=np.int32), triangles, edges, joined, no_lists(len(x)), no_lists(len(edges)))
+    faces, sides = pairs_nearer(np.ascontiguousarray(x), parts, patches, reach)
+    marked_triangles, marked_edges = of(marked[triangles], axis=1), of(marked[edges], axis=1)
+    return faces[marked[faces[:, 0]] | marked_triangles[faces[:, 1]]], sides[marked_edges[sides].any(axis=1)]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.start.surfaces import StartSurfaces, winding_number
+from supple.contact.start.surfaces import StartSurfaces
 from supple.numerics.geometry.box_tree import boxes_of_labels, boxes_of_triangles
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
+from supple.numerics.geometry.winding_number import winding_number
 from supple.scene.contact_pairs import PairTable
 
 # How far a surface is moved inwards to test whether it only touches, as a share of its size.

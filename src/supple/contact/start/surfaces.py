@@ -1,4 +1,4 @@
-"""The surfaces of a scene at its start as one list of triangles, and whether points are inside them."""
+"""The surfaces of a scene at its start as one list of triangles."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from supple.contact.mesh.contact_mesh import joined_surfaces
 from supple.contact.mesh.obstacles import placed_with_obstacles, with_obstacles
+from supple.mesh.closed_surfaces import is_closed
 from supple.mesh.topology import connected_components
 from supple.model.system import System
-from supple.numerics.mat3 import cross, dot, row, subtract
-from supple.runtime.kernel_cache import njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,19 +70,11 @@ def start_surfaces(system: System, positions: NDArray[np.float64], time: float) 
         if part.obstacle.is_room:
             rooms.append(thing)
             solid[thing] = False
-        solid[thing] &= _is_closed(part.triangles)
+        solid[thing] &= is_closed(part.triangles)
     points, triangles, owner = joined_surfaces(extended, ranges)
     owner = owner[triangles[:, 0]]
     first_row, pieces = np.searchsorted(owner, np.arange(count)), _pieces(triangles, owner, len(points))
     return StartSurfaces(points.positions(x), triangles, owner, first_row, pieces, tuple(planes), tuple(rooms), solid)
-
-
-def _is_closed(triangles: NDArray[np.integer]) -> bool:
-    """Whether every edge has as many triangles on one side as on the other."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
-    n = int(edges.max(initial=0)) + 1
-    keys, backward = np.sort(edges[:, 0] * n + edges[:, 1]), np.sort(edges[:, 1] * n + edges[:, 0])
-    return np.array_equal(keys, backward)
 
 
 def _pieces(triangles: NDArray[np.int32], owner: NDArray[np.int32], n: int) -> NDArray[np.int64]:
@@ -91,20 +82,3 @@ def _pieces(triangles: NDArray[np.int32], owner: NDArray[np.int32], n: int) -> N
     _, rows = np.unique(labels, return_index=True)
     rows = np.sort(rows)
     return np.column_stack([owner[rows], triangles[rows, 0]]).astype(np.int64)
-
-
-@njit(cache=True)
-def winding_number(x, triangles, q):
-    """The winding number of a closed surface of triangles of x (n, 3) about the point q: 0 outside.
-
-    Source: van Oosterom, Strackee, "The solid angle of a plane triangle" (1983).
-    """
-    total = 0.0
-    for t in range(len(triangles)):
-        a = subtract(row(x, triangles[t, 0]), q)
-        b = subtract(row(x, triangles[t, 1]), q)
-        c = subtract(row(x, triangles[t, 2]), q)
-        la, lb, lc = np.sqrt(dot(a, a)), np.sqrt(dot(b, b)), np.sqrt(dot(c, c))
-        det = dot(a, cross(b, c))
-        total += np.arctan2(det, la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
-    return total / (2.0 * np.pi)

@@ -19,8 +19,8 @@ from supple.errors import MeshingError
 from supple.mesh.meshing.child_process import Limits, MesherResult, run_mesher
 from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
-from supple.mesh.surface_checks import winding_number
 from supple.mesh.topology import without_unused
+from supple.numerics.geometry.winding_number import winding_number
 
 
 def _remedy() -> str:
@@ -61,11 +61,10 @@ def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherR
         return inside
     corners = vertices[result.elements]
     volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-    triangles = surface.vertices[surface.triangles]
     for region in regions:
         members = np.flatnonzero(result.labels == region)
         middle = corners[members[volumes[members].argmax()]].mean(axis=0)
-        if winding_number(triangles, middle) < 0.5:
+        if winding_number(surface.vertices, surface.triangles, tuple(middle)) < 0.5:
             inside[members] = False
     return inside
 

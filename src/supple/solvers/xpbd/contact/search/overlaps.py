@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.search.distances import point_triangle_square
-from supple.contact.start.surfaces import winding_number
 from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle
+from supple.numerics.geometry.winding_number import winding_number
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.search.surface import Simplices
