@@ -15,6 +15,9 @@ from threadpoolctl import ThreadpoolController
 
 # A call into OpenMP takes 2 us; into TBB, Numba's own first choice, 270 us, and its threads shared no loop of a step.
 _LAYERS = ["omp", "tbb", "workqueue"]
+# Turns of a loop, some 15 us, for which threads of GNU OpenMP wait busily for the next kernel. By itself it waits for
+# milliseconds: where other processes are busy, a step then took up to 20 times as much of the processor.
+_SPINS = "1000"
 
 
 def threads_for(work: int, least: int) -> AbstractContextManager[None]:
@@ -59,6 +62,8 @@ class _Present(threading.local):
 _present = _Present()
 if "NUMBA_THREADING_LAYER_PRIORITY" not in os.environ:
     config.THREADING_LAYER_PRIORITY = _LAYERS  # pyright: ignore[reportAttributeAccessIssue]
+if not {"GOMP_SPINCOUNT", "OMP_WAIT_POLICY"} & os.environ.keys():
+    os.environ["GOMP_SPINCOUNT"] = _SPINS  # GNU OpenMP reads it where it is loaded, with the first parallel kernel
 _UNCHANGED = nullcontext()
 
 
