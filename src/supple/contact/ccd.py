@@ -177,13 +177,13 @@ class Limit(NamedTuple):
     Attributes
     ----------
     step : in [0, 1]
-    kind : "vertex-triangle" or "edge-edge", or "" where nothing limits the step
-    pair : point and triangle, or two edges; (-1, -1) for none
+    kind : VERTEX_TRIANGLE or EDGE_EDGE
+    points : its four points; none where nothing limits the step
     """
 
     step: float
-    kind: str = ""
-    pair: tuple[int, int] = (-1, -1)
+    kind: int = VERTEX_TRIANGLE
+    points: tuple[int, ...] = ()
 
 
 def largest_step(
@@ -200,12 +200,10 @@ def largest_step(
     The points may be moved by step * way in rounded numbers. The pair is the first of those with the least step.
     """
     limit = Limit(1.0)
-    for kind, name, pairs in (
-        (VERTEX_TRIANGLE, "vertex-triangle", candidates.vertex_triangle),
-        (EDGE_EDGE, "edge-edge", candidates.edge_edge),
-    ):
+    for kind, pairs in ((VERTEX_TRIANGLE, candidates.vertex_triangle), (EDGE_EDGE, candidates.edge_edge)):
         step, k = _first(points, way, kind, mesh.triangles, mesh.edges, pairs, limit.step, floor)
-        limit = Limit(step, name, (int(pairs[k, 0]), int(pairs[k, 1]))) if k >= 0 else limit
+        if k >= 0:
+            limit = Limit(step, kind, tuple(map(int, corners(kind, mesh.triangles, mesh.edges, *pairs[k]))))
     return limit
 
 
@@ -224,7 +222,7 @@ def largest_step_in_pieces(
         begin = points if k == 0 else points + (k * share) * way
         part = share * way
         limit = largest_step(mesh, begin, part, finder.find(begin, begin + part), floor)
-        if limit.kind:
+        if limit.points:
             return limit._replace(step=(k + limit.step) * share)
     # A complete way must give exactly 1: count * (1 / count) can be slightly less.
     return Limit(1.0 if longest <= count * piece else count * share)

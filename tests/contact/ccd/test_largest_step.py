@@ -8,6 +8,7 @@ import pytest
 import supple as sp
 from supple.contact.candidates import CandidateFinder
 from supple.contact.ccd import largest_step, largest_step_in_pieces
+from supple.contact.features.pair_geometry import VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import intersects, mesh_of_triangles
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
@@ -39,9 +40,7 @@ def test_a_box_that_falls_on_another_keeps_a_tenth_of_the_distance(length):
     if length < 1.0:  # in one piece; a later piece keeps a tenth of what the earlier ones leave
         assert left == pytest.approx(0.025, rel=0.06)
     assert 1e-4 < left < 0.1
-    assert limit.kind in ("vertex-triangle", "edge-edge")
-    parts = mesh.triangles[limit.pair[1]] if limit.kind == "vertex-triangle" else mesh.edges[limit.pair[1]]
-    first = limit.pair[0] if limit.kind == "vertex-triangle" else mesh.edges[limit.pair[0], 0]
+    first, *parts = limit.points if limit.kind == VERTEX_TRIANGLE else limit.points[1:]
     assert {mesh.owner[first], mesh.owner[parts[0]]} == {0, 1}
 
 
@@ -50,7 +49,7 @@ def test_a_way_that_leads_away_is_taken_completely():
     way = np.zeros_like(x)
     way[mesh.owner == 1, 1] = 7.3
     limit = largest_step_in_pieces(CandidateFinder(mesh, 1e-3), x, way)
-    assert (limit.step, limit.kind, limit.pair) == (1.0, "", (-1, -1))
+    assert (limit.step, limit.points) == (1.0, ())
     assert largest_step_in_pieces(CandidateFinder(mesh, 1e-3), x, np.zeros_like(x)).step == 1.0
 
 
@@ -63,9 +62,9 @@ def test_a_way_that_is_not_finite_is_not_taken(value):
 
 
 def distance_of(mesh, limit, x):
-    if limit.kind == "vertex-triangle":
-        return np.sqrt(ipctk.point_triangle_distance(x[limit.pair[0]], *x[mesh.triangles[limit.pair[1]]]))
-    one, other = mesh.edges[list(limit.pair)]
+    if limit.kind == VERTEX_TRIANGLE:
+        return np.sqrt(ipctk.point_triangle_distance(*x[list(limit.points)]))
+    one, other = list(limit.points[:2]), list(limit.points[2:])
     return np.sqrt(ipctk.edge_edge_distance(*x[one], *x[other]))
 
 
@@ -79,7 +78,7 @@ def test_random_ways_never_lead_to_intersections_and_end_at_a_tenth_of_a_distanc
         limit = largest_step_in_pieces(finder, x, way)
         for share in (0.3, 0.7, 1.0):
             assert not intersects(mesh, x + share * limit.step * way)
-        if limit.kind and np.linalg.norm(way, axis=1).max() < mesh.edge_lengths.mean():  # in one piece
+        if limit.points and np.linalg.norm(way, axis=1).max() < mesh.edge_lengths.mean():  # in one piece
             end = distance_of(mesh, limit, x + limit.step * way)
             assert 0.0999 <= end / distance_of(mesh, limit, x) <= 0.106
             limited += 1

@@ -231,7 +231,7 @@ class Implicit(Solver):
         forces, parts, works = start_of(system)
         parts = [each.parts(now.positions) for each in system.actuators]
         energy, residual = no_works(system), 0.0
-        time_errors: list[float] = []
+        time_error: float | None = None
         while not substepping.over:
             with threads_for(len(system.tets), _SHARED_FROM), workspace.tools.linear_solver.own_threads():
                 taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
@@ -251,31 +251,34 @@ class Implicit(Solver):
             works = [w + Q * (s - t) for w, Q, s, t in zip(works, forces, parts, before, strict=True)]
             add_works(energy, taken.works)
             residual += taken.residual
-            time_errors += [] if taken.time_error is None else [taken.time_error]
+            if taken.time_error is not None:
+                time_error = (time_error or 0.0) + taken.time_error
             substeps += 1
             substepping.advance()
         add_works(energy, works_of_actuators(system, works))
-        time_error = sum(time_errors) if time_errors else None
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
         workspace.checked = now
-        details = replace(ImplicitDetails.of_rows(rows, substeps), work=energy, energy_residual=residual)
-        details = replace(details, time_error=time_error)
+        details = replace(
+            ImplicitDetails.of_rows(rows, substeps),
+            work=energy,
+            energy_residual=residual,
+            time_error=time_error,
+            orthogonality_errors=orthogonality_errors(system, now.positions),
+            **actuator_fields(system, forces, parts, works),
+        )
         nearest, contacts = None, None
         if last is not None:
             gradient = last.outcome.end.gradient / last.contact.weight
-            left = norm(workspace.tools.freed(gradient))
-            details = replace(details, unbalanced_force=left)
-            details = replace(details, weld_forces=weld_forces(system, gradient))
+            left, of_welds = norm(workspace.tools.freed(gradient)), weld_forces(system, gradient)
             if workspace.tools.linear_solver.reduction is not None:
                 workspace.tools.linear_solver.reduction.reduce(gradient)
             totals, by_vertex = reaction_forces(system, gradient)
+            details = replace(details, unbalanced_force=left, weld_forces=of_welds)
             details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
             details, nearest, contacts = last.contact.measured(details, last.state.positions)
             if last.joints is not None:
                 details = last.joints.measured(details, last.outcome.end.positions)
-        details = replace(details, **actuator_fields(system, forces, parts, works))
-        errors = orthogonality_errors(system, now.positions)
-        details = replace(details, orthogonality_errors=errors, seconds=workspace.tools.clock.shares())
+        details = replace(details, seconds=workspace.tools.clock.shares())
         return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)
 
 

@@ -34,7 +34,7 @@ class Approach(ContactPotential):
 
     def with_more(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> Approach:
         """The rows that push along a `way` (n, 3) from x (n, 3): those that are known, and those of new collisions."""
-        ahead = self.collisions.along(way)
+        ahead = self.collisions.half_spaces.points.positions(way)
         rows = self.rows.along(ahead).joined(self.collisions.ahead(x, ahead, self.target))
         return Approach(self.collisions, rows.where(rows.ends < self.target), self.stiffness)
 

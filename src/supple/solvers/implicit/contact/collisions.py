@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from supple.contact.barrier.barrier_energy import add_barrier_gradient, barrier_energy, barrier_hessian
 from supple.contact.barrier.collision_rows import CollisionRows, write_collisions
 from supple.contact.candidates import CandidateFinder
-from supple.contact.ccd import Limit, largest_step_in_pieces
+from supple.contact.ccd import largest_step_in_pieces
 from supple.contact.features.contact_set import ContactSet, Found
 from supple.contact.features.contacts import Contacts, KnownWeights
 from supple.contact.features.half_spaces import HalfSpaces
@@ -83,19 +83,15 @@ class Collisions:
         return self._found
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:
-        """How far along `direction` (n, 3), at most 1, nothing touches, and points of the pair that allows no more."""
+        """How far along `direction` (n, 3), at most 1, nothing touches; the points of the pair that allows no more."""
         points, way, s = self.points(x), self.half_spaces.points.positions(direction), len(self.mesh.points)
         step, row = self.half_spaces.largest_step(points, way)
         pair = [] if row < 0 else self.half_spaces.tets[row, [3, 0]].tolist()
         if step > 0.0:
             limit = largest_step_in_pieces(self._finder, points[:s], step * way[:s], self.floor)
             step *= limit.step
-            pair = self._points_of(limit) if limit.kind else pair
+            pair = list(limit.points) or pair
         return step, pair
-
-    def along(self, way: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The ways (s + 3 h, 3) of all points, from those of the vertices (n, 3)."""
-        return self.half_spaces.points.positions(way)
 
     def ahead(self, x: NDArray[np.float64], way: NDArray[np.float64], least: float) -> CollisionRows:
         """Rows of the pairs that collide while points go from x (n, 3) along `way` (s + 3 h, 3).
@@ -119,11 +115,6 @@ class Collisions:
         while (count := write_collisions(points[:s], way[:s], *pairs, self.floor, rows)) > len(rows.kinds):
             rows = CollisionRows.room(count)
         return rows.where(slice(count)).joined(on_planes.where(on_planes.ends < least))
-
-    def _points_of(self, limit: Limit) -> list[int]:
-        mesh, (i, j) = self.mesh, limit.pair
-        edges = limit.kind == "edge-edge"
-        return [int(mesh.edges[i, 0]), int(mesh.edges[j, 0])] if edges else [i, int(mesh.triangles[j, 0])]
 
     def intersect(self, x: NDArray[np.float64]) -> bool:
         """Whether any two triangles that may not cross do so at x."""

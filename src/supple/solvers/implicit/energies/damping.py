@@ -200,5 +200,5 @@ class QuadraticViscosity:
 def quadratic_viscosity_of(elasticity: Elasticity) -> QuadraticViscosity | None:
     """The viscosity of a system's quadratic tets; None where no material is damped."""
     quadratic = elasticity.quadratic
-    inner = None if quadratic is None else viscosity_of(quadratic.at_points)
+    inner = None if quadratic is None else viscosity_of(quadratic.inner)
     return None if quadratic is None or inner is None else QuadraticViscosity(quadratic.virtual, inner)

@@ -34,8 +34,8 @@ class QuadraticElasticity(OfQuadraticTets):
     means : see `mean_volume`; None where no material has such a term
     """
 
+    inner: Elasticity
     rows: NDArray[np.int64]
-    at_points: Elasticity
     internal: NDArray[np.int64]
     means: MeanVolumes | None
 
@@ -46,7 +46,7 @@ class QuadraticElasticity(OfQuadraticTets):
         means, own = laws.at_points
         elements = virtual.elements()
         at_points = Elasticity(elements, own, _law_elasticity(elements, own, np.ones(virtual.count, dtype=bool)))
-        return cls(at_points, virtual, tets.rows, at_points, rows_of_points(laws.material), means)
+        return cls(at_points, virtual, tets.rows, rows_of_points(laws.material), means)
 
     def value(self, x: NDArray[np.float64]) -> float:
         return super().value(x) if self.means is None else float(self.energies(x).sum())
@@ -54,7 +54,7 @@ class QuadraticElasticity(OfQuadraticTets):
     def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k,) of each element [J]."""
         y = self.virtual.corners(x)
-        energies = self.at_points.energies(y).reshape(len(self.rows), -1).sum(axis=1)
+        energies = self.inner.energies(y).reshape(len(self.rows), -1).sum(axis=1)
         return energies if self.means is None else energies + self.means.states(self.virtual.determinants(y))[0]
 
     def add_model(
@@ -67,7 +67,7 @@ class QuadraticElasticity(OfQuadraticTets):
         energies, pressures, stiffness = self.means.states(self.virtual.determinants(y))
         of_points = np.repeat(pressures, self.means.volumes.shape[1])
         blocks, forces = self.virtual.blocks(hessian), np.zeros_like(y)
-        energy = self.at_points.add_model(y, forces, blocks, project, of_points)
+        energy = self.inner.add_model(y, forces, blocks, project, of_points)
         self.virtual.add_forces(forces, gradient)
         if hessian is not None and blocks is not None:
             products = np.maximum(stiffness, 0.0) if project else stiffness
@@ -78,12 +78,11 @@ class QuadraticElasticity(OfQuadraticTets):
         """As of `Elasticity`, with the internal variables of all tets."""
         if not len(self.internal):
             return self
-        stepping = self.at_points.in_step(internal[self.internal], h)
-        return replace(self, inner=stepping, at_points=stepping)
+        return replace(self, inner=self.inner.in_step(internal[self.internal], h))
 
     def flowed(self, x: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
         """The rows `internal` at the end of a step, from the internal variables of all tets."""
-        return self.at_points.flowed(self.virtual.corners(x), internal[self.internal], h)
+        return self.inner.flowed(self.virtual.corners(x), internal[self.internal], h)
 
 
 @dataclass(frozen=True, eq=False)

@@ -147,8 +147,8 @@ class BDF2(Integrator):
 
     def position_error(self, before: State, end: State) -> NDArray[np.float64] | None:
         """2/9 h^3 of the third derivative of x, for equal steps, from the velocities of three times."""
-        past, h = before.memory, end.time - before.time
-        if not isinstance(past, History) or h > 2.0 * past.step or past.positions.shape != before.positions.shape:
+        h = end.time - before.time
+        if (past := _history(before, h)) is None:
             return BackwardEuler().position_error(before, end)
         w = h / past.step
         now, then = (end.velocities - before.velocities) / h, (before.velocities - past.velocities) / past.step
@@ -156,8 +156,7 @@ class BDF2(Integrator):
         return (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)) * h**3 * third
 
     def plan(self, system: System, state: State, h: float) -> Plan:
-        past = state.memory
-        if not isinstance(past, History) or h > 2.0 * past.step or past.positions.shape != state.positions.shape:
+        if (past := _history(state, h)) is None:
             return BackwardEuler().plan(system, state, h)
         x, v = state.positions, state.velocities
         w = h / past.step
@@ -178,6 +177,13 @@ class BDF2(Integrator):
             strain_rate=strain_rate,
             memory=History(x, v, h),
         )
+
+
+def _history(state: State, h: float) -> History | None:
+    """What BDF2 needs for a step of h [s]; None where there is none that suits."""
+    past = state.memory
+    fits = isinstance(past, History) and h <= 2.0 * past.step and past.positions.shape == state.positions.shape
+    return past if fits else None
 
 
 @dataclass(frozen=True)
