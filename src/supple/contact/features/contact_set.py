@@ -8,12 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.features.contacts import Contacts, KnownWeights
-from supple.contact.features.edge_contacts import (
-    edge_ends,
-    edge_weights,
-    saddle_weights,
-    write_edge_contacts,
-)
+from supple.contact.features.edge_contacts import edge_weights, write_edge_contacts
 from supple.contact.features.vertex_contacts import REACH, write_vertex_contacts
 from supple.contact.features.vertex_features import alternating_sums, grouped, near_features
 from supple.contact.mesh.contact_mesh import ContactMesh
@@ -79,42 +74,21 @@ class ContactSet:
         )
         starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
         count = int(starts[-1, 1])
-        crossing, ends = edge_ends(x, edge_edge, areas, edges)
-        saddles = saddle_weights(edge_edge, areas, crossing, ends, edges, len(x))
+        crossing = np.flatnonzero(areas)
         out = Contacts.room(count + 2 * len(crossing))
-        keys, planes, grown = np.empty(count, np.int64), np.empty(count, np.int32), np.empty(count)
-        write_vertex_contacts(
-            x,
-            vertex_triangle,
-            rows,
-            starts,
-            codes,
-            signs,
-            shares,
-            self._of_vertices,
-            mesh.owner,
-            mesh.areas,
-            saddles,
-            dhat,
-            known,
-            out,
-            keys,
-            planes,
-            grown,
-        )
-        write_edge_contacts(x, edge_edge, areas, crossing, ends, edges, count, out)
+        saddles = write_edge_contacts(x, edge_edge, crossing, areas, edges, count, out)
+        new = KnownWeights(np.empty(count, np.int64), np.empty(count), np.empty(count, np.int32))
+        groups = rows, starts, codes, signs, shares
+        surface = mesh.owner, mesh.areas, saddles
+        write_vertex_contacts(x, vertex_triangle, groups, self._of_vertices, surface, dhat, known, out, new)
         least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
-        new = _new(keys, grown, planes).with_more(_new(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32)))
+        planes = new.codes[new.triangles >= 0]
+        of_edges = KnownWeights(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32))
+        new = new.with_weights().with_more(of_edges.with_weights())
         counted = (out.weights != 0.0) & (out.distances < dhat)
         if not counted.all():
             out = out.where(counted)
-        return Found(out, float(np.sqrt(least)), new, keys[planes >= 0])
-
-
-def _new(keys: NDArray[np.int64], grown: NDArray[np.float64], planes: NDArray[np.int32]) -> KnownWeights:
-    """Of the pairs that are to be known, those with `grown` zero or more."""
-    chosen = grown >= 0.0
-    return KnownWeights(keys[chosen], grown[chosen], planes[chosen])
+        return Found(out, float(np.sqrt(least)), new, planes)
 
 
 _NOTHING = Found(Contacts.room(0), np.inf, KnownWeights.none(), np.zeros(0, dtype=np.int64))

@@ -84,6 +84,10 @@ class KnownWeights(NamedTuple):
     def none(cls) -> KnownWeights:
         return cls(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int32))
 
+    def with_weights(self) -> KnownWeights:
+        """Those with a weight of zero or more."""
+        return KnownWeights._make(array[self.weights >= 0.0] for array in self)
+
     def with_more(self, more: KnownWeights) -> KnownWeights:
         """With further pairs, and the others' weights where both have one; `more` is in any order."""
         if not len(more.codes):

@@ -122,40 +122,39 @@ def _inward(x, triangles, t, a, b):
 
 
 @njit(cache=True)
-def edge_ends(x, pairs, weights, edges):
-    """Of the m pairs with a weight, the nearest end of one edge to the other.
+def write_edge_contacts(x, pairs, rows, weights, edges, first, out):
+    """Write two contacts for each of the rows (m,) of pairs with a weight into `out`, a `Contacts`, from `first` on.
 
     Returns
     -------
-    rows : (m,) rows of `pairs`; ends : (m,) 0, 1 for the first edge's ends, 2, 3 for the second's
-    """
-    rows = np.flatnonzero(weights)
-    ends = np.empty(len(rows), dtype=np.int8)
-    for m in range(len(rows)):
-        ids = _ids(edges, pairs[rows[m], 0], pairs[rows[m], 1])
-        least = np.inf
-        for end in range(4):
-            vertex, one, other = _end(ids, end)
-            _, r = nearest_of_edge(row(x, vertex), row(x, one), row(x, other))
-            if dot(r, r) < least:
-                least, ends[m] = dot(r, r), end
-    return rows, ends
-
-
-@njit(cache=True)
-def saddle_weights(pairs, weights, rows, ends, edges, s):
-    """Weights [m^2] that vertices (s,) need because they are ends of several edges that cross the same edge.
+    saddles : (s,) weights [m^2] that vertices need because they are ends of several edges that cross the same edge
 
     Every pair of edges takes the energy of its nearest end away. Where two edges of a ridge that bends away cross an
     edge beside their common vertex, that vertex's energy must be counted once more, or nothing is left of the three.
     """
-    out = np.zeros(s)
     codes = np.empty(len(rows), dtype=np.int64)
     for m in range(len(rows)):
-        e, f = pairs[rows[m], 0], pairs[rows[m], 1]
-        vertex, other = (edges[e, ends[m]], f) if ends[m] < 2 else (edges[f, ends[m] - 2], e)
-        codes[m] = np.int64(vertex) * len(edges) + other
-    order = np.argsort(codes, kind="mergesort")
+        k, n = rows[m], first + 2 * m
+        e, f = pairs[k, 0], pairs[k, 1]
+        ids = (edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1])
+        s, t, r, _ = crossing_point(row(x, ids[0]), row(x, ids[1]), row(x, ids[2]), row(x, ids[3]))
+        put(out, n, EDGE_EDGE, ids, (1.0 - s, s, t - 1.0, -t), r)
+        least, nearest = np.inf, 0
+        for end in range(4):
+            vertex, one, other = _end(ids, end)
+            _, r = nearest_of_edge(row(x, vertex), row(x, one), row(x, other))
+            if dot(r, r) < least:
+                least, nearest = dot(r, r), end
+        # The nearest end with the other edge, or with an end of that.
+        end, one, other = _end(ids, nearest)
+        w, r = nearest_of_edge(row(x, end), row(x, one), row(x, other))
+        if 0.0 < w < 1.0:
+            put(out, n + 1, VERTEX_EDGE, (end, one, other, -1), (1.0, w - 1.0, -w, 0.0), r)
+        else:
+            put(out, n + 1, VERTEX_VERTEX, (end, one if w == 0.0 else other, -1, -1), (1.0, -1.0, 0.0, 0.0), r)
+        out.weights[n], out.weights[n + 1] = weights[k], -weights[k]
+        codes[m] = np.int64(end) * len(edges) + (f if nearest < 2 else e)
+    saddles, order = np.zeros(len(x)), np.argsort(codes, kind="mergesort")
     begin = 0
     while begin < len(order):
         end, total, most = begin, 0.0, 0.0
@@ -164,32 +163,9 @@ def saddle_weights(pairs, weights, rows, ends, edges, s):
             total, most = total + weight, max(most, weight)
             end += 1
         vertex = codes[order[begin]] // len(edges)
-        out[vertex] = max(out[vertex], total - most)
+        saddles[vertex] = max(saddles[vertex], total - most)
         begin = end
-    return out
-
-
-@njit(cache=True)
-def write_edge_contacts(x, pairs, weights, rows, ends, edges, first, out):
-    """Write two contacts for each of the pairs of `edge_ends` into the rows of `out`, a `Contacts`, from `first` on."""
-    for m in range(len(rows)):
-        k, n = rows[m], first + 2 * m
-        ids = _ids(edges, pairs[k, 0], pairs[k, 1])
-        s, t, r, _ = crossing_point(row(x, ids[0]), row(x, ids[1]), row(x, ids[2]), row(x, ids[3]))
-        put(out, n, EDGE_EDGE, ids, (1.0 - s, s, t - 1.0, -t), r)
-        # An end with the other edge, or with an end of that.
-        end, one, other = _end(ids, ends[m])
-        w, r = nearest_of_edge(row(x, end), row(x, one), row(x, other))
-        if 0.0 < w < 1.0:
-            put(out, n + 1, VERTEX_EDGE, (end, one, other, -1), (1.0, w - 1.0, -w, 0.0), r)
-        else:
-            put(out, n + 1, VERTEX_VERTEX, (end, one if w == 0.0 else other, -1, -1), (1.0, -1.0, 0.0, 0.0), r)
-        out.weights[n], out.weights[n + 1] = weights[k], -weights[k]
-
-
-@njit
-def _ids(edges, e, f):
-    return edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1]
+    return saddles
 
 
 @njit

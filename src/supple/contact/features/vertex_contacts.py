@@ -34,21 +34,21 @@ REACH = math.sqrt(1.0 + _NONE**2)
 
 
 @njit(cache=True, parallel=True)
-def write_vertex_contacts(
-    x, pairs, rows, starts, codes, signs, shares, mesh, owner, areas, saddles, dhat, known, out, keys, planes, grown
-):
+def write_vertex_contacts(x, pairs, groups, mesh, surface, dhat, known, out, new):
     """Write the contacts of `alternating_sums` into the first rows of `out`, a `Contacts`.
 
     Parameters
     ----------
-    starts : (groups + 1, 2) where each group begins in `rows` and in `out`
+    groups : rows, starts (groups + 1, 2) where each group begins in `rows` and in `out`, codes, signs, shares
     mesh : triangles, edges, start and items of neighbors (see `ContactMesh`)
-    saddles : (s,) least weights of vertices that `saddle_weights` asks for [m^2]
+    surface : owner, areas, and (s,) least weights of vertices that `write_edge_contacts` asks for [m^2]
     known : the weights that do not depend on x, a `KnownWeights`
-    keys : (m,) codes for `KnownWeights`
-    planes : (m,) triangles whose planes count, -1 for other contacts
-    grown : (m,) weights of the vertices that are to be known [m^2], -1 where they do not change
+    new : (m,) another one, to be written: codes, the weights that are to be known [m^2], -1 where they do not change,
+        and triangles whose planes count, -1 for other contacts
     """
+    rows, starts, codes, signs, shares = groups
+    owner, areas, saddles = surface
+    keys, grown, planes = new
     triangles, edges, near_start, near_items = mesh
     kinds, points, _, vectors, distances, weights = out
     height = NEARER_SHARE * dhat

@@ -12,41 +12,31 @@ PARTS = ("elasticity", "contact", "joints", "linear_solve")
 
 
 @dataclass(eq=False)
-class Clock:
+class Clock(AbstractContextManager[None]):
     """Seconds since the last `restart`, by name of the part."""
 
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     start: float = 0.0
-    _spans: dict[str, _Span] = field(default_factory=dict)
+    _name: str = ""
+    _began: float = 0.0
 
     def restart(self) -> None:
         """Begin a step."""
         self.seconds.clear()
         self.start = perf_counter()
 
-    def of(self, name: str) -> AbstractContextManager[None]:
-        """Count the time of a block under a name; no block of that name may be in it."""
-        span = self._spans.get(name)
-        if span is None:
-            span = self._spans[name] = _Span(self.seconds, name)
-        return span
+    def of(self, name: str) -> Clock:
+        """Count the time of a block under a name; blocks are not within each other."""
+        self._name = name
+        return self
+
+    def __enter__(self) -> None:
+        self._began = perf_counter()
+
+    def __exit__(self, *error: object) -> None:
+        self.seconds[self._name] += perf_counter() - self._began
 
     def shares(self) -> dict[str, float]:
         """Seconds since the step began, of each of `PARTS` and of all else, named "other"."""
         shares = {name: self.seconds[name] for name in PARTS}
         return {**shares, "other": perf_counter() - self.start - sum(shares.values())}
-
-
-class _Span(AbstractContextManager[None]):
-    """A block whose time is counted; a class, since a generator takes several times longer to enter and leave."""
-
-    __slots__ = ("name", "seconds", "start")
-
-    def __init__(self, seconds: dict[str, float], name: str) -> None:
-        self.seconds, self.name, self.start = seconds, name, 0.0
-
-    def __enter__(self) -> None:
-        self.start = perf_counter()
-
-    def __exit__(self, *error: object) -> None:
-        self.seconds[self.name] += perf_counter() - self.start
