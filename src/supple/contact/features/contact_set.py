@@ -15,7 +15,7 @@ from supple.contact.mesh.contact_mesh import ContactMesh
 
 
 class Found(NamedTuple):
-    """What `ContactSet.of` has found.
+    """What `contacts_at` has found.
 
     Attributes
     ----------
@@ -31,64 +31,50 @@ class Found(NamedTuple):
     planes: NDArray[np.int64]
 
 
-class ContactSet:
-    """Finds the contacts among given pairs.
+def contacts_at(
+    x: NDArray[np.float64],
+    mesh: ContactMesh,
+    vertex_triangle: NDArray[np.int32],
+    edge_edge: NDArray[np.int32],
+    known: KnownWeights,
+    dhat: float,
+) -> Found:
+    """The contacts of a mesh at x (s, 3), nearer than dhat [m].
 
     Parameters
     ----------
-    dhat : [m] contacts are nearer than this
+    vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than `REACH` dhat
+    known : the weights that do not depend on x
     """
-
-    def __init__(self, mesh: ContactMesh, dhat: float) -> None:
-        self.dhat = dhat
-        self._mesh = mesh
-        self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors)
-        self._of_sums = (mesh.triangles, mesh.edges, mesh.triangle_edges, *mesh.vertex_triangles, mesh.owner)
-        self._of_edges = (mesh.triangles, mesh.edges, *mesh.edge_triangles)
-
-    def of(
-        self,
-        x: NDArray[np.float64],
-        vertex_triangle: NDArray[np.int32],
-        edge_edge: NDArray[np.int32],
-        known: KnownWeights,
-    ) -> Found:
-        """The contacts at x (s, 3).
-
-        Parameters
-        ----------
-        vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than `REACH` dhat
-        known : the weights that do not depend on x
-        """
-        if not len(vertex_triangle) and not len(edge_edge):
-            return _NOTHING
-        mesh, dhat, reach = self._mesh, self.dhat, REACH * self.dhat
-        triangles, edges = mesh.triangles, mesh.edges
-        features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
-        areas, edge_squares, edge_keys, edges_grown = edge_weights(
-            x, edge_edge, self._of_edges, mesh.edge_areas, dhat, known
-        )
-        rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
-        codes, signs, counts, shares = alternating_sums(
-            x, vertex_triangle, features, squares, rows, start, self._of_sums, known, reach
-        )
-        starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
-        count = int(starts[-1, 1])
-        crossing = np.flatnonzero(areas)
-        out = Contacts.room(count + 2 * len(crossing))
-        saddles = write_edge_contacts(x, edge_edge, crossing, areas, edges, count, out)
-        new = KnownWeights(np.empty(count, np.int64), np.empty(count), np.empty(count, np.int32))
-        groups = rows, starts, codes, signs, shares
-        surface = mesh.owner, mesh.areas, saddles
-        write_vertex_contacts(x, vertex_triangle, groups, self._of_vertices, surface, dhat, known, out, new)
-        least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
-        planes = new.codes[new.triangles >= 0]
-        of_edges = KnownWeights(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32))
-        new = new.with_weights().with_more(of_edges.with_weights())
-        counted = (out.weights != 0.0) & (out.distances < dhat)
-        if not counted.all():
-            out = out.where(counted)
-        return Found(out, float(np.sqrt(least)), new, planes)
+    if not len(vertex_triangle) and not len(edge_edge):
+        return _NOTHING
+    triangles, edges, reach = mesh.triangles, mesh.edges, REACH * dhat
+    of_sums = triangles, edges, mesh.triangle_edges, *mesh.vertex_triangles, mesh.owner
+    features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
+    areas, edge_squares, edge_keys, edges_grown = edge_weights(
+        x, edge_edge, (triangles, edges, *mesh.edge_triangles), mesh.edge_areas, dhat, known
+    )
+    rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
+    codes, signs, counts, shares = alternating_sums(
+        x, vertex_triangle, features, squares, rows, start, of_sums, known, reach
+    )
+    starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
+    count = int(starts[-1, 1])
+    crossing = np.flatnonzero(areas)
+    out = Contacts.room(count + 2 * len(crossing))
+    saddles = write_edge_contacts(x, edge_edge, crossing, areas, edges, count, out)
+    new = KnownWeights(np.empty(count, np.int64), np.empty(count), np.empty(count, np.int32))
+    groups, around = (rows, starts, codes, signs, shares), (triangles, edges, *mesh.neighbors)
+    surface = mesh.owner, mesh.areas, saddles
+    write_vertex_contacts(x, vertex_triangle, groups, around, surface, dhat, known, out, new)
+    least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
+    planes = new.codes[new.triangles >= 0]
+    of_edges = KnownWeights(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32))
+    new = new.with_weights().with_more(of_edges.with_weights())
+    counted = (out.weights != 0.0) & (out.distances < dhat)
+    if not counted.all():
+        out = out.where(counted)
+    return Found(out, float(np.sqrt(least)), new, planes)
 
 
 _NOTHING = Found(Contacts.room(0), np.inf, KnownWeights.none(), np.zeros(0, dtype=np.int64))

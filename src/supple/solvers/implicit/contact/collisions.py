@@ -11,7 +11,7 @@ from supple.contact.barrier.barrier_energy import add_barrier_gradient, barrier_
 from supple.contact.barrier.collision_rows import CollisionRows, write_collisions
 from supple.contact.candidates import CandidateFinder
 from supple.contact.ccd import largest_step_in_pieces
-from supple.contact.features.contact_set import ContactSet, Found
+from supple.contact.features.contact_set import Found, contacts_at
 from supple.contact.features.contacts import Contacts, KnownWeights
 from supple.contact.features.half_spaces import HalfSpaces
 from supple.contact.features.vertex_contacts import REACH
@@ -40,7 +40,6 @@ class Collisions:
         self.dhat = dhat
         self.floor = 0.0
         self._finder = CandidateFinder(mesh, REACH * dhat)
-        self._set = ContactSet(mesh, dhat)
         self._x: NDArray[np.float64] | None = None
         self._points = np.zeros((0, 3))
         self._found: Found | None = None
@@ -74,8 +73,9 @@ class Collisions:
     def _at(self, x: NDArray[np.float64]) -> Found:
         points, s = self.points(x), len(self.mesh.points)
         if self._found is None:
-            candidates = self._finder.at(points[:s])
-            found = self._set.of(points[:s], candidates.vertex_triangle, candidates.edge_edge, self._known)
+            near = self._finder.at(points[:s])
+            pairs = near.vertex_triangle, near.edge_edge
+            found = contacts_at(points[:s], self.mesh, *pairs, self._known, self.dhat)
             on_planes, least = self.half_spaces.contacts(points, self.dhat)
             if len(on_planes.kinds):
                 found = found._replace(contacts=found.contacts.joined(on_planes))
