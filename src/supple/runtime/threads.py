@@ -11,7 +11,6 @@ from typing import Any
 import numba
 from numba.core import config
 from numba.np.ufunc import parallel
-from threadpoolctl import ThreadpoolController
 
 # A call into OpenMP takes 2 us; into TBB, Numba's own first choice, 270 us, and its threads shared no loop of a step.
 _LAYERS = ["omp", "tbb", "workqueue"]
@@ -116,8 +115,10 @@ class _OneBlasThread(AbstractContextManager[None]):
 
 
 @cache
-def _openblas() -> ThreadpoolController:
+def _openblas() -> Any:
     """The copies of OpenBLAS that NumPy and SciPy have loaded; reading their list takes 3 ms."""
+    from threadpoolctl import ThreadpoolController  # takes milliseconds, which small scenes do not need
+
     return ThreadpoolController().select(internal_api="openblas")
 
 
