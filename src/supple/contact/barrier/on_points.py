@@ -13,9 +13,6 @@ from supple.contact.features.pair_geometry import point_count
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit, prange
 
-# Pairs from which a second thread pays.
-PARALLEL_FROM = 300
-
 
 @njit(cache=True)
 def add_forces(kinds, points, coefficients, sizes, vectors, out):
