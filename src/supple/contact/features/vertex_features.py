@@ -11,7 +11,6 @@ Source of the alternating sum: Li et al., "Convergent Incremental Potential Cont
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.contact.features.contacts import known_row
 from supple.contact.features.pair_geometry import unit
@@ -68,9 +67,8 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
     return features, squares
 
 
-def grouped(
-    pairs: NDArray[np.int32], features: NDArray[np.int32], triangles: NDArray[np.int32], owner: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+@njit(cache=True)
+def grouped(pairs, features, triangles, owner):
     """The rows (m,) of the pairs that have a feature, by vertex and owner of the triangle.
 
     Parameters
@@ -81,11 +79,23 @@ def grouped(
     -------
     rows : (m,); start : (groups + 1,) where each vertex with each owner begins
     """
-    rows = np.flatnonzero(features >= 0).astype(np.int32)
-    keys = pairs[rows, 0] * np.int64(len(owner)) + owner[triangles[pairs[rows, 1], 0]]
-    order = np.argsort(keys, kind="stable")  # most often, they are in order
-    start = np.flatnonzero(np.diff(keys[order], prepend=-1))
-    return rows[order], np.append(start, len(rows)).astype(np.int32)
+    rows = np.flatnonzero(features >= 0)
+    keys = np.empty(len(rows), dtype=np.int64)
+    ascending = True  # most often they are
+    for i in range(len(rows)):
+        keys[i] = np.int64(pairs[rows[i], 0]) * len(owner) + _owner(pairs, rows[i], triangles, owner)
+        ascending = ascending and (i == 0 or keys[i - 1] <= keys[i])
+    if not ascending:
+        order = np.argsort(keys, kind="mergesort")
+        rows, keys = rows[order], keys[order]
+    start = np.empty(len(rows) + 1, dtype=np.int32)
+    groups = 0
+    for i in range(len(rows)):
+        if i == 0 or keys[i] != keys[i - 1]:
+            start[groups] = i
+            groups += 1
+    start[groups] = len(rows)
+    return rows.astype(np.int32), start[: groups + 1]
 
 
 @njit

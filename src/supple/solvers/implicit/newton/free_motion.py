@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.topology import graph_components
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
+from supple.numerics.joined_sets import root_of
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit
 
@@ -62,14 +62,12 @@ class FreeMotion:
         """The same with pieces in contact as one piece, without those in contact with something held."""
         if not couplings or len(self.totals) == 0:
             return self
-        held, ends = len(self.totals), []  # one piece more stands for all that is held
-        for numbers in ([part.rows for part in couplings], [part.columns for part in couplings]):
-            piece = self.piece[np.concatenate(numbers)]
-            ends.append(np.where(piece < 0, held, piece))
-        apart = ends[0] != ends[1]
-        of_piece = graph_components(held + 1, ends[0][apart], ends[1][apart])
-        free = np.flatnonzero(of_piece != of_piece[held])
-        _, joined = np.unique(of_piece[free], return_inverse=True)
+        held = len(self.totals)
+        root = np.arange(held + 1, dtype=np.int32)
+        for part in couplings:
+            _unite(part.rows, part.columns, self.piece, root)
+        free = np.flatnonzero(root != root[held])
+        _, joined = np.unique(root[free], return_inverse=True)
         number = np.full(held + 1, -1, dtype=np.int32)
         number[free] = joined
         totals = np.bincount(joined, weights=self.totals[free]).astype(np.float64)
@@ -84,6 +82,19 @@ class FreeMotion:
         """
         if len(self.totals):
             _correct(self.piece, self.masses, self.totals, gradient, scale, direction)
+
+
+@njit(cache=True)
+def _unite(rows, columns, piece, root):
+    """Join the pieces of coupled vertices. The last one stands for all that is held; `root` names one of each set."""
+    held = len(root) - 1
+    for t in range(len(rows)):
+        i, j = piece[rows[t]], piece[columns[t]]
+        if i != j:
+            a, b = root_of(root, held if i < 0 else i), root_of(root, held if j < 0 else j)
+            root[min(a, b)] = max(a, b)
+    for k in range(held):
+        root[k] = root_of(root, k)
 
 
 @njit(cache=True)
