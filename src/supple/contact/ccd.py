@@ -56,7 +56,7 @@ def _moved(x, p, t):
 
 @njit
 def _time_to(gap, speed, keep):
-    """When gap + t speed falls to `keep`: 0 where it is below or there is no gap, infinite where it does not fall."""
+    """When gap + t speed falls to `keep`: 0 where it is not above, infinite where it does not fall."""
     if not gap > 0.0:
         return 0.0
     if speed >= 0.0:

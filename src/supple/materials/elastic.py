@@ -46,8 +46,8 @@ class EdgesAndVolume(Material):
 class ARAP(Elastic):
     """As-rigid-as-possible: squared distance to the nearest rotation, times mu = E / (2 (1 + nu)).
 
-    There is no volume term: small strains behave as with a first Lamé parameter of 0, that is with Poisson's ratio 0
-    and Young's modulus 2 mu.
+    The energy has no volume term: small strains behave as with a first Lamé parameter of 0, that is with Poisson's
+    ratio 0 and Young's modulus 2 mu.
     """
 
     stretch_functions = arap.FUNCTIONS

@@ -88,7 +88,7 @@ class ContactPoints:
 
         Raises
         ------
-        SceneError : where there is no body or obstacle of a name.
+        SceneError : where no body or obstacle has a name.
         """
         a, b = self._number(on), self._number(by)
         forces = self.forces + self.friction

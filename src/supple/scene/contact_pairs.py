@@ -85,7 +85,7 @@ class PairTable:
     friction : (p, p) Coulomb coefficients
     bodies : number of bodies among the p
 
-    Both arrays are symmetric. Between two obstacles there is no contact: False and 0. A rigid body does
+    Both arrays are symmetric. Two obstacles do not touch: False and 0. A rigid body does
     not touch itself.
     """
 

@@ -60,7 +60,7 @@ class BatchVectorEnv(VectorEnv):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        """Start an episode in each copy; `seed` of the first copy, or one for each. There are no options."""
+        """Start an episode in each copy; `seed` of the first copy, or one for each. It takes no options."""
         seeds = [seed + k for k in range(self.num_envs)] if isinstance(seed, int | np.integer) else seed
         for k, one in enumerate(seeds or ()):
             if one is not None:

@@ -38,7 +38,7 @@ def edge_weights(x, pairs, mesh, areas, dhat, known):
 
     Returns
     -------
-    weights : (l,) [m^2], zero where there is no contact
+    weights : (l,) [m^2], zero without a contact
     squares : (l,) squared distances, infinite where the edges do not cross, or not below dhat [m^2]
     keys : (l,) codes of the pairs, for `KnownWeights`
     grown : (l,) weights that are to be known [m^2], -1 where they do not change
@@ -95,7 +95,7 @@ def _height(x, triangles, edges, edge_start, edge_items, e, other, r, sign):
     """How far the surface recedes beside edge e, against the direction sign * r, over the edge's length [m].
 
     Negative where it comes nearer. Triangles that end at the other edge have no contacts with it, and do not count: in
-    a crease, the surface always comes nearer there. Infinite where there are no others.
+    a crease, the surface always comes nearer there. Infinite without others.
     """
     length = math.sqrt(dot(r, r))
     least = np.inf

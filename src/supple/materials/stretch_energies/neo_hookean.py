@@ -31,7 +31,7 @@ def _density(F, s, mu, lam):
 
 @njit
 def _tension(s, mu, lam):
-    """c = lam ln J - mu, which stands with 1 / s_i in the stress; not-a-number for J <= 0, where there is no stress."""
+    """c = lam ln J - mu, which stands with 1 / s_i in the stress; not-a-number for J <= 0, without a stress."""
     if s[2] <= 0.0:
         return np.nan
     return lam * _log_J(s) - mu

@@ -81,7 +81,7 @@ class AppliedLoad(ABC):
         return None
 
     def value(self, time: float) -> NDArray[np.float64] | None:
-        """That of the pattern at `time` [s]; None where there is no pattern."""
+        """That of the pattern at `time` [s]; None without a pattern."""
         return None
 
     @abstractmethod

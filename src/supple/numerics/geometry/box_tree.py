@@ -220,7 +220,7 @@ def _fill(boxes, order, nodes):
 
 @njit(cache=True)
 def _labels_of_nodes(labels, order, leaves):
-    out = np.full(2 * leaves, -2, dtype=np.int32)  # -2 where there is no primitive
+    out = np.full(2 * leaves, -2, dtype=np.int32)  # -2 without a primitive
     for k in range(len(order)):
         out[leaves + k] = labels[order[k]]
     for i in range(leaves - 1, 0, -1):

@@ -138,7 +138,7 @@ class FrameCheck:
         """Check a frame; frames come in order."""
 
     def passed(self) -> CheckResult:
-        """The result where nothing failed and there is no number."""
+        """The result where nothing failed and nothing was measured."""
         return CheckResult(self.name, Verdict.PASS, self.good)
 
     def result(self) -> CheckResult:

@@ -65,7 +65,7 @@ def _add_fields(columns: dict[str, NDArray[Any]], recording: Recording) -> None:
 
 
 def write_csv(recording: Recording, output: Path) -> None:
-    """Write one row for each frame, with all digits; a cell is empty where there is no value."""
+    """Write one row for each frame, with all digits; a cell without a value is empty."""
     columns = report_columns(recording)
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")

@@ -119,7 +119,7 @@ def point_on_camera_plane(
 
     Returns
     -------
-    (3,) [m], or None where there is no intersection in front of the eye.
+    (3,) [m], or None where nothing intersects in front of the eye.
     """
     start, along, normal = (np.asarray(v, dtype=np.float64) for v in (eye, toward, look))
     along = along - start

@@ -23,7 +23,7 @@ class BallJoint(Joint):
     Parameters
     ----------
     axis : (3,) a direction in the world where the scene places everything, of any length [-]; the first has it, and the
-        second. None: there is no limit.
+        second. None: without a limit.
     max_swing : the largest angle between the two, from 0.01 to pi - 0.01 [rad]: the axis of the first stays in a cone
         about that of the second. The coordinate is this angle.
     twist_limits : the smallest and the largest turn of the first about the axis against the second (low, high), between

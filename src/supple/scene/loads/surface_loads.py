@@ -73,7 +73,7 @@ class Wind(OnSurface):
 
     u is the velocity of the flow against the triangle, and A the area of the triangle's projection along u. So a plate
     across the flow feels density/2 drag area |u|^2, whatever its tets, and a body that falls in still air reaches a
-    terminal velocity. Triangles do not shelter each other, and there is no lift.
+    terminal velocity. Triangles do not shelter each other, and have no lift.
 
     Parameters
     ----------

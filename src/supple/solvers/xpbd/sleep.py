@@ -10,7 +10,7 @@ of one place, with l the mean length of the body's edges. A body that stays with
 - slower than a share of an edge in the time T, which is at least the body's damping time: the remaining creep of an
   overdamped body is at most d;
 - in balance up to a share of its weight: an oscillation that turns has the displacement a (T/2)^2 / 2 to both sides.
-  Where there is no gravity, nothing sleeps.
+  Without gravity, nothing sleeps.
 
 An island wakes where something awake pushes it or has passed into it (the frame is then undone and simulated with the
 island awake), where its state was changed from outside, where an obstacle moves, and where anything in the scene

@@ -265,7 +265,7 @@ def integrator_of(choice: str | Integrator) -> Integrator:
 
     Raises
     ------
-    SolverError : where there is none of that name.
+    SolverError : where none has that name.
     """
     if isinstance(choice, Integrator):
         return choice
