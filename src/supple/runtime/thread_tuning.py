@@ -2,7 +2,7 @@
 
 Threads that synchronize forty times a frame are faster on an idle machine. Where another process uses one of the
 cores, a frame can take ten times as long. This cannot be predicted. Both modes give the same bits, so the faster one
-is used. The unit that is timed is called a task here: a substep of XPBD, or the assembly of a Newton matrix.
+is used. The unit that is timed is called a task here: a substep of XPBD, or an iteration of Newton's method.
 """
 
 from __future__ import annotations
@@ -32,11 +32,16 @@ class ThreadTuner:
     ----------
     choice : whether there are two modes to choose from; otherwise `parallel` is always used.
     parallel : the mode to start with; interval : the shortest one between measurements of the slower mode, in tasks
+
+    Attributes
+    ----------
+    untimed : seconds of the present task that do not count, since that part of the work varies from task to task
     """
 
     def __init__(self, choice: bool, parallel: bool, interval: int = SHORTEST_INTERVAL) -> None:
         self.choice = choice
         self.parallel = parallel
+        self.untimed = 0.0
         self._seconds = {mode: deque[float](maxlen=SAMPLES) for mode in (False, True)}
         self._compiled: set[bool] = set()
         self._shortest = self._interval = interval
@@ -81,13 +86,6 @@ class ThreadTuner:
             return numba_threads(threads)
         return one_thread() if self.choice else numba_threads(1)
 
-    def blocks(self, count: int, threads: int) -> Iterator[int]:
-        """The numbers of this many blocks, each in the present mode. It can be interrupted before each."""
-        for k in range(count):
-            interruption_point()
-            with self.threads(self.parallel, threads):
-                yield k
-
     def tasks(self, count: int, threads: int) -> Iterator[int]:
         """The numbers of this many tasks, each on several threads or on one; their times are noted.
 
@@ -97,9 +95,10 @@ class ThreadTuner:
         for k in range(count):
             interruption_point()
             parallel, started = self.choose(), perf_counter()
+            self.untimed = 0.0
             with self.threads(parallel, threads):
                 yield k
-            self.note(parallel, perf_counter() - started)
+            self.note(parallel, perf_counter() - started - self.untimed)
 
     def _time(self, mode: bool) -> float:
         return median(self._seconds[mode])

@@ -14,9 +14,9 @@ from numba.np.ufunc import parallel
 
 # A call into OpenMP takes 2 us; into TBB, Numba's own first choice, 270 us, and its threads shared no loop of a step.
 _LAYERS = ["omp", "tbb", "workqueue"]
-# Turns of a loop, some 15 us, for which threads of GNU OpenMP wait busily for the next kernel. By itself it waits for
+# Turns of a loop, some .15 ms, for which threads of GNU OpenMP wait busily for the next kernel. By itself it waits for
 # milliseconds: where other processes are busy, a step then took up to 20 times as much of the processor.
-_SPINS = "1000"
+_SPINS = "10000"
 
 
 def threads_for(work: int, least: int) -> AbstractContextManager[None]:

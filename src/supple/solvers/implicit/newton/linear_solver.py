@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from time import perf_counter
 
 import numba
 import numpy as np
@@ -29,7 +30,7 @@ logger = logging.getLogger(__name__)
 # thin bodies of nearly incompressible material more than 500 (docs/theory/implicit.md).
 _STALLED = 400
 
-# After this many systems the slower number of threads is tried again, see `ThreadTuner`.
+# After this many iterations the slower number of threads is tried again, see `ThreadTuner`.
 _REST = 40
 
 # The coarse level of the preconditioner is renewed where CG takes this factor times its first number of iterations, and
@@ -58,8 +59,8 @@ class LinearSolver:
     matrix : the sparse part; low_rank : (k, rows, 3) vectors g, of which g g^T is added to it
     age, fresh_iterations : the number of runs of CG on the present coarse level (-1: none), and the iterations of the
         first one
-    pace : the number of threads of an iteration, one or `most_threads`, chosen by the times of assemblies, whose work
-        hardly varies
+    pace : the number of threads of an iteration, one or `most_threads`, chosen by its time without the linear solve,
+        whose work varies
     """
 
     kind: str
@@ -106,28 +107,27 @@ class LinearSolver:
         self.most_threads = numba.get_num_threads()
         return self.pace.threads(self.pace.parallel, self.most_threads)
 
-    def blocks(self, count: int) -> Iterator[int]:
-        """The numbers of this many iterations, each on the number of threads that is best for assemblies."""
-        return self.pace.blocks(count, self.most_threads)
+    def iterations(self, count: int) -> Iterator[int]:
+        """The numbers of this many iterations, each on one thread or on several."""
+        return self.pace.tasks(count, self.most_threads)
 
     def assemble(self, hessian: HessianBlocks) -> None:
         """Assemble the matrix of a new Hessian, and update the preconditioner."""
-        for _ in self.pace.tasks(1, self.most_threads):
-            diagonal = hessian.vertices[self.order.vertices]
-            reduction = self.reduction
-            if couplings := (hessian.beyond_elements if reduction is None else reduction.couplings(hessian)):
-                self._assemble_joint(hessian.elements, diagonal, Couplings.joined(couplings))
-            else:
-                if self.joint is not None:
-                    self.joint, self.age = None, -1
-                self.matrix, self.preconditioner = self.elements, self.elements_only
-                self.pattern.assemble(hessian.elements, diagonal, self.elements)
-            count = len(self.order.vertices)
-            self.low_rank = np.zeros((len(hessian.low_rank), count, 3))
-            for k, part in enumerate(hessian.low_rank):
-                self.low_rank[k] = part.in_rows(self.row_of, count)
-            if self.kind != "direct":
-                self.preconditioner.update(self.matrix, coarse=self.age < 0)
+        diagonal = hessian.vertices[self.order.vertices]
+        reduction = self.reduction
+        if couplings := (hessian.beyond_elements if reduction is None else reduction.couplings(hessian)):
+            self._assemble_joint(hessian.elements, diagonal, Couplings.joined(couplings))
+        else:
+            if self.joint is not None:
+                self.joint, self.age = None, -1
+            self.matrix, self.preconditioner = self.elements, self.elements_only
+            self.pattern.assemble(hessian.elements, diagonal, self.elements)
+        count = len(self.order.vertices)
+        self.low_rank = np.zeros((len(hessian.low_rank), count, 3))
+        for k, part in enumerate(hessian.low_rank):
+            self.low_rank[k] = part.in_rows(self.row_of, count)
+        if self.kind != "direct":
+            self.preconditioner.update(self.matrix, coarse=self.age < 0)
 
     def _assemble_joint(
         self, elements: NDArray[np.float64], diagonal: NDArray[np.float64], couplings: Couplings
@@ -163,7 +163,9 @@ class LinearSolver:
         p : (n, 3), zero where pinned, and welded vertices with their rigid bodies; None where the system could not be
             solved, or was found to be indefinite
         """
+        began = perf_counter()
         p, report = self._solve(force, tolerance, convex)
+        self.pace.untimed += perf_counter() - began
         if p is not None and self.reduction is not None:
             self.reduction.welding.follow(p)
         return p, report

@@ -52,7 +52,7 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
     rows: list[NewtonRow] = []
     if not np.isfinite(here.energy):
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
-    for iteration in tools.linear_solver.blocks(FEW):
+    for iteration in tools.linear_solver.iterations(FEW):
         solved = _direction(directions, here, limits, approach)
         if solved is None:
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)

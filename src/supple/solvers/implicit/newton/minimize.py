@@ -131,7 +131,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
     last_length = 0.0
     settled = 0
-    for iteration in tools.linear_solver.blocks(problem.max_iterations):
+    for iteration in tools.linear_solver.iterations(problem.max_iterations):
         found = directions.find(here)
         if found is None:
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
