@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from supple.contact.search.distances import edge_edge_square, point_triangle_square
 from supple.contact.search.patches import Parts, Patches
-from supple.numerics.adjacency import in_list
+from supple.numerics.adjacency import Adjacency, in_list
 from supple.numerics.mat3 import dot, row, subtract
-from supple.runtime.kernel_cache import njit
+from supple.runtime.kernel_cache import njit, prange
+from supple.runtime.threads import has_several
 
 # Points and edges of a patch of 16 triangles, at most.
 _SCRATCH = 96
+# Parts of a search that threads share. They find the pairs in the order in which one finds them.
+_RUNS = 16
 
 
 @njit(cache=True)
@@ -109,45 +112,39 @@ def _reaching(box, i, boxes, first, last, reach, room):
     return count
 
 
-@njit(cache=True)
-def search_patches(x, way, reach, asked, parts, patches, boxes, order, out_points, out_edges):
-    """List pairs with a part in a patch that is asked (q,). Returns the numbers of both kinds, which may not fit.
-
-    Parameters
-    ----------
-    x, way : (N, >= 3) of the nodes [m]; reach : [m]
-    boxes : of points, triangles and edges in the order of their patches, and of patches
-    order : (q,) patches by the low end of their box along `axis`
-    out_points : (k, 2) points and triangles; out_edges : (l, 2) edges, the lower first
-    """
+@njit
+def _search_run(share, x, way, reach, asked, parts, patches, boxes, order, rooms):
+    """The pairs of patches in a share of `order`, two ends, with later ones. Returns the numbers of both kinds."""
+    out_points, out_edges = rooms
     of_points, of_triangles, of_edges, of_patches, axis = boxes
-    s, p = parts, patches
+    s = parts
+    owner, patch_triangles, patch_edges, patch_points = patches
     hits, near = np.empty(_SCRATCH, dtype=np.uint8), np.empty(_SCRATCH, dtype=np.int64)
     one = np.empty(_SCRATCH, np.uint8), np.empty(_SCRATCH, np.int64), np.empty((6, _SCRATCH))
     other = np.empty(_SCRATCH, np.uint8), np.empty(_SCRATCH, np.int64), np.empty((6, _SCRATCH))
     points = edges = 0
-    for first in range(len(order)):
+    for first in range(share[0], share[1]):
         a = order[first]
         for second in range(first, len(order)):
             b = order[second]
             if of_patches[axis, b] - reach > of_patches[3 + axis, a]:
                 break
-            if not (asked[a] or asked[b]) or not s.collide[p.owner[a], p.owner[b]]:
+            if not (asked[a] or asked[b]) or not s.collide[owner[a], owner[b]]:
                 continue
             if _meeting(of_patches, a, of_patches, b, b + 1, reach, hits, near) == 0:
                 continue
             for turn in range(1 if a == b else 2):
                 u, w = (a, b) if turn == 0 else (b, a)
-                m = _reaching(of_patches, w, of_points, p.points.start[u], p.points.start[u + 1], reach, one)
+                m = _reaching(of_patches, w, of_points, patch_points.start[u], patch_points.start[u + 1], reach, one)
                 if m == 0:
                     continue
-                start, stop = p.triangles.start[w], p.triangles.start[w + 1]
+                start, stop = patch_triangles.start[w], patch_triangles.start[w + 1]
                 n = _reaching(of_patches, u, of_triangles, start, stop, reach, other)
                 for i in range(m):
-                    k = p.points.items[one[1][i]]
+                    k = patch_points.items[one[1][i]]
                     v = s.nodes[k]
                     for j in range(_meeting(one[2], i, other[2], 0, n, reach, hits, near)):
-                        t = p.triangles.items[other[1][near[j]]]
+                        t = patch_triangles.items[other[1][near[j]]]
                         if v in (s.triangles[t, 0], s.triangles[t, 1], s.triangles[t, 2]):
                             continue
                         if not _point_near(x, way, v, s.triangles, t, reach) or in_list(s.excluded_triangles, k, t):
@@ -155,14 +152,18 @@ def search_patches(x, way, reach, asked, parts, patches, boxes, order, out_point
                         if points < len(out_points):
                             out_points[points, 0], out_points[points, 1] = k, t
                         points += 1
-            m = _reaching(of_patches, b, of_edges, p.edges.start[a], p.edges.start[a + 1], reach, one)
-            n = _reaching(of_patches, a, of_edges, p.edges.start[b], p.edges.start[b + 1], reach, other) if m else 0
+            m = _reaching(of_patches, b, of_edges, patch_edges.start[a], patch_edges.start[a + 1], reach, one)
+            n = (
+                _reaching(of_patches, a, of_edges, patch_edges.start[b], patch_edges.start[b + 1], reach, other)
+                if m
+                else 0
+            )
             for i in range(m):
-                e = p.edges.items[one[1][i]]
+                e = patch_edges.items[one[1][i]]
                 c, d = s.edges[e, 0], s.edges[e, 1]
                 start = i + 1 if a == b else 0
                 for j in range(_meeting(one[2], i, other[2], start, n, reach, hits, near)):
-                    f = p.edges.items[other[1][start + near[j]]]
+                    f = patch_edges.items[other[1][start + near[j]]]
                     g, h = s.edges[f, 0], s.edges[f, 1]
                     if c in (g, h) or d in (g, h):
                         continue
@@ -174,6 +175,40 @@ def search_patches(x, way, reach, asked, parts, patches, boxes, order, out_point
     return points, edges
 
 
+@njit(cache=True, parallel=True)
+def search_patches(x, way, reach, asked, parts, patches, boxes, order, counts, out_points, out_edges):
+    """List pairs with a part in a patch that is asked (q,), in runs over the patches.
+
+    Parameters
+    ----------
+    x, way : (N, >= 3) of the nodes [m]; reach : [m]
+    boxes : of points, triangles and edges in the order of their patches, and of patches
+    order : (q,) patches by the low end of their box along `axis`
+    counts : (r, 2) the numbers of both kinds that each run finds, which may not fit
+    out_points : (r, k, 2) points and triangles; out_edges : (r, l, 2) edges, the lower first
+    """
+    # Numba takes no tuples into a parallel loop.
+    nodes, triangles, edges, collide, not_triangles, not_edges = parts
+    (not_triangles_start, not_triangles_items), (not_edges_start, not_edges_items) = not_triangles, not_edges
+    owner, (of_t_start, of_t_items), (of_e_start, of_e_items), (of_p_start, of_p_items) = patches
+    of_points, of_triangles, of_edges, of_patches, axis = boxes
+    runs, rows = len(counts), len(order)
+    for r in prange(runs):
+        no_triangles = Adjacency(not_triangles_start, not_triangles_items)
+        no_edges = Adjacency(not_edges_start, not_edges_items)
+        its_parts = Parts(nodes, triangles, edges, collide, no_triangles, no_edges)
+        its_patches = (
+            owner,
+            Adjacency(of_t_start, of_t_items),
+            Adjacency(of_e_start, of_e_items),
+            Adjacency(of_p_start, of_p_items),
+        )
+        its_boxes = of_points, of_triangles, of_edges, of_patches, axis
+        share, rooms = (r * rows // runs, (r + 1) * rows // runs), (out_points[r], out_edges[r])
+        points, lines = _search_run(share, x, way, reach, asked, its_parts, its_patches, its_boxes, order, rooms)
+        counts[r, 0], counts[r, 1] = points, lines
+
+
 class PatchSearch:
     """Searches surfaces; keeps the memory of its results."""
 
@@ -183,7 +218,7 @@ class PatchSearch:
         points, triangles = parts.nodes[p.points.items, None], parts.triangles[p.triangles.items]
         self._simplices = points, triangles, parts.edges[p.edges.items]
         self._boxes = [np.empty((6, len(rows))) for rows in (*self._simplices, p.owner)]
-        self._room = [np.empty((1024, 2), dtype=np.int32) for _ in range(2)]
+        self._room = [np.empty((1, 1024, 2), dtype=np.int32) for _ in range(2)]
 
     def find(
         self, x: NDArray[np.float64], way: NDArray[np.float64], reach: float, asked: NDArray[np.bool_] | None = None
@@ -203,12 +238,20 @@ class PatchSearch:
         axis = int(np.argmax(of_patches[3:].max(axis=1) - of_patches[:3].min(axis=1))) if len(p.owner) else 0
         order = np.argsort(of_patches[axis], kind="stable")
         boxes = (*self._boxes, axis)
+        counts = np.empty((_RUNS if has_several() else 1, 2), dtype=np.int64)
+        if len(self._room[0]) != len(counts):
+            self._room = [np.empty((len(counts), 1024 // len(counts), 2), dtype=np.int32) for _ in range(2)]
         while True:
-            counts = search_patches(x, way, reach, asked, self._parts, p, boxes, order, *self._room)
-            if all(count <= len(room) for count, room in zip(counts, self._room, strict=True)):
+            search_patches(x, way, reach, asked, self._parts, p[:4], boxes, order, counts, *self._room)
+            most = counts.max(axis=0)
+            if all(count <= room.shape[1] for count, room in zip(most, self._room, strict=True)):
                 break
-            self._room = [np.empty((count + count // 2 + 64, 2), dtype=np.int32) for count in counts]
-        return self._room[0][: counts[0]].copy(), self._room[1][: counts[1]].copy()
+            self._room = [np.empty((len(counts), count + count // 2 + 64, 2), dtype=np.int32) for count in most]
+        points, edges = (
+            np.concatenate([part[:count] for part, count in zip(room, counts[:, kind], strict=True)])
+            for kind, room in enumerate(self._room)
+        )
+        return points, edges
 
 
 def pairs_nearer(
