@@ -297,14 +297,18 @@ def test_the_whole_scene_is_visible_from_camera_presets(live, server, visitor, u
         way = np.asarray(camera.look_at) - np.asarray(camera.position)
         return way / np.linalg.norm(way)
 
+    def is_in_the_picture():
+        toward = view.outline - np.asarray(camera.position)
+        right = np.cross(looks(), view.up)
+        above = np.cross(right / np.linalg.norm(right), looks())
+        return (np.abs(toward @ above) / (toward @ looks())).max() < np.tan(0.5 * np.radians(35.0))
+
     moved = preset == "corner"  # where it is already
-    until(lambda: (moved or not np.allclose(camera.position, before)) and np.allclose(axis(), looks(), atol=1e-6))
-    toward = view.outline - np.asarray(camera.position)
-    right = np.cross(looks(), view.up)
-    above = np.cross(right / np.linalg.norm(right), looks())
-    assert (np.abs(toward @ above) / (toward @ looks())).max() < np.tan(0.5 * np.radians(35.0))  # it is in the picture
+    until(lambda: moved or not np.allclose(camera.position, before))
+    # Its position and the point it looks at are set one after the other.
+    until(lambda: np.allclose(axis(), looks(), atol=1e-6) and is_in_the_picture())
     if ahead is not None:
-        np.testing.assert_allclose(looks(), ahead, atol=2e-3)
+        until(lambda: np.allclose(looks(), ahead, atol=2e-3))
 
 
 def test_notices_are_displayed_once(live, server, fake, visitor, until, monkeypatch):
