@@ -1,5 +1,7 @@
 """The XPBD solver as a whole: parameters, pins, mixed scenes, threads, and states that cannot be continued."""
 
+from contextlib import nullcontext
+
 import numba
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import supple as sp
 from supple.errors import SolverError
 from supple.model.state import State
 from supple.model.system import build_system, initial_state
+from supple.runtime import thread_tuning
 from supple.runtime.thread_tuning import ThreadTuner
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.solver import XPBD
@@ -177,6 +180,17 @@ def clocked(pace, seconds, count=4000):
         choices.append(way)
         pace.note(way, seconds(k, way))
     return choices
+
+
+def test_work_that_varies_does_not_count(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(thread_tuning, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(ThreadTuner, "threads", lambda self, parallel, threads: nullcontext(modes.append(parallel)))
+    pace, modes, varying = ThreadTuner(True, True, 40), [], np.random.default_rng(0)
+    for _ in pace.tasks(400, 2):
+        pace.untimed = float(varying.uniform(0.0, 100.0))
+        now[0] += (1.0 if modes[-1] else 2.0) + pace.untimed
+    assert sum(modes) > 370
 
 
 def test_the_pace_takes_the_faster_way():

@@ -113,11 +113,10 @@ def _reaching(box, i, boxes, first, last, reach, room):
 
 
 @njit
-def _search_run(share, x, way, reach, asked, parts, patches, boxes, order, rooms):
+def _search_run(share, x, way, reach, asked, s, patches, boxes, order, rooms):
     """The pairs of patches in a share of `order`, two ends, with later ones. Returns the numbers of both kinds."""
     out_points, out_edges = rooms
     of_points, of_triangles, of_edges, of_patches, axis = boxes
-    s = parts
     owner, patch_triangles, patch_edges, patch_points = patches
     hits, near = np.empty(_SCRATCH, dtype=np.uint8), np.empty(_SCRATCH, dtype=np.int64)
     one = np.empty(_SCRATCH, np.uint8), np.empty(_SCRATCH, np.int64), np.empty((6, _SCRATCH))
@@ -153,11 +152,8 @@ def _search_run(share, x, way, reach, asked, parts, patches, boxes, order, rooms
                             out_points[points, 0], out_points[points, 1] = k, t
                         points += 1
             m = _reaching(of_patches, b, of_edges, patch_edges.start[a], patch_edges.start[a + 1], reach, one)
-            n = (
-                _reaching(of_patches, a, of_edges, patch_edges.start[b], patch_edges.start[b + 1], reach, other)
-                if m
-                else 0
-            )
+            start, stop = patch_edges.start[b], patch_edges.start[b + 1]
+            n = _reaching(of_patches, a, of_edges, start, stop, reach, other) if m else 0
             for i in range(m):
                 e = patch_edges.items[one[1][i]]
                 c, d = s.edges[e, 0], s.edges[e, 1]
