@@ -14,6 +14,7 @@ from .errors import SceneError as SceneError
 from .errors import SolverError as SolverError
 from .errors import StudyError as StudyError
 from .errors import SuppleError as SuppleError
+from .errors import SuppleWarning as SuppleWarning
 from .materials.elastic import ARAP as ARAP
 from .materials.elastic import EdgesAndVolume as EdgesAndVolume
 from .materials.elastic import FixedCorotated as FixedCorotated

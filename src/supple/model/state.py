@@ -231,26 +231,51 @@ class StepReport:
     contacts: Callable[[], ContactPoints] | None = None
 
 
+# What helps against a status where its message does not say it.
+_REMEDIES = {
+    Status.ITERATION_LIMIT: "take a shorter dt, or more max_iterations",
+    Status.LINE_SEARCH_FAILED: "take a shorter dt; a static load may have no equilibrium: follow the motion "
+    "with integrator='backward_euler'",
+    Status.BLOCKED: "let what is named move slower, or elsewhere",
+}
+
+
 class Problems:
-    """The frames of a run that the solver could go on from although they did not converge.
+    """The frames of a run that did not converge, and why it ended early.
+
+    Parameters
+    ----------
+    last : index of the frame at which the run is to end
 
     Attributes
     ----------
-    frames : number of frames; bad : how many of them did not converge
-    first : by status, the message of its first frame
+    frames : number of frames; bad : how many of them did not converge although the solver could go on
+    first : by status, the text of its first frame
+    latest : text of the last frame; "" where it converged
+    stopped : whether the solver could not go on from the last frame
     """
 
-    def __init__(self) -> None:
+    def __init__(self, last: int) -> None:
+        self.last = last
         self.frames = self.bad = 0
         self.first: dict[Status, str] = {}
+        self.latest, self.stopped = "", False
 
-    def note(self, status: Status, message: str) -> None:
+    def note(self, index: int, time: float, status: Status, message: str) -> None:
         """Record a frame."""
         self.frames += 1
-        if status is not Status.CONVERGED and status.can_go_on:
-            self.bad += 1
-            self.first.setdefault(status, message)
+        self.stopped, self.latest = not status.can_go_on, ""
+        if status is not Status.CONVERGED:
+            words = [f"{status}: {message}" if message else str(status), *filter(None, [_REMEDIES.get(status)])]
+            text = "; ".join(words)
+            self.latest = f"frame {index} of {self.last}, t = {time:.6g} s: {text}"
+            if status.can_go_on:
+                self.bad += 1
+                self.first.setdefault(status, text)
 
     def __str__(self) -> str:
-        texts = "; ".join(f"{status}: {message}" if message else str(status) for status, message in self.first.items())
-        return f"{self.bad} of {self.frames} frames did not converge; first of each kind: {texts}" if self.bad else ""
+        texts = [f"stopped at {self.latest}"] if self.stopped else []
+        if self.bad:
+            first = "; ".join(self.first.values())
+            texts.append(f"{self.bad} of {self.frames} frames did not converge; first of each kind: {first}")
+        return "; ".join(texts)

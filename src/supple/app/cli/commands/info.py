@@ -335,15 +335,7 @@ def _recording(file: Path) -> None:
             ("scene file", "inside" if recording.scene_text else "none"),
             ("written by", f"supple {recording.supple_version}"),
         ]
-        bad = [k for k, status in enumerate(recording.statuses) if not status.can_go_on]
-        rows.append(("problems", _recording_problems(float(J.min()), bad)))
+        problems = [*(["a tetrahedron is inverted or flat (J <= 0)"] if J.min() <= 0.0 else [])]
+        problems += [recording.unfinished] if recording.unfinished else []
+        rows.append(("problems", "; ".join(problems) or "none"))
     print_table(rows, str(file))
-
-
-def _recording_problems(smallest_J: float, stopped: list[int]) -> str:
-    problems = []
-    if smallest_J <= 0.0:
-        problems.append("a tetrahedron is inverted or flat (J <= 0)")
-    if stopped:
-        problems.append(f"the solver stopped at frame {stopped[0]}")
-    return "; ".join(problems) or "none"
