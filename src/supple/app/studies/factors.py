@@ -41,10 +41,14 @@ class Factor(Kind):
     Parameters
     ----------
     values : numbers, texts, lists or mappings, each equally likely
-    uniform : a range of numbers, equally likely everywhere
-    loguniform : a range of numbers above zero, whose logarithms are equally likely everywhere
+    uniform : a range of numbers, in the unit of the factor, equally likely everywhere
+    loguniform : a range of numbers above zero, in the unit of the factor, whose logarithms are equally likely everywhere
     count : levels of a range in a grid, with both ends
     paths : what the factor sets in the scene file; without them, its name is the path
+
+    Raises
+    ------
+    StudyError : where not exactly one of values and ranges is given, or a value is not allowed.
     """
 
     kind: ClassVar[str] = "factor"
