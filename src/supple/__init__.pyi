@@ -60,6 +60,7 @@ from .scene.joints.motors import PositionMotor as PositionMotor
 from .scene.joints.motors import VelocityMotor as VelocityMotor
 from .scene.joints.point_joints import BallJoint as BallJoint
 from .scene.joints.point_joints import FixedJoint as FixedJoint
+from .scene.joints.point_joints import PlanarJoint as PlanarJoint
 from .scene.joints.point_joints import UniversalJoint as UniversalJoint
 from .scene.joints.weld import Weld as Weld
 from .scene.loads.body_force import BodyForce as BodyForce

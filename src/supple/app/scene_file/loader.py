@@ -91,7 +91,7 @@ def _sets(body: BodyModel, meshes: MeshStore) -> MeshSets:
 
 logger = logging.getLogger(__name__)
 
-_READERS = {".urdf": read_urdf, **dict.fromkeys(SURFACE_FILES, read_surface_scene)}
+URDF_FILES = (".urdf", ".xacro")
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,16 +157,39 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
-    document = _READERS.get(Path(path).suffix.lower(), read_yaml)(path)
+    store, suffix = meshes(Path(path).parent), Path(path).suffix.lower()
+    if suffix in URDF_FILES:
+        document = read_urdf(path, store)
+        if pairs := overlaps(_run(path, document, store).scene):
+            document = document.with_pairs(pairs)
+    else:
+        document = (read_surface_scene if suffix in SURFACE_FILES else read_yaml)(path)
+    return _run(path, document, store)
+
+
+def _run(path: str | Path, document: YamlDocument, store: MeshStore) -> Run:
     model = validated(document)
     try:
         with spelled_for("yaml"):
-            run = _built(model, meshes(Path(path).parent))
+            run = _built(model, store)
         return replace(run, text=document.text, description=model, folder=Path(path).parent)
     except LocatedError as error:
         if Path(path).suffix.lower() in SURFACE_FILES:  # its lines are not those of the document
             raise SceneError(f"{path}: {error}") from None
         raise document.error(_keys_of_message(document.data, error.keys, str(error)), str(error)) from None
+
+
+def overlaps(scene: Scene) -> list[tuple[str, str]]:
+    """The pairs of bodies whose surfaces meet where the scene places them, or are inside each other."""
+    from supple.contact.start.intersections import intersections_of
+    from supple.contact.start.surfaces import start_surfaces
+    from supple.model.system import build_system, initial_state
+    from supple.scene.contact_pairs import pair_table
+
+    start = initial_state(scene)
+    surfaces = start_surfaces(build_system(scene, start), start.positions, start.time)
+    found = intersections_of(surfaces, pair_table(scene))
+    return list({(scene.bodies[one.first].name, scene.bodies[one.second].name): None for one in found})
 
 
 def validated(document: YamlDocument) -> SceneFileModel:
@@ -203,9 +226,20 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
         solver = built(model.solver, meshes)
     with at():
         scene = Scene(list(bodies.values()), gravity=model.gravity, **parts)
+    if model.joint_positions:
+        with at("joint_positions"):
+            there, scene = scene, scene.with_joint_positions(model.joint_positions)
+            for name in starts:
+                if _is_moved(there.body(name), scene.body(name)):
+                    raise SceneError(f"they move body {name!r}, which has a deformed start; remove one of the two")
+    with at():
         # The pairs are found here, where an error's place in the file is known; the scene caches them.
         logger.debug("%d stitched pairs", len(scene.stitching))
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
+
+
+def _is_moved(before: PlacedBody, after: PlacedBody) -> bool:
+    return any(not np.array_equal(getattr(before, key), getattr(after, key)) for key in ("position", "rotation"))
 
 
 def _keys_of_message(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Key, ...]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene.stitches.stitching import Stitching
 
-SCENE_FILES = (".yaml", ".yml", ".urdf")
+SCENE_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")

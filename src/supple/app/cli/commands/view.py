@@ -16,7 +16,7 @@ Port = Annotated[int | None, Parameter(name="--port", converter=whole_number)]
 Full = Annotated[bool, Parameter(name="--full", negative="")]
 Open = Annotated[bool, Parameter(name="--open")]
 
-SCENE_FILES = (".yaml", ".yml", ".urdf")
+SCENE_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 
 

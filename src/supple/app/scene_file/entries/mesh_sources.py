@@ -7,6 +7,7 @@ import logging
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, Field
 
 from supple.app.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, SurfaceShapeModel
@@ -16,6 +17,7 @@ from supple.errors import MeshError, SceneError
 from supple.mesh.meshing.units import warn_of_millimetres
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
+from supple.numerics.geometry.convex_hull import convex_hull
 from supple.scene.located import at
 from supple.scene.rotation import rotation_matrix
 
@@ -82,9 +84,12 @@ class SurfaceModel(Model):
 
     file: FilePath | None = Field(default=None, description="relative to the scene file")
     shape: SurfaceShapeModel | None = Field(default=None, description="instead of `file`")
-    scale: Positive = Field(default=1.0, description="of all coordinates")
+    scale: Positive | Vector = Field(
+        default=1.0, description="of all coordinates, or of x, y and z; a negative one mirrors"
+    )
     rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the origin [rad]")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
+    hull: bool = Field(default=False, description="true: the convex hull of the surface instead")
 
     def build(self, meshes: MeshStore) -> SurfaceMesh:
         return meshes.surface(self)
@@ -136,6 +141,13 @@ class MeshStore:
         """The surface of a file or a shape, placed."""
         return self._once(source, lambda: self._surface(source))
 
+    def joined(self, sources: list[SurfaceModel]) -> SurfaceMesh:
+        """Several surfaces as one."""
+        surfaces = [self.surface(source) for source in sources]
+        begins = np.cumsum([0, *(len(one.vertices) for one in surfaces)])
+        triangles = [one.triangles + begin for one, begin in zip(surfaces, begins[:-1], strict=True)]
+        return SurfaceMesh(np.concatenate([one.vertices for one in surfaces]), np.concatenate(triangles))
+
     def located(self, file: str) -> Path:
         """The path of a mesh file that a scene names.
 
@@ -171,12 +183,20 @@ class MeshStore:
 
     def _surface(self, source: SurfaceModel) -> SurfaceMesh:
         if source.file is not None:
+            file = source.file
             with at("file"):
-                surface = SurfaceMesh.load(self.located(source.file))
+                surface = self._once(
+                    MeshFileModel(file=file), lambda: SurfaceMesh.load(self.located(file)), "surface in "
+                )
         else:
             assert source.shape is not None
             with at("shape"):
                 surface = source.shape.build_surface()
+        if source.hull:
+            try:
+                surface = SurfaceMesh(*convex_hull(surface.vertices))
+            except ValueError as error:
+                raise MeshError(f"{source.file}: no convex hull: {error}") from None
         if source.scale == 1.0 and not any(source.rotation) and not any(source.position):
             return surface
         return surface.transformed(source.scale, rotation_matrix(source.rotation), source.position)
