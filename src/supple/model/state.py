@@ -169,6 +169,8 @@ class SolverDetails:
     joint_coordinates : angles of hinges [rad], travels of sliders [m], swings of balls with limits [rad], by name
     motor_forces : efforts of the motors [N], [N m], by name of their joint
     joint_violations : how far each joint is from holding, as a share of the diameter of gyration of its smaller body
+    reaction_forces : of pins on what they hold, by label of the pin, (3,) [N]; of `XPBD` means over the step, without
+        those that hold one piece with rigid edges or volumes together: their shares are not known
     work : on the bodies over the step, by what does it [J]; see `Report.work`
     energy_residual : what the forces of the step leave open [J]; see `Report.energy_residual`
     active : stretch of each growth and activation of each muscle at the end, by kind and number: "growth.0" [-]
@@ -188,6 +190,7 @@ class SolverDetails:
     joint_coordinates: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     motor_forces: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     joint_violations: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    reaction_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
     work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     energy_residual: float = field(default=0.0, kw_only=True)
     active: Mapping[str, float] = field(default_factory=dict, kw_only=True)
