@@ -1,4 +1,4 @@
-"""What pages name exists: commands and their options, extras, functions and their arguments, files, keys of scene files."""
+"""What pages name exists: commands, options, extras, functions, arguments, files, keys of scene files."""
 
 import ast
 import inspect
