@@ -1,4 +1,4 @@
-"""What pages name exists: commands, options, extras, functions, arguments, files, keys of scene files."""
+"""What pages name exists: commands, options, extras, functions and their arguments, files, keys of scene files."""
 
 import ast
 import inspect
@@ -97,7 +97,8 @@ def test_public_names_and_their_arguments_exist(page):
     wrong = []
     for name, keywords in calls_of(page):
         try:
-            parameters = inspect.signature(object_of(name)).parameters if keywords else {}
+            found = object_of(name)
+            parameters = inspect.signature(found).parameters if keywords else {}
         except AttributeError:
             wrong.append(name)
             continue
