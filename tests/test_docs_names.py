@@ -124,23 +124,21 @@ def test_files_of_this_project_exist(page):
 
 
 def keys_of_schema(schema):
-    """Every key that files of a schema may have."""
-    found = set()
-    for value in [*schema.get("$defs", {}).values(), schema]:
-        stack = [value]
-        while stack:
-            part = stack.pop()
-            if isinstance(part, dict):
-                found |= set(part.get("properties", {}))
-                stack += part.values()
-            elif isinstance(part, list):
-                stack += part
-    return found
+    """Every key that files of a schema may have, and those of them below which their author chooses names."""
+    found, free, stack = set(), set(), [schema]
+    while stack:
+        part = stack.pop()
+        if isinstance(part, dict):
+            named = part.get("properties", {})
+            found |= set(named)
+            free |= {key for key, one in named.items() if '"additionalProperties": {' in json.dumps(one)}
+            stack += part.values()
+        elif isinstance(part, list):
+            stack += part
+    return found, free
 
 
-KEYS = keys_of_schema(json_schema()) | keys_of_schema(study_schema())
-# Names that a file's author chooses stand below these keys.
-FREE = {"factors", "measures", "constants", "parameters", "inputs", "formula"}
+KEYS, FREE = (a | b for a, b in zip(keys_of_schema(json_schema()), keys_of_schema(study_schema()), strict=True))
 
 
 def keys_in(data):
