@@ -84,7 +84,7 @@ def _body(body: BodyModel, meshes: MeshStore, number: int) -> BodyModel:
 
 
 def _sets(body: BodyModel, meshes: MeshStore) -> MeshSets:
-    if body.mesh is None or body.mesh.is_surface():
+    if body.mesh is None or not meshes.holds_tets(body.mesh):
         raise SceneError(f"body {body.name!r} has no file of tets with named sets (.inp or .msh)")
     return meshes.tets(body.mesh).sets
 

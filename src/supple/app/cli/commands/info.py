@@ -129,28 +129,17 @@ def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
 
 def _mesh(file: Path, suffix: str) -> None:
     from supple.errors import MeshError
-    from supple.mesh.io.mesh_files import SURFACE_READERS, TET_EXTENSIONS
-    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.io.mesh_files import READERS
+    from supple.mesh.io.tetgen_family import SUFFIXES
+    from supple.mesh.mesh_file import load_mesh
     from supple.mesh.tetmesh import TetMesh
 
-    known = (*SCENE_FILES, *RECORDINGS[:1], *dict.fromkeys((*SURFACE_READERS, *TET_EXTENSIONS)))
+    known = (*SCENE_FILES, *RECORDINGS[:1], *READERS, *SUFFIXES)
     if suffix not in known:
         raise MeshError(f"{file}: unknown extension {suffix or '(none)'}; known are {', '.join(known)}")
-    mesh: TetMesh | SurfaceMesh
-    if suffix not in TET_EXTENSIONS:
-        mesh = SurfaceMesh.load(file)
-    else:
-        try:
-            mesh = TetMesh.load(file)
-        except MeshError as error:
-            if suffix not in SURFACE_READERS:
-                raise
-            try:  # a file of this format may hold a surface
-                mesh = SurfaceMesh.load(file)
-            except MeshError:
-                raise error from None
+    mesh = load_mesh(file)
     rows = _tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh, file)
-    if isinstance(mesh, TetMesh) and suffix in (".inp", ".msh"):
+    if isinstance(mesh, TetMesh) and suffix in (".inp", ".msh", ".mesh"):
         rows += [(f"sets of {kind}", listed) for kind, listed in mesh.sets.listed().items()]
     print_table(rows, str(file))
 

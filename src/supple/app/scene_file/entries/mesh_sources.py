@@ -14,6 +14,8 @@ from supple.app.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel
 from supple.app.scene_file.model import FilePath, Model, Positive, Vector
 from supple.app.scene_file.yaml_files import printable
 from supple.errors import MeshError, SceneError
+from supple.mesh.io.mesh_files import SURFACE_READERS
+from supple.mesh.mesh_file import load_mesh
 from supple.mesh.meshing.units import warn_of_millimetres
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
@@ -23,8 +25,8 @@ from supple.scene.rotation import rotation_matrix
 
 logger = logging.getLogger(__name__)
 
-SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".glb", ".vtp")
-TET_FILES = (".node", ".ele", ".edge", ".face", ".msh", ".inp", ".usd", ".usda", ".usdc")
+SURFACE_FILES = tuple(SURFACE_READERS)
+KEEP_AXES = "true: coordinates of a .dae or USD file whose x or z axis points up are not turned to y"
 MESHING_OPTIONS = (
     "tets",
     "edge",
@@ -40,7 +42,7 @@ MESHING_OPTIONS = (
 
 
 class MeshFileModel(Model):
-    """A mesh file. A surface is filled with tetrahedra according to the meshing options.
+    """A mesh file. Where it holds a surface, that is filled with tetrahedra according to the meshing options.
 
     Without a size, a surface whose triangles need more than 5,000 tetrahedra is filled with so many. A surface that is
     reduced for that, or by `decimate`, is the skin of the body.
@@ -62,19 +64,12 @@ class MeshFileModel(Model):
         default=None, ge=4, le=10**8, description="number of triangles to which the surface is reduced first"
     )
     time_limit: Positive | None = Field(default=None, description="of the mesher [s]")
+    keep_axes: bool = Field(default=False, description=KEEP_AXES)
 
     @property
     def meshing(self) -> dict[str, Any]:
         """The meshing options that were given."""
         return {key: getattr(self, key) for key in MESHING_OPTIONS if getattr(self, key) is not None}
-
-    def is_surface(self) -> bool:
-        """Whether the file is a surface to be filled: by its extension; where it can be both, by the options."""
-        suffix = Path(self.file).suffix.lower()
-        if suffix in TET_FILES and self.meshing:
-            with at(next(iter(self.meshing))):
-                raise MeshError(f"{self.file} already holds tetrahedra; remove this")
-        return suffix in SURFACE_FILES or (suffix not in TET_FILES and bool(self.meshing))
 
 
 class SurfaceModel(Model):
@@ -90,6 +85,7 @@ class SurfaceModel(Model):
     rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the origin [rad]")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
     hull: bool = Field(default=False, description="true: the convex hull of the surface instead")
+    keep_axes: bool = Field(default=False, description=KEEP_AXES)
 
     def build(self, meshes: MeshStore) -> SurfaceMesh:
         return meshes.surface(self)
@@ -127,9 +123,11 @@ class MeshStore:
 
     def solid(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
         """The surface in a file as it is, without meshing options; otherwise its tet mesh."""
-        if not source.is_surface() or source.meshing:
-            return self.tets(source)
-        return self._once(source, lambda: self._read_surface(source), "solid ")
+        return self.tets(source) if source.meshing else self._loaded(source)
+
+    def holds_tets(self, source: MeshFileModel) -> bool:
+        """Whether a file holds tets, or other solid cells, and not a surface to be filled."""
+        return isinstance(self._loaded(source), TetMesh)
 
     def solid_shape(self, shape: ShapeModel) -> SurfaceMesh | TetMesh:
         """The surface of a shape, or its tet mesh where the surface has no other description."""
@@ -159,34 +157,43 @@ class MeshStore:
 
     def _read(self, source: MeshFileModel) -> tuple[TetMesh, SurfaceMesh | None]:
         """The mesh; and the surface where it was reduced before it was filled."""
-        if source.is_surface():
-            from supple.mesh.meshing.sizes import automatic_tets
-            from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
+        loaded = self._loaded(source)
+        if isinstance(loaded, TetMesh):
+            return loaded, None
+        from supple.mesh.meshing.sizes import automatic_tets
+        from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
 
-            surface, options = self._read_surface(source), source.meshing
-            if not options.keys() & {"tets", "edge", "max_volume", "decimate", "keep_surface"}:
-                options["tets"] = automatic_tets(surface)
-            mesh, report = tetrahedralize_reported(surface, **options)
-            if report.reduced:
-                logger.info("%s: its %d triangles are drawn, as the skin", source.file, len(report.fine.triangles))
-            return mesh, report.fine if report.reduced else None
-        with at("file"):
-            mesh = TetMesh.load(self.located(source.file))
-        warn_of_millimetres(source.file, mesh.vertices, source.scale)
-        return (mesh if source.scale == 1.0 else mesh.transformed(source.scale)), None
+        options = source.meshing
+        if not options.keys() & {"tets", "edge", "max_volume", "decimate", "keep_surface"}:
+            options["tets"] = automatic_tets(loaded)
+        mesh, report = tetrahedralize_reported(loaded, **options)
+        if report.reduced:
+            logger.info("%s: its %d triangles are drawn, as the skin", source.file, len(report.fine.triangles))
+        return mesh, report.fine if report.reduced else None
 
-    def _read_surface(self, source: MeshFileModel) -> SurfaceMesh:
-        with at("file"):
-            surface = SurfaceMesh.load(self.located(source.file))
-        warn_of_millimetres(source.file, surface.vertices, source.scale)
-        return surface if source.scale == 1.0 else surface.transformed(source.scale)
+    def _loaded(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
+        """What a file holds, scaled."""
+
+        def load() -> SurfaceMesh | TetMesh:
+            with at("file"):
+                mesh = load_mesh(self.located(source.file), keep_axes=source.keep_axes)
+            warn_of_millimetres(source.file, mesh.vertices, source.scale)
+            return mesh if source.scale == 1.0 else mesh.transformed(source.scale)
+
+        loaded = self._once(source, load, "loaded ")
+        if isinstance(loaded, TetMesh) and source.meshing:
+            with at(next(iter(source.meshing))):
+                raise MeshError(f"{source.file} already holds tetrahedra; remove this")
+        return loaded
 
     def _surface(self, source: SurfaceModel) -> SurfaceMesh:
         if source.file is not None:
             file = source.file
             with at("file"):
                 surface = self._once(
-                    MeshFileModel(file=file), lambda: SurfaceMesh.load(self.located(file)), "surface in "
+                    MeshFileModel(file=file, keep_axes=source.keep_axes),
+                    lambda: SurfaceMesh.load(self.located(file), keep_axes=source.keep_axes),
+                    "surface in ",
                 )
         else:
             assert source.shape is not None

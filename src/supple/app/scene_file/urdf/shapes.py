@@ -105,7 +105,9 @@ def entries(geometry: Geometry, frame: Placement) -> list[dict[str, Any]]:
     numbers, placement = geometry.numbers, frame.then(geometry.placement)
     if geometry.kind == "mesh":
         hull = {"hull": True} if geometry.hull else {}
-        return [_placed({"file": geometry.file, "scale": list(numbers), **hull}, placement)]
+        # Programs for robots ignore which axis a .dae file says to point up.
+        axes = {"keep_axes": True} if geometry.file.lower().endswith(".dae") else {}
+        return [_placed({"file": geometry.file, "scale": list(numbers), **hull, **axes}, placement)]
     if geometry.kind == "box":
         return [_placed({"shape": {"kind": "box", "size": list(numbers), "divisions": [1, 1, 1]}}, placement)]
     radius, length = numbers[0], numbers[-1]
