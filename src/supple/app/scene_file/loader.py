@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from supple.app.scene_file.document import KINDS_OF_LISTS, OutputModel, SceneFileModel
 from supple.app.scene_file.entries.bodies import BodyModel
 from supple.app.scene_file.entries.kinds import built
-from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES, MeshStore
+from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES, ConfinedMeshStore, MeshStore
 from supple.app.scene_file.new_scenes import read_surface_scene
 from supple.app.scene_file.urdf.document import read_urdf
 from supple.app.scene_file.validation_errors import scene_error
@@ -124,7 +124,7 @@ class Run:
         return {"initial_positions": self.initial_positions} if self.initial_positions else {}
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, *, confine: bool = False) -> Scene:
     """The scene of a scene file (YAML), or of a robot (URDF). Paths in it are relative to the file.
 
     The format of scene files: `supple schema`; what is read of a URDF: docs/learn/robots.md.
@@ -134,30 +134,31 @@ def load_scene(path: str | Path) -> Scene:
     Parameters
     ----------
     path : of the scene file.
+    confine : whether meshes are read from the folder of the file, and folders below, only; for files of strangers.
 
     Raises
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
-    run = load_run(path)
+    run = load_run(path, confine=confine)
     for name in run.initial_positions:
         logger.warning("%s: the deformed start of %r is not a part of the scene; load_run returns it", path, name)
     return run.scene
 
 
-def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) -> Run:
+def load_run(path: str | Path, *, confine: bool = False) -> Run:
     """The scene of a scene file, with its solver, timing and start.
 
     Parameters
     ----------
     path : of the scene file (YAML), of a robot (URDF), or of a surface, which becomes a body above a floor.
-    meshes : makes the store of meshes from the file's folder; `ConfinedMeshStore` reads only files in this folder.
+    confine : as of `load_scene`
 
     Raises
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
-    store, suffix = meshes(Path(path).parent), Path(path).suffix.lower()
+    store, suffix = (ConfinedMeshStore if confine else MeshStore)(Path(path).parent), Path(path).suffix.lower()
     if suffix in URDF_FILES:
         document = read_urdf(path, store)
         if pairs := overlaps(_run(path, document, store).scene):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from supple.app.cli.arguments import Confine
 from supple.app.cli.console import print_table
 
 if TYPE_CHECKING:
@@ -27,7 +28,9 @@ PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 
-def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negative="")] = False) -> None:
+def info(
+    file: Path | None = None, /, *, time: Annotated[bool, Parameter(negative="")] = False, confine: Confine = False
+) -> None:
     """Print what a file contains: counts, sizes, quality, problems. Without a file: versions, platform and threads.
 
     Parameters
@@ -36,6 +39,8 @@ def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negativ
         A scene (.yaml), a robot (.urdf), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
     time
         Of a scene: simulate its first frames, and print how long one takes. The first run of a solver compiles it.
+    confine
+        Of a scene: read meshes from the folder of its file, and folders below, only.
     """
     if file is None:
         print_table(_platform(), "Supple")
@@ -47,7 +52,7 @@ def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negativ
         return
     suffix = file.suffix.lower()
     if suffix in SCENE_FILES:
-        _scene(file, time)
+        _scene(file, time, confine)
     elif suffix in RECORDINGS:
         _recording(file)
     else:
@@ -144,14 +149,14 @@ def _mesh(file: Path, suffix: str) -> None:
     print_table(rows, str(file))
 
 
-def _scene(file: Path, timed: bool) -> None:
+def _scene(file: Path, timed: bool, confine: bool) -> None:
     from supple.app.cli.console import reading
     from supple.app.scene_file.loader import load_run
     from supple.model.system import build_system, initial_state
     from supple.scene.rigid.rigid_body import RigidBody
 
     with reading():
-        run = load_run(file)
+        run = load_run(file, confine=confine)
     start = initial_state(run.scene, **{key.removeprefix("initial_"): value for key, value in run.start.items()})
     scene, system = run.scene, build_system(run.scene, start)
     points = system.split(start.positions)

@@ -235,6 +235,9 @@ class ConfinedMeshStore(MeshStore):
         except (OSError, ValueError, RuntimeError):
             raise SceneError(f"{printable(file)} cannot be read") from None
         if not inside or Path(file).is_absolute():
-            raise SceneError(f"{printable(file)} is outside the scene file's folder; a live page reads no files there")
+            raise SceneError(
+                f"{printable(file)} is outside the scene file's folder, to which reading is confined; "
+                "move it there, or do not confine reading (--no-confine, confine=False)"
+            )
         if exists and not regular:
             raise SceneError(f"{printable(file)} is not a regular file of at most {LARGEST_FILE // 2**20} MiB")
