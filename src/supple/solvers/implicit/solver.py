@@ -15,7 +15,6 @@ from supple.model.actuator_readings import actuator_fields, start_of
 from supple.model.energy_balance import add_works, no_works, works_of_actuators
 from supple.model.joints.at_state import initial_joint_details, refuse_apart, refuse_moved_welds
 from supple.model.joints.geometry import JointGeometry
-from supple.model.pin_reactions import pin_reactions
 from supple.model.state import State, Status, StepReport
 from supple.model.stitched_points import with_stitched_points
 from supple.model.system import System
@@ -39,7 +38,8 @@ from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.linear_solver import LinearSolver
 from supple.solvers.implicit.newton.trace import NewtonRow
 from supple.solvers.implicit.stepping.integrators import INTEGRATORS, Integrator, Static, integrator_of
-from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors, weld_forces
+from supple.solvers.implicit.stepping.reactions import reaction_forces, weld_forces
+from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors
 from supple.solvers.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.solvers.implicit.stepping.substepping import Substepping
 from supple.solvers.implicit.stepping.workspace import Workspace
@@ -190,7 +190,7 @@ class Implicit(Solver):
         return ImplicitDetails(
             contact_forces=pushes,
             friction_forces=pushes,
-            reaction_forces=pin_reactions(system, zero)[0],
+            reaction_forces=reaction_forces(system, zero)[0],
             weld_forces=weld_forces(system, zero),
             orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
             **initial_joint_details(workspace.joints, workspace.checked or system.start_states[-1]),
@@ -234,12 +234,17 @@ class Implicit(Solver):
         time_error: float | None = None
         while not substepping.over:
             with threads_for(len(system.tets), _SHARED_FROM), workspace.tools.linear_solver.own_threads():
-                taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
+                span = substepping.end, substepping.length
+                taken = take_substep(now, *span, settings, workspace, substepping.divisible)
+            if taken is None:
+                substepping.divide()
+                continue
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
             if taken.outcome.status is not Status.CONVERGED:
                 logger.debug("step of %g s: %s", substepping.length, taken.outcome.status)
                 linearized = taken.outcome.status is Status.LINEARIZED
-                if not linearized and substepping.halve():
+                tunnelled = taken.outcome.status is Status.TUNNELLED
+                if not linearized and (substepping.divide() if tunnelled else substepping.halve()):
                     continue
                 message = taken.outcome.message if linearized else _limit_message(taken.outcome.message, substepping)
                 worst = taken.outcome.status
@@ -270,7 +275,9 @@ class Implicit(Solver):
         if last is not None:
             gradient = last.outcome.end.gradient / last.contact.weight
             left, of_welds = norm(workspace.tools.freed(gradient)), weld_forces(system, gradient)
-            totals, by_vertex = pin_reactions(system, workspace.system.welding.reduced(gradient))
+            if workspace.tools.linear_solver.reduction is not None:
+                workspace.tools.linear_solver.reduction.reduce(gradient)
+            totals, by_vertex = reaction_forces(system, gradient)
             details = replace(details, unbalanced_force=left, weld_forces=of_welds)
             details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
             details, nearest, contacts = last.contact.measured(details, last.state.positions)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +48,6 @@ class XPBDMemory:
     sleep : of bodies at rest; None at the start
     futile : the statuses of the last frame that repetitions did not remove
     control : of rigid bodies; None where nothing is welded to any
-    at_rest : the last forces of joints, welds and pins of sleeping bodies, by field of `XPBDDetails` and name
     """
 
     contact: ContactMemory | None = None
@@ -60,4 +58,3 @@ class XPBDMemory:
     futile: frozenset[str] = frozenset()
     sleep: SleepMemory | None = None
     control: ControlMemory | None = None
-    at_rest: Mapping[str, Mapping[str, NDArray[np.float64]]] = field(default_factory=dict)

@@ -20,7 +20,8 @@ def test_head_on_cubes_converge_and_keep_their_momentum(dt: float):
     frame = next(iter(sp.simulate(head_on(20.0), sp.Implicit(), dt, 1)))
     assert frame.report.status == "converged", frame.report.message
     assert frame.det_F.min() > 0.0
-    assert frame.report.details.substeps <= 4
+    # A substep of half a cube's size, and those of growing length before and after it.
+    assert frame.report.details.substeps <= 24
     masses = frame.system.masses
     assert np.abs(masses @ frame.state.velocities).max() < 1e-6 * masses.sum() * 20.0
 

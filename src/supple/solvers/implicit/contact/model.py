@@ -13,6 +13,7 @@ from supple.contact.barrier.barrier_energy import barrier_forces
 from supple.contact.barrier.friction_energy import lagged_slips, sides
 from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
 from supple.contact.mesh.obstacles import ObstacleRange, obstacle_positions, with_obstacles
+from supple.contact.passing import Passing
 from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
 from supple.mesh.topology import graph_components
@@ -42,6 +43,7 @@ class ContactModel:
     table: PairTable
     scales: Scales
     friction_iterations: int | None
+    direct_way: Passing
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
@@ -91,6 +93,11 @@ class ContactModel:
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every vertex is in front of every plane."""
         return self.collisions.smallest_distance(x) > 0.0
+
+    def passing(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> str | None:
+        """The names of two things that pass each other on the direct way between places (n, 3); see `Passing`."""
+        points = self.direct_way.between(*(self.mesh.points.positions(x) for x in (begin, end)))
+        return None if points is None else self.names(points)
 
     def smallest_distance(self, x: NDArray[np.float64]) -> float:
         """Between anything that may touch, where it is below dhat [m]; else infinite."""
@@ -162,4 +169,5 @@ def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np
         table=table,
         scales=scales,
         friction_iterations=settings.friction_iterations,
+        direct_way=Passing(mesh, mesh.points.positions(extended.rest_positions)),
     )

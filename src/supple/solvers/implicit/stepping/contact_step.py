@@ -136,7 +136,7 @@ class ContactStep:
         return change > allowed * norm(now)
 
     def verified(self, outcome: Outcome) -> Outcome:
-        """The outcome, or a failure where surfaces intersect because of rounding.
+        """The outcome, or a failure where things have passed each other, or intersect because of rounding.
 
         Every state that the next step may start from is tested, whether Newton's method has converged or not.
         """
@@ -144,7 +144,11 @@ class ContactStep:
             return outcome
         if self.model.collisions.intersect(outcome.end.positions):
             return replace(outcome, status=Status.LINE_SEARCH_FAILED, message="two surfaces intersect after the step")
-        return outcome
+        names = self.model.passing(self.start, outcome.end.positions)
+        if names is None:
+            return outcome
+        text = f"{names} pass each other within the step; take a shorter one"
+        return replace(outcome, status=Status.TUNNELLED, message=text)
 
     def measured(
         self, details: ImplicitDetails, x: NDArray[np.float64]

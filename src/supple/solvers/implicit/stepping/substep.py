@@ -100,23 +100,35 @@ class Substep:
     time_error: float | None = None
 
 
-def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
+def take_substep(
+    state: State, end: float, h: float, settings: StepSettings, workspace: Workspace, divisible: bool
+) -> Substep | None:
     """One step of length h [s] to the time `end` [s], from a state with the obstacles' vertices.
+
+    None where it is `divisible` and things would pass through each other if they went on as they do.
 
     Where its integrator makes energy of the velocities before a blow, the step is taken again without its history.
     """
-    taken = _take(state, end, h, settings, workspace)
+    taken = _take(state, end, h, settings, workspace, divisible)
     method = settings.integrator.without_history
-    if method is None or state.memory is None or taken.outcome.status not in (Status.CONVERGED, Status.LINEARIZED):
+    if (
+        taken is None
+        or method is None
+        or state.memory is None
+        or taken.outcome.status not in (Status.CONVERGED, Status.LINEARIZED)
+    ):
         return taken
     balance = taken.works, taken.residual, taken.actuators
     if not makes_energy(state, taken.state, *balance, settings.shortest(workspace, h) / h, workspace):
         return taken
-    again = _take(state, end, h, replace(settings, integrator=method), workspace)
+    again = _take(state, end, h, replace(settings, integrator=method), workspace, False)
+    assert again is not None
     return replace(again, outcome=replace(again.outcome, rows=taken.outcome.rows + again.outcome.rows))
 
 
-def _take(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
+def _take(
+    state: State, end: float, h: float, settings: StepSettings, workspace: Workspace, divisible: bool
+) -> Substep | None:
     system, tools = workspace.system, workspace.tools
     targets = system.pin_targets(end)
     obstacles = len(state.positions) - workspace.bodies_end
@@ -126,6 +138,9 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
     plan = settings.integrator.plan(system, state, h)
     middle = end - (1.0 - plan.place) * h
     forces = total_forces(system, state.positions, middle)
+    onwards = _without_forces(system, plan, targets)
+    if divisible and workspace.contact is not None and workspace.contact.passing(state.positions, onwards):
+        return None
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
     grown = workspace.elasticity_at(middle)
@@ -159,7 +174,7 @@ def _take(state: State, end: float, h: float, settings: StepSettings, workspace:
         else:
             x = _first_guess(problem, x, ahead, limits)
     else:
-        x = _going_on(system, x, plan, targets, limits, tools.pinned)
+        x = _going_on(x, onwards, limits) if plan.scale is not None else x
         x, moved = move_pins(system, problem, x, targets, limits, tools)
         rows = moved.rows
         if moved.status is not Status.CONVERGED:
@@ -238,6 +253,14 @@ def _objective(
     return Objective(terms, workspace.tools.clock)
 
 
+def _without_forces(system: System, plan: Plan, targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where everything goes on as it does, with rigid bodies rigid and pins at `targets`."""
+    ahead = with_rigid_bodies(system, plan.predicted.copy())
+    ahead[system.pinned_vertices] = targets
+    system.welding.follow(ahead)
+    return ahead
+
+
 def _without_elasticity(
     system: System, x: NDArray[np.float64], plan: Plan, forces: NDArray[np.float64], pinned: NDArray[np.int32]
 ) -> NDArray[np.float64]:
@@ -275,20 +298,8 @@ def _linearized_at(
     return place
 
 
-def _going_on(
-    system: System,
-    x: NDArray[np.float64],
-    plan: Plan,
-    targets: NDArray[np.float64],
-    limits: StepLimits,
-    pinned: NDArray[np.int32],
-) -> NDArray[np.float64]:
-    """Where pins are at `targets` and all else goes on as it does, as far as filters allow; x where that is near."""
-    if plan.scale is None:
-        return x
-    ahead = with_rigid_bodies(system, plan.predicted.copy())
-    ahead[pinned] = targets
-    system.welding.follow(ahead)
+def _going_on(x: NDArray[np.float64], ahead: NDArray[np.float64], limits: StepLimits) -> NDArray[np.float64]:
+    """The positions `ahead` as far as the filters allow; x where that is near."""
     step = limits.largest_step(x, ahead - x).step
     ahead = ahead if step == 1.0 else x + step * (ahead - x)
     return ahead if step >= _WORTHWHILE and limits.allows(ahead) else x

@@ -85,6 +85,11 @@ class Substepping:
         return self.begin + self.dt * self.ahead[-1][1]
 
     @property
+    def divisible(self) -> bool:
+        """Whether the next substep may be shorter."""
+        return self.ahead[-1][1] - self.ahead[-1][0] > self.ahead[-1][2]
+
+    @property
     def length(self) -> float:
         """Of the next substep [s]."""
         first, last, _ = self.ahead[-1]
@@ -93,10 +98,20 @@ class Substepping:
     def halve(self) -> bool:
         """Make the next substep half as long; False where it may not be shorter."""
         first, last, shortest = self.ahead[-1]
-        if last - first <= shortest:
+        if not self.divisible:
             return False
         middle = 0.5 * (first + last)
         self.ahead[-1:] = [(middle, last, shortest), (first, middle, shortest)]
+        return True
+
+    def divide(self) -> bool:
+        """As `halve`, for a step that is longer than the things: its halves are pieces of their own."""
+        first, last, _ = self.ahead[-1]
+        if self.halves == 1 or last - first <= _SHORTEST_PIECE:
+            return self.halve()
+        self.ahead[-1] = first, last, 0.0
+        self.halve()
+        self._find_piece()
         return True
 
     def advance(self) -> None:

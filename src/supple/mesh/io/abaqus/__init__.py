@@ -1,1 +1,0 @@
-"""Abaqus's input files (.inp)."""
