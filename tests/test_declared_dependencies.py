@@ -19,9 +19,11 @@ IMPORT_NAMES = {
     "imageio-ffmpeg": "imageio_ffmpeg",
     "lazy-loader": "lazy_loader",
     "pillow": "PIL",
+    "pycollada": "collada",
     "pyyaml": "yaml",
     "usd-core": "pxr",
 }
+BY_TRIMESH = {"lxml", "networkx"}  # imported by it where it reads 3MF
 # Development tools that are run, or loaded by pytest; no test imports them.
 TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-xdist", "ruff"}
 OWN = {"supple", "tests", "benchmarks"}
@@ -69,7 +71,7 @@ def test_every_package_that_the_library_imports_is_declared(runtime):
 
 
 def test_every_declared_package_is_imported(runtime):
-    assert runtime - imported_packages(SOURCES).keys() == set()
+    assert runtime - imported_packages(SOURCES).keys() == BY_TRIMESH
 
 
 def test_every_package_that_the_tests_import_is_declared(project, runtime):

@@ -55,7 +55,8 @@ def test_every_name_of_a_space_exists(space):
 
 
 def test_there_are_at_most_ninety_names():
-    assert len([name for name in sp.__all__ if name != "__version__"]) <= 90
+    names = [name for name in sp.__all__ if name not in ("__version__", "SuppleWarning")]
+    assert len(names) <= 90
 
 
 def test_an_obstacle_has_also_a_short_name_that_is_not_listed():

@@ -1,5 +1,7 @@
 """The simulation loop: its frames, the calls of its sinks, its end, and restarts."""
 
+import itertools
+import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -97,6 +99,7 @@ def test_sinks_see_the_start_every_frame_and_the_end():
     assert len(frames) == 3
 
 
+@pytest.mark.filterwarnings("ignore::supple.errors.SuppleWarning")
 def test_a_failed_step_is_the_last_frame_and_has_the_reason():
     log_sink = CallLog()
     frames = list(sp.simulate(scene(), FreeFall(stops_at=3), 0.1, 10, sinks=[log_sink]))
@@ -259,3 +262,66 @@ def test_energies_of_edges_and_volume_follow_their_compliances():
     change = np.linalg.norm((ends[:, 1] - ends[:, 0]) * [1.1, 1, 1], axis=1) - system.rest_lengths
     expected = 0.5 * (change @ change) / 1e-3 + 0.5 * 6 * (0.1 / 6) ** 2 / 1e-5
     assert measure(system, stretched).elastic_energy == pytest.approx(expected)
+
+
+def test_an_early_end_is_a_warning_of_python_and_of_the_log(caplog):
+    with pytest.warns(sp.SuppleWarning) as warned:
+        list(sp.simulate(scene(), FreeFall(stops_at=3), 0.1, 10))
+    assert [warning.filename for warning in warned] == [__file__]
+    text = "stopped at frame 3 of 10, t = 0.2 s: not_finite: vertex 2 left for infinity"
+    assert str(warned[0].message) == text
+    assert [record.getMessage() for record in caplog.records] == [text]
+
+
+def test_a_warning_is_seen_once_where_no_log_is_set_up(caplog, monkeypatch):
+    monkeypatch.setattr(logging.getLogger("supple"), "propagate", False)
+    with pytest.warns(sp.SuppleWarning, match="stopped at frame 3 of 10") as warned:
+        list(sp.simulate(scene(), FreeFall(stops_at=3), 0.1, 10))
+    assert len(warned) == 1
+    assert not caplog.records
+
+
+@pytest.mark.filterwarnings("error")
+def test_strict_raises_at_the_frame_that_did_not_converge():
+    log_sink = CallLog()
+    frames = sp.simulate(scene(), FreeFall(stops_at=3), 0.1, 10, sinks=[log_sink], strict=True)
+    with pytest.raises(sp.SolverError, match=r"^simulate: frame 3 of 10, t = 0.2 s: not_finite: vertex 2 left"):
+        list(frames)
+    assert log_sink.log == ["begin", "write 1", "write 2", "write 3", "end"]
+    assert len(list(sp.simulate(scene(), FreeFall(), 0.1, 3, strict=True))) == 3
+
+
+def burst(**options):
+    """A thin ball of rubber under more pressure than any equilibrium bears."""
+    mesh = sp.shapes.spherical_shell(inner_radius=0.1, outer_radius=0.12, edge_length=0.08)
+    body = sp.Body("balloon", mesh, sp.NeoHookean(youngs=1e5, poisson=0.4))
+    foot = sp.Pin("balloon", sp.InBox((-1, -1, -1), (1, -0.09, 1)))
+    filled = sp.Cavity("balloon", pressure=sp.Curve([0, 1], [0, 2e5]))
+    setting = sp.Scene([body], pins=[foot], cavities=[filled], gravity=(0, 0, 0))
+    solver = sp.Implicit("static", max_iterations=20, max_substeps=1)
+    return sp.simulate(setting, solver, 0.025, 10, **options)
+
+
+def test_a_load_without_an_equilibrium_ends_with_a_reason_and_a_remedy():
+    with pytest.warns(sp.SuppleWarning, match="have no equilibrium: follow the motion with integrator='backward_eul"):
+        frames = list(burst())
+    assert 1 < len(frames) < 10
+    with pytest.raises(sp.SolverError, match=r"frame 2 of 10, .*: iteration_limit: "):
+        list(burst(strict=True))
+
+
+@pytest.mark.filterwarnings("ignore::supple.errors.SuppleWarning")
+def test_a_check_says_how_a_run_ended_before_its_last_frame(tmp_path):
+    path, solvers = tmp_path / "recording.vtkhdf", (FreeFall(stops_at=3), FreeFall())
+    texts = ("the solver stopped at frame 3 of 10 (not_finite)", "it ends at frame 4 of 10")
+    for solver, text in zip(solvers, texts, strict=True):
+        frames = sp.simulate(scene(), solver, 0.1, 10, sinks=[sp.Recorder(path)])
+        list(itertools.islice(frames, 4))
+        frames.close()
+        report = sp.check_recording(path, only=["finite", "status"])
+        assert report.unfinished == text
+        assert f" frames checked ({text}), " in report.verdict
+        assert report.ok is (solver.stops_at is None)
+        path.unlink()
+    list(sp.simulate(scene(), FreeFall(), 0.1, 2, sinks=[sp.Recorder(path)]))
+    assert sp.check_recording(path, only=["finite", "status"]).verdict.endswith("all 3 frames checked, 2 checks passed")

@@ -15,6 +15,7 @@ _listed, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __all__ += ["__version__"]
 _OBSTACLES = ("Box", "Capsule", "Cylinder", "Sphere", "TriangleObstacle")
 supply(
+    compilation="supple.results.progress:show_compilation",
     check="supple.results.check.checker:check_recording",
     export="supple.results.export.exporter:export",
     player="supple.results.player:player_of",

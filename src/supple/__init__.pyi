@@ -14,6 +14,7 @@ from .errors import SceneError as SceneError
 from .errors import SolverError as SolverError
 from .errors import StudyError as StudyError
 from .errors import SuppleError as SuppleError
+from .errors import SuppleWarning as SuppleWarning
 from .materials.elastic import ARAP as ARAP
 from .materials.elastic import EdgesAndVolume as EdgesAndVolume
 from .materials.elastic import FixedCorotated as FixedCorotated
@@ -59,6 +60,7 @@ from .scene.joints.motors import PositionMotor as PositionMotor
 from .scene.joints.motors import VelocityMotor as VelocityMotor
 from .scene.joints.point_joints import BallJoint as BallJoint
 from .scene.joints.point_joints import FixedJoint as FixedJoint
+from .scene.joints.point_joints import PlanarJoint as PlanarJoint
 from .scene.joints.point_joints import UniversalJoint as UniversalJoint
 from .scene.joints.weld import Weld as Weld
 from .scene.loads.body_force import BodyForce as BodyForce

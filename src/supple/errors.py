@@ -5,6 +5,10 @@ class SuppleError(Exception):
     """Base of every error that Supple raises for bad input or an impossible request."""
 
 
+class SuppleWarning(UserWarning):
+    """A simulation ended early, or has frames that did not converge."""
+
+
 class MeshError(SuppleError):
     """A surface or tetrahedral mesh, or a file that should hold one, cannot be used."""
 

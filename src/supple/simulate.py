@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import math
+import sys
 import time
+import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -13,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.errors import SceneError, SolverError
+from supple.errors import SceneError, SolverError, SuppleWarning
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.materials.laws.internal import checked
 from supple.model.state import Problems, State, StepReport
@@ -82,11 +84,12 @@ def simulate(
     control: Control | None = None,
     sinks: Sequence[Sink] = (),
     progress: bool = False,
+    strict: bool = False,
 ) -> Frames:
     """Advance a scene and yield a frame after each step.
 
-    Where the solver cannot continue, ends early; the report of the last frame gives the reason. At the end, a warning
-    in the log names the frames that did not converge, and why.
+    Where the solver cannot continue, ends early; the report of the last frame gives the reason. At the end, a
+    `SuppleWarning`, which is in the log too, says why it ended early, which frames did not converge, and what to do.
 
     Parameters
     ----------
@@ -102,11 +105,13 @@ def simulate(
         step, by name, or None. Others stay as they are. `send` of the generator does the same.
     sinks : receive the start, every frame, and the end.
     progress : whether to show a bar, in a terminal or a notebook; see `ProgressBar`.
+    strict : raise `SolverError` at the first frame whose status is not `converged`, in place of yielding it. Sinks have
+        received it.
 
     Raises
     ------
     SceneError, SolverError : before the first step, where the input cannot be simulated; later, where an input is set
-        to what it cannot have.
+        to what it cannot have, and as `strict` says.
     """
     if not isinstance(scene, Scene):
         raise SceneError(f"simulate: the scene is a {type(scene).__name__}; give a Scene")
@@ -126,7 +131,7 @@ def simulate(
     details = with_applied_values(solver.initial_details(first.system, workspace), first.system, first.time)
     first = replace(first, report=replace(first.report, details=details))
     shown = [supplied("progress")()] if progress else []
-    return _steps(first, solver, float(dt), int(steps), workspace, control, [*sinks, *shown])
+    return _steps(first, solver, float(dt), int(steps), workspace, control, [*sinks, *shown], strict)
 
 
 def check_timing(caller: str, dt: object, steps: object) -> None:
@@ -201,13 +206,15 @@ def _steps(
     workspace: Any,
     control: Control | None,
     sinks: Sequence[Sink],
+    strict: bool,
 ) -> Frames:
     system, state, frame = first.system, first.state, first
     inputs = system.scene.inputs
     wanted = dict(state.inputs)
-    problems = Problems()
+    problems = Problems(first.index + steps)
     with ExitStack() as ends:  # ends every sink, also where another sink fails
-        ends.callback(_warn, problems)
+        if not strict:
+            ends.callback(_warn, problems)
         for sink in sinks:
             ends.callback(sink.end)
             sink.begin(first, dt, steps)
@@ -219,9 +226,11 @@ def _steps(
             seconds = time.perf_counter() - began
             report = completed_report(system, state, step, seconds, frame.report.energy)
             frame = Frame(index, state, system, report, step.contacts, solver)
-            problems.note(frame.report.status, frame.report.message)
+            problems.note(index, frame.time, frame.report.status, frame.report.message)
             for sink in sinks:
                 sink.write(frame)
+            if strict and problems.latest:
+                raise SolverError(f"simulate: {problems.latest}")
             sent = yield frame
             wanted |= checked_values(inputs, sent)
             if not step.status.can_go_on:
@@ -229,5 +238,13 @@ def _steps(
 
 
 def _warn(problems: Problems) -> None:
-    if problems.bad:
-        logger.warning("%s", problems)
+    """Warn of the problems by the log and by Python's warnings, at the line that asked for the last frame."""
+    text = str(problems)
+    if not text:
+        return
+    if logger.hasHandlers():  # a log that nobody has set up would print the same text again
+        logger.warning("%s", text)
+    caller = sys._getframe()
+    while caller.f_back and caller.f_globals.get("__name__", "").partition(".")[0] in ("supple", "contextlib"):
+        caller = caller.f_back
+    warnings.warn_explicit(text, SuppleWarning, caller.f_code.co_filename, caller.f_lineno)

@@ -34,8 +34,7 @@ def vtp(counts, points, connectivity, offsets):
 
 MALFORMED_SURFACES = {
     "no extension": ("bear", SQUARE, "no extension"),
-    "wrong extension": ("a.docx", SQUARE, "'.docx' is not one of .glb, .obj, .off"),
-    "tets' extension": ("a.msh", SQUARE, "TetMesh.load"),
+    "wrong extension": ("a.docx", SQUARE, "'.docx' is not one of .3mf, .dae, .edge"),
     "empty stl": ("a.stl", "", "empty"),
     "blank obj": ("a.obj", " \n\n", "empty"),
     "short stl": ("a.stl", b"\x01" * 50, "too few"),
@@ -130,7 +129,11 @@ MSH_NODES = "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
 VTK_TETS = VTK.replace("POLYDATA", "UNSTRUCTURED_GRID") + "POINTS 4 double\n0 0 0 1 0 0 0 1 0 0 0 1\n"
 
 MALFORMED_TET_FILES = {
-    "surface's extension": ("a.stl", b"\0" * 84, "SurfaceMesh.load"),
+    "surface's extension": (
+        "a.stl",
+        b"\0" * 80 + struct.pack("<I", 1) + b"\0" * 50,
+        "surface of 1 cells.*supple mesh a.stl",
+    ),
     "extension": ("a.xyz", "x", "'.xyz' is not one of"),
     "empty": ("a.msh", "", "empty"),
     "msh head": ("a.msh", "mesh\n", "MeshFormat"),
@@ -154,14 +157,19 @@ MALFORMED_TET_FILES = {
         MSH + MSH_NODES + MSH_TAIL.replace("s\n1\n", "s\n7000000000\n"),
         "invalid literal",
     ),
-    "msh wedge": ("a.msh", MSH + MSH_NODES + MSH_TAIL.replace("4 2 0 1 1 2 3 4", "6 0 1 2 3 4 1 2"), "wedge cells"),
+    "msh wedge": (
+        "a.msh",
+        MSH + MSH_NODES + MSH_TAIL.replace("4 2 0 1 1 2 3 4", "6 0 1 2 3 4 1 2"),
+        "cell 0 .* is a wedge that is flat or folds",
+    ),
     "msh flat": ("a.msh", MSH + MSH_NODES.replace("4 0 0 1", "4 1 1 0") + MSH_TAIL, "tet 0 .*flat"),
     "msh triangle": (
         "a.msh",
         MSH + MSH_NODES + MSH_TAIL.replace("1 4 2 0 1 1 2 3 4", "1 2 2 0 1 1 2 3"),
-        "no tetrahedra",
+        "surface of 1 cells, and no tets; fill it with them: supple mesh a.msh",
     ),
-    "vtk hexahedron": ("a.vtk", VTK_TETS + "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n12\n", "hexahedron cells"),
+    "vtk hexahedron": ("a.vtk", VTK_TETS + "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n12\n", "hexahedron of 4 points, not 8"),
+    "vtk polyhedron": ("a.vtk", VTK_TETS + "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n42\n", "polyhedron cells"),
     "vtk no types": ("a.vtk", VTK_TETS + "CELLS 1 5\n4 0 1 2 3\n", "CELL_TYPES"),
     "vtk types": ("a.vtk", VTK_TETS + "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 2\n10 10\n", "1 cells, but 2 cell types"),
     "vtk five": ("a.vtk", VTK_TETS + "CELLS 1 6\n5 0 1 2 3 0\nCELL_TYPES 1\n10\n", "5 points, not 4"),
@@ -172,7 +180,7 @@ MALFORMED_TET_FILES = {
         VTK_TETS.replace("0 0 1\n", "0 nan 1\n") + "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n",
         "finite",
     ),
-    "vtu surface": ("a.vtu", vtp('NumberOfPoints="3"', "0 0 0 1 0 0 0 1 0", "0 1 2", "3"), "no tetrahedra"),
+    "vtu surface": ("a.vtu", vtp('NumberOfPoints="3"', "0 0 0 1 0 0 0 1 0", "0 1 2", "3"), "surface of 1 cells"),
     **{f"garbage {e}": (f"g{e}", GARBAGE, f"g{e}") for e in (".msh", ".vtu", ".vtk", ".node", ".ele")},
 }
 
@@ -198,10 +206,12 @@ def test_missing_files_and_folders(tmp_path, load):
 
 def test_tets_as_a_surface_are_an_error_with_a_remedy(tmp_path):
     BODY.save(tmp_path / "a.vtu")
-    with pytest.raises(MeshError, match=r"tetrahedron cells, which are not a surface; load it with TetMesh\.load"):
+    with pytest.raises(MeshError, match=r"it holds 36 solid cells, .*use it as it is; it is loaded with TetMesh\.load"):
         SurfaceMesh.load(tmp_path / "a.vtu")
     BALL.save(tmp_path / "b.vtk")
-    with pytest.raises(MeshError, match="no tetrahedra; a surface is loaded with"):
+    with pytest.raises(
+        MeshError, match=r"it holds a surface of 80 cells, and no tets; fill it with them: supple mesh b\.vtk"
+    ):
         TetMesh.load(tmp_path / "b.vtk")
 
 

@@ -145,14 +145,15 @@ def test_a_file_without_groups_has_no_sets(tmp_path):
 GOOD = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4\n9,1,2,3,4\n"
 HEAD = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
 MALFORMED = {
-    "no tets": ("a.inp", "*NODE\n1,0,0,0\n", "a.inp: it has no tetrahedra"),
+    "no tets": ("a.inp", "*NODE\n1,0,0,0\n", "a.inp: it has neither tets nor a surface"),
     "no name": ("a.inp", GOOD + "*NSET\n1\n", "a.inp:8: \\*NSET has no name"),
     "unknown node": ("a.inp", GOOD + "*NSET, NSET=a\n1, 5\n", "node 5 is used, and does not exist"),
     "unknown set": ("a.inp", GOOD + "*NSET, NSET=a\nb\n", "a.inp:9: names the set 'b', which is not defined before"),
     "no number": ("a.inp", GOOD + "*NSET, NSET=a\n1, 1x\n", "a.inp:9: names the set '1x'"),
     "endless": ("a.inp", GOOD + "*NSET, NSET=a, GENERATE\n1, 4000000000000\n", "a.inp:9: a set has more than"),
     "step of zero": ("a.inp", GOOD + "*NSET, NSET=a, GENERATE\n1, 4, 0\n", "a.inp:9: GENERATE needs"),
-    "node twice": ("a.inp", GOOD.replace("2,1,0,0", "1,1,0,0"), "node 1 is given twice"),
+    "node that is missing": ("a.inp", GOOD.replace("2,1,0,0", "1,1,0,0"), "node 2 is used, and does not exist"),
+    "element twice": ("a.inp", GOOD + "9,1,2,3,4\n", "element 9 is given twice"),
     "short element": ("a.inp", GOOD.replace("9,1,2,3,4", "9,1,2,3"), "do not have a number and 4 nodes each"),
     "binary": ("a.inp", GOOD + "\0", "not a text file"),
     "no entities": (

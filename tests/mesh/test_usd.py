@@ -63,10 +63,10 @@ def test_prims_are_placed_in_metres(tmp_path: Path) -> None:
     [
         ("solid x\n", "not a USD file"),
         ('#usda 1.0\ndef TetMesh "a" {\n', "OpenUSD cannot read it"),
-        ("#usda 1.0\n", "no tetrahedra"),
+        ("#usda 1.0\n", "no prims of the types Mesh and TetMesh"),
         (
             tet("point3f[] points = [(0, 0, 0)]"),
-            "/a: a tet names a point outside of 0 to 0",
+            "/a: a cell names a point outside of 0 to 0",
         ),
         (tet("pointXf[] points = [(0, 0, 0)]"), r"/a.points is not an array of the type point3f\[\]"),
         (tet("float2[] points = [(0, 1), (2, 3), (4, 5)]"), r"/a.points is not an array of the type point3f\[\]"),

@@ -99,7 +99,7 @@ class Kind:
                 if isinstance(one.form, Name) != of_names or (value is None and one.optional):
                     continue
                 if value is None and key in self.required:
-                    raise SceneError(f"{self.label}: {key} is missing; give {key}=..., {one.description}")
+                    raise self.error(f"{self.label}: {key} is missing; give {key}=..., {one.description}")
                 what = (self.word if key == "name" else f"{self.word}: {key}") if of_names else f"{self.label}: {key}"
                 try:
                     object.__setattr__(self, key, one.form.checked(value, what))
@@ -110,7 +110,7 @@ class Kind:
             if len(given) != 1:
                 *others, last = self.exactly_one
                 found = " and ".join(given) or "none of them"
-                raise SceneError(f"{self.label}: {found} given; give exactly one of {', '.join(others)} and {last}")
+                raise self.error(f"{self.label}: {found} given; give exactly one of {', '.join(others)} and {last}")
 
     @property
     def word(self) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, vertex_array
-from supple.mesh.io.mesh_files import read_surface, write_surface
+from supple.mesh.io.mesh_files import read_contents, surface_of, write_surface
 from supple.mesh.topology import Components, connected_components, is_used, unique_edges, without_unused
 from supple.runtime.displayed import Showable, extent
 
@@ -58,20 +58,26 @@ class SurfaceMesh(Showable):
         }
 
     @classmethod
-    def load(cls, path: str | Path) -> SurfaceMesh:
-        """Read a surface from an STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file, selected by its extension.
+    def load(cls, path: str | Path, *, keep_axes: bool = False) -> SurfaceMesh:
+        """Read a surface from an STL, OBJ, PLY, OFF, GLB, glTF, DAE, 3MF, VTP, VTK, VTU, MSH, INP, MESH or USD file, by
+        its extension, or by what it holds where that differs.
 
         Polygons are cut into triangles. Vertices closer than 2e-7 of the bounding box's diagonal (two units in the
         last place of the single precision that most files are written in) become one; triangles that collapse by
         this, that repeat another one and face the same way, and vertices that no triangle uses are dropped. The log
-        gives their numbers.
+        gives their numbers. Coordinates are in metres where the file names its unit (DAE, 3MF, glTF, USD).
+
+        Parameters
+        ----------
+        keep_axes : whether the coordinates stay those of a file that says that x or z points up (DAE, USD), which
+            otherwise becomes y
 
         Raises
         ------
         MeshError : where the file is missing, malformed, of another kind, or has no surface; the text starts with
             the path.
         """
-        return cls(*read_surface(path))
+        return cls(*surface_of(read_contents(path, keep_axes=keep_axes)))
 
     def save(self, path: str | Path) -> None:
         """Write the surface as STL (binary), OBJ, PLY, OFF, VTP, VTK or VTU, by the extension of `path`.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, place, vertex_array
-from supple.mesh.io.mesh_files import read_tets, write_tets
+from supple.mesh.io.mesh_files import TetFile, read_contents, tet_file_of, write_tets
 from supple.mesh.io.tetgen_family import is_tetgen_path, write_tetgen_family
 from supple.mesh.quadratic import (
     check_middle_nodes,
@@ -143,20 +143,29 @@ class TetMesh(Showable):
         return cls(kept, renumbered)
 
     @classmethod
-    def load(cls, path: str | Path) -> TetMesh:
-        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu, .vtk, Abaqus's .inp or USD's .usd,
-        .usda or .usdc (the extra `usd`), selected by the extension.
+    def load(cls, path: str | Path, *, keep_axes: bool = False) -> TetMesh:
+        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu, .vtk, Abaqus's .inp, Medit's .mesh or
+        USD's .usd, .usda or .usdc (the extra `usd`), by the extension, or by what the file holds where that differs.
 
-        Tets of ten nodes stay quadratic; of TetGen's only the corners are used.
+        Tets of ten nodes stay quadratic; of TetGen's only the corners are used. Hexahedra, wedges, pyramids and voxels
+        are split into tets that fit those of their neighbours: by the numbers of their corners (Dompierre et al. 1999).
+        Vertices that belong to no tet are dropped, and negative tets are turned; the log says so.
 
-        Vertices that belong to no tet are dropped, and negative tets are turned; the log gives their numbers.
+        Parameters
+        ----------
+        keep_axes : whether the coordinates stay those of a file of USD whose z axis points up, which otherwise becomes
+            y
 
         Raises
         ------
         MeshError : where the file is missing, malformed, of another kind, or has no usable tets; the text starts
             with the path.
         """
-        file = read_tets(path)
+        return cls.of_file(tet_file_of(read_contents(path, keep_axes=keep_axes)))
+
+    @classmethod
+    def of_file(cls, file: TetFile) -> TetMesh:
+        """The mesh of what a file holds; see `load`."""
         source = file.source
         try:
             mesh = cls.dropping_unused(file.points, file.tets)

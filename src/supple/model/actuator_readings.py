@@ -87,17 +87,3 @@ def actuator_fields(
             found["cable_length"][each.name] = float(s.sum())
         found[f"{each.kind}_work"][each.name] = float(work.sum())
     return found
-
-
-def add_actuator_forces(
-    system: System, details: SolverDetails, x: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
-    """Add the forces of all actuators on the vertices at x (n, 3) [m] to `out` (n, 3) [N]."""
-    cables = cable_readings(details)
-    for each in system.actuators:
-        if each.kind == "cavity":
-            forces = np.array([details.cavity_pressure[each.name]])
-        else:
-            forces = -np.array(cables[each.name].tension)
-        rows = each.coordinate.vertices
-        out[rows] += np.einsum("p,pij->ij", forces, each.coordinate.part_gradients(x[rows]))

@@ -171,6 +171,8 @@ class SolverDetails:
     joint_coordinates : angles of hinges [rad], travels of sliders [m], swings of balls with limits [rad], by name
     motor_forces : efforts of the motors [N], [N m], by name of their joint
     joint_violations : how far each joint is from holding, as a share of the diameter of gyration of its smaller body
+    reaction_forces : of pins on what they hold, by label of the pin, (3,) [N]; of `XPBD` means over the step, without
+        those that hold one piece with rigid edges or volumes together: their shares are not known
     work : on the bodies over the step, by what does it [J]; see `Report.work`
     energy_residual : what the forces of the step leave open [J]; see `Report.energy_residual`
     active : stretch of each growth and activation of each muscle at the end, by kind and number: "growth.0" [-]
@@ -190,6 +192,7 @@ class SolverDetails:
     joint_coordinates: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     motor_forces: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     joint_violations: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    reaction_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
     work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     energy_residual: float = field(default=0.0, kw_only=True)
     active: Mapping[str, float] = field(default_factory=dict, kw_only=True)
@@ -233,26 +236,51 @@ class StepReport:
     contacts: Callable[[], ContactPoints] | None = None
 
 
+# What helps against a status where its message does not say it.
+_REMEDIES = {
+    Status.ITERATION_LIMIT: "take a shorter dt, or more max_iterations",
+    Status.LINE_SEARCH_FAILED: "take a shorter dt; a static load may have no equilibrium: follow the motion "
+    "with integrator='backward_euler'",
+    Status.BLOCKED: "let what is named move slower, or elsewhere",
+}
+
+
 class Problems:
-    """The frames of a run that the solver could go on from although they did not converge.
+    """The frames of a run that did not converge, and why it ended early.
+
+    Parameters
+    ----------
+    last : index of the frame at which the run is to end
 
     Attributes
     ----------
-    frames : number of frames; bad : how many of them did not converge
-    first : by status, the message of its first frame
+    frames : number of frames; bad : how many of them did not converge although the solver could go on
+    first : by status, the text of its first frame
+    latest : text of the last frame; "" where it converged
+    stopped : whether the solver could not go on from the last frame
     """
 
-    def __init__(self) -> None:
+    def __init__(self, last: int) -> None:
+        self.last = last
         self.frames = self.bad = 0
         self.first: dict[Status, str] = {}
+        self.latest, self.stopped = "", False
 
-    def note(self, status: Status, message: str) -> None:
+    def note(self, index: int, time: float, status: Status, message: str) -> None:
         """Record a frame."""
         self.frames += 1
-        if status is not Status.CONVERGED and status.can_go_on:
-            self.bad += 1
-            self.first.setdefault(status, message)
+        self.stopped, self.latest = not status.can_go_on, ""
+        if status is not Status.CONVERGED:
+            words = [f"{status}: {message}" if message else str(status), *filter(None, [_REMEDIES.get(status)])]
+            text = "; ".join(words)
+            self.latest = f"frame {index} of {self.last}, t = {time:.6g} s: {text}"
+            if status.can_go_on:
+                self.bad += 1
+                self.first.setdefault(status, text)
 
     def __str__(self) -> str:
-        texts = "; ".join(f"{status}: {message}" if message else str(status) for status, message in self.first.items())
-        return f"{self.bad} of {self.frames} frames did not converge; first of each kind: {texts}" if self.bad else ""
+        texts = [f"stopped at {self.latest}"] if self.stopped else []
+        if self.bad:
+            first = "; ".join(self.first.values())
+            texts.append(f"{self.bad} of {self.frames} frames did not converge; first of each kind: {first}")
+        return "; ".join(texts)

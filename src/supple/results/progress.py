@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import sys
 import time
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from supple.runtime.kernel_count import KernelCount
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _PERIOD = 0.2  # between two lines in a notebook [s]
 _STARTING = "starting"
 _SMOOTHING = 0.2  # weight of the newest frame in the displayed milliseconds
+_PATIENCE = 2.0  # compilation that takes longer is shown without being asked for [s]
 
 
 @cache
@@ -32,12 +34,14 @@ class ProgressBar:
     """Frames done, milliseconds of each, time left, and how the last step ended.
 
     In a notebook it is a line that changes. Where the output is neither a terminal nor a notebook (a file, a pipe, CI),
-    there is one line at the end.
+    there is one line at the end. While kernels are compiled, it says so.
 
     Parameters
     ----------
     console : where to write; standard error by default, so that standard output contains only results.
     """
+
+    running: ClassVar[list[ProgressBar]] = []
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = console
@@ -53,6 +57,7 @@ class ProgressBar:
             self._console = error_console()
         self._start, self._steps, self._status = time.perf_counter(), steps, _STARTING
         self._seconds.clear()
+        self.running.append(self)
         if self._console.is_terminal:
             columns = (
                 BarColumn(),
@@ -71,20 +76,23 @@ class ProgressBar:
         self._displayed_ms += (_SMOOTHING if self._seconds else 1.0) * (ms - self._displayed_ms)
         self._seconds.append(report.wall_seconds)
         self._status = str(report.status)
+        self.show(self._status)
+
+    def show(self, status: str) -> None:
+        """Show what was done so far, and this status."""
+        ms = f"{self._displayed_ms:.1f}" if self._seconds else "-"
         if self._bar is not None:
-            self._bar.update(
-                self._task, completed=len(self._seconds), ms=f"{self._displayed_ms:.1f}", status=self._status
-            )
+            self._bar.update(self._task, completed=len(self._seconds), ms=ms, status=status)
         elif self._console is not None and self._console.is_jupyter and time.perf_counter() > self._next_line:
             self._next_line = time.perf_counter() + _PERIOD
-            frames = f"{len(self._seconds)} of {self._steps} frames"
             # A carriage return replaces the line: a bar of rich needs ipywidgets there.
-            sys.stdout.write(f"\r{frames}, {self._displayed_ms:.1f} ms each; {self._status}{' ' * 12}")
-            sys.stdout.flush()
+            _write_over(f"{len(self._seconds)} of {self._steps} frames, {ms} ms each; {status}")
 
     def end(self) -> None:
+        if self in self.running:  # a sink may be ended that never began
+            self.running.remove(self)
         if self._console is not None and self._console.is_jupyter:
-            sys.stdout.write(f"\r{self._summary()}{' ' * 12}\n")
+            _write_over(self._summary(), "\n")
             return
         if self._bar is not None:
             self._bar.stop()
@@ -97,6 +105,12 @@ class ProgressBar:
         each = f", {1e3 * sum(self._seconds) / frames:.1f} ms each in the solver" if frames else ""
         seconds = time.perf_counter() - self._start
         return f"{frames} of {self._steps} frames in {seconds:.1f} s{each}; {self._status}"
+
+
+def _write_over(text: str, end: str = "") -> None:
+    """Replace the line of a notebook."""
+    sys.stdout.write(f"\r{text:<60}{end}")
+    sys.stdout.flush()
 
 
 def kernel_bar(console: Console) -> Progress:
@@ -113,35 +127,69 @@ def kernel_bar(console: Console) -> Progress:
 
 
 class CompileBar(KernelCount):
-    """A block in which compilation is shown, kernel by kernel, where standard error is a terminal."""
+    """Shows compilation, kernel by kernel, where standard error is a terminal, or in a notebook.
 
-    def __init__(self) -> None:
+    Of several, the one that is a block shows it. Where a `ProgressBar` runs, that one does.
+
+    Parameters
+    ----------
+    patience : how long compilation takes altogether before it is shown [s]
+    """
+
+    _blocks: ClassVar[int] = 0
+
+    def __init__(self, patience: float = 0.0) -> None:
         super().__init__()
         self._bar: Progress | None = None
+        self._patience, self._spent, self._began = patience, 0.0, 0.0
+        self._is_block = self._has_line = False
 
     def __enter__(self) -> CompileBar:
+        self._is_block = True
+        CompileBar._blocks += 1
         return self
 
     def __exit__(self, *_: object) -> None:
+        CompileBar._blocks -= 1
         self.close()
         self._stop()
 
     def changed(self) -> None:
         if not self.compiling:
+            self._spent += time.perf_counter() - self._began if self._began else 0.0
+            self._began = 0.0
             self._stop()  # what follows may print
             return
-        if self._bar is None:
-            from supple.results.progress import error_console
+        self._began = self._began or time.perf_counter()
+        waited = self._spent + time.perf_counter() - self._began
+        if waited >= self._patience and (self._is_block or not CompileBar._blocks):
+            self._show(waited)
 
-            if not error_console().is_terminal:
-                return
-            self._bar = kernel_bar(error_console())
-            self._bar.start()
-            self._task = self._bar.add_task("", total=None)
+    def _show(self, waited: float) -> None:
         number, total = self.numbers()
-        self._bar.update(self._task, completed=number, total=total)
+        if ProgressBar.running:
+            ProgressBar.running[-1].show(f"compiling kernel {number} of {total}, once on this machine")
+        elif error_console().is_jupyter:
+            _write_over(f"compiling kernel {number} of {total}, once on this machine, {waited:.0f} s")
+            self._has_line = True
+        elif sys.stderr is not None and sys.stderr.isatty():
+            if self._bar is None:
+                self._bar = kernel_bar(error_console())
+                self._bar.start()
+                self._task = self._bar.add_task("", total=None)
+                self._bar.tasks[0].start_time = self._bar.get_time() - waited  # of all kernels so far
+            self._bar.update(self._task, completed=number, total=total)
 
     def _stop(self) -> None:
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
+        if self._has_line:
+            _write_over("", "\r")
+            self._has_line = False
+
+
+def show_compilation() -> None:
+    """From now on, show compilation that takes long; not in a process of a study or of the page, which has a caller."""
+    if multiprocessing.parent_process() is None:
+        CompileBar(_PATIENCE)

@@ -32,6 +32,7 @@ from numba.np.numpy_support import numpy_version
 from numpy.typing import NDArray
 
 from supple.runtime import inner_function, kernel_folder
+from supple.runtime.displayed import supplied
 from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly, inlined_size
 from supple.runtime.kernel_watchers import WATCHERS
 from supple.runtime.lock import FileLock
@@ -219,6 +220,7 @@ class KernelCache(_Cache):
         self._tell("compiled", sig)
 
     def _tell(self, stage: str, sig: Any) -> None:
+        _watch()
         if stage == "compiling":
             _announce()
             logger.debug("compiling %s", self.name)
@@ -242,6 +244,11 @@ class KernelCache(_Cache):
 
 
 @cache  # once per process
+def _watch() -> None:
+    supplied("compilation")()
+
+
+@cache
 def _announce() -> None:
     logger.info("compiling kernels, once on this machine; `supple warm` does so beforehand")
 

@@ -2,12 +2,19 @@
 
 A wheel may contain such a folder, which is only read: its kernels are compiled for a level of instructions that many
 processors have.
+
+An entry is machine code and is read by pickle: who can write it runs code here. So an entry, and its folder, must
+belong to this user or to root, and be writable by nobody else. The folder of a wheel may belong to who owns the
+package, and be writable by who can write that: they run code here in any case.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import os
+import stat
+import sys
 import zlib
 from contextlib import suppress
 from functools import cache
@@ -25,6 +32,9 @@ _LONGEST_WAIT, _PAUSE = 60.0, 0.02
 # Ten states of the code, with the kernels of all tests each; those that were not used for longest go.
 _MOST_BYTES = 1 << 30
 _DAY = 86400.0  # a use is noted at most once a day: a note is a write
+
+
+logger = logging.getLogger(__name__)
 
 
 def kernel_folder() -> Path:
@@ -56,10 +66,47 @@ def shipped_target() -> tuple[str, str, str] | None:
     return triple, processor, features
 
 
+def is_trusted(status: os.stat_result, like: os.stat_result | None = None) -> bool:
+    """Whether nobody but this user and root can write a file or folder, or those who can write another one (`like`).
+
+    Windows has neither owners nor modes of this kind: its folder of a user is that user's.
+    """
+    if sys.platform == "win32":
+        return True
+    owners, others = {os.getuid(), 0}, stat.S_IWGRP | stat.S_IWOTH
+    if like is not None:
+        owners.add(like.st_uid)
+        # The group of another file is no matter where it is another group.
+        others &= ~(like.st_mode if like.st_gid == status.st_gid else like.st_mode & stat.S_IWOTH)
+    return status.st_uid in owners and not status.st_mode & others
+
+
+def _is_refused(path: Path, status: os.stat_result) -> bool:
+    """Whether a file or folder of kernels is not trusted; the log says so, once for each folder."""
+    like = Path(__file__).stat() if path.is_relative_to(SHIPPED) else None
+    if is_trusted(status, like):
+        return False
+    _warn(path if stat.S_ISDIR(status.st_mode) else path.parent)
+    return True
+
+
+@cache  # once per process
+def _warn(folder: Path) -> None:
+    logger.warning(
+        "compiled kernels in %s are not used: it, or a file in it, belongs to another user, or others can write it; "
+        "`chmod -R go-w` it, or set NUMBA_CACHE_DIR to a folder of your own",
+        folder,
+    )
+
+
 def read(path: Path) -> bytes | None:
-    """The content of an entry; None where there is none, or it is damaged."""
+    """The content of an entry; None where there is none, it is damaged, or others can write it."""
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            # Of what is opened, which may be another file than the path names a moment later.
+            if _is_refused(path, os.fstat(file.fileno())) or _is_refused(path.parent, path.parent.stat()):
+                return None
+            content = file.read()
         if zlib.crc32(content[4:]).to_bytes(4, "little") != content[:4]:
             return None
     except OSError:
@@ -79,12 +126,16 @@ def write(path: Path, content: bytes) -> None:
 
     Raises
     ------
-    OSError : where it cannot be written.
+    OSError : where it cannot be written, or others can write in the folder.
     """
+    if _is_refused(path.parent, path.parent.stat()):
+        raise PermissionError(f"{path.parent} can be written by others")
     _remove_unused(path.parent)
     part = path.with_suffix(f".{os.getpid()}")
+    part.unlink(missing_ok=True)
     try:
-        part.write_bytes(zlib.crc32(content).to_bytes(4, "little") + content)
+        with open(part, "xb", opener=lambda name, flags: os.open(name, flags, 0o600)) as file:
+            file.write(zlib.crc32(content).to_bytes(4, "little") + content)
         part.replace(path)
     except OSError:
         part.unlink(missing_ok=True)
@@ -99,6 +150,8 @@ def lock(path: Path) -> tuple[FileLock | None, bool]:
     waited, end = False, monotonic() + _LONGEST_WAIT
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if _is_refused(path.parent, path.parent.stat()):
+            return None, False
         while (held := FileLock.acquired(path.with_suffix(".lock"))) is None and monotonic() < end:
             waited = True
             sleep(_PAUSE)

@@ -8,7 +8,7 @@ from typing import Any
 
 from supple.scene.joints.axis_joint import HingeJoint, SliderJoint
 from supple.scene.joints.joint import Joint
-from supple.scene.joints.point_joints import BallJoint, FixedJoint, UniversalJoint
+from supple.scene.joints.point_joints import BallJoint, FixedJoint, PlanarJoint, UniversalJoint
 from supple.scene.obstacles.box import Box
 from supple.scene.obstacles.capsule import Capsule
 from supple.scene.obstacles.cylinder import Cylinder
@@ -51,6 +51,7 @@ JOINTS: tuple[type[Joint], ...] = (
     BallJoint,
     HingeJoint,
     SliderJoint,
+    PlanarJoint,
     UniversalJoint,
 )
 

@@ -21,6 +21,7 @@ from supple.scene.inputs import Input, inputs_among
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.joint import Joint
 from supple.scene.joints.motors import Motor
+from supple.scene.joints.positions import at_positions
 from supple.scene.joints.weld import Weld
 from supple.scene.joints.welding import Welding, weld_together
 from supple.scene.loads.cable import Cable
@@ -293,6 +294,28 @@ class Scene(Showable):
                 )
         changed = {name: replace(with_axis[name], motor=motor) for name, motor in motors.items()}
         return replace(self, joints=[changed.get(str(joint.name), joint) for joint in self.joints])
+
+    def with_joint_positions(self, positions: Mapping[str, float]) -> Scene:
+        """The same scene with bodies placed so that hinges and sliders have other coordinates, where it starts.
+
+        Everything that is connected to one side of a joint moves with it, as one: see the module
+        `supple.scene.joints.positions`. Coordinates are set in the order in which they are given.
+
+        Parameters
+        ----------
+        positions : by name of the joint, its coordinate [rad] or [m].
+
+        Raises
+        ------
+        SceneError : where no hinge or slider has a name, a coordinate is outside of its joint's limits, or both sides
+            of a joint are connected by others.
+        """
+        links: list[tuple[str | None, str | None]] = [(weld.body, weld.rigid) for weld in self.welds]
+        obstacles = {obstacle.name for obstacle in self.obstacles}
+        links += [(one.first, None if one.second in obstacles else one.second) for one in self.stitches]
+        links += [(pin.body, None) for pin in self.pins]
+        bodies, joints = at_positions(self.bodies, self.joints, links, positions)
+        return replace(self, bodies=bodies, joints=joints)
 
     def body(self, name: str) -> PlacedBody:
         """The body of that name.

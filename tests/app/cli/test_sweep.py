@@ -7,7 +7,7 @@ import pytest
 from supple.app.cli.app import main
 from supple.app.cli.commands.sweep import StudyBar, duration
 from supple.app.cli.console import ExitCode
-from supple.app.studies.runner import StudyProgress
+from supple.app.studies.study import StudyProgress
 
 SCENE = """\
 bodies:
@@ -41,10 +41,9 @@ def test_a_study_in_the_shell(study, tmp_path, capfd):
         rows = list(csv.DictReader(file))
     assert [(row["steps"], row["status"]) for row in rows] == [("1", "done"), ("2", "done"), ("-1", "failed")]
     assert float(rows[1]["drop [m]"]) == pytest.approx(3.0 * float(rows[0]["drop [m]"]))
-    assert (tmp_path / "out" / "plots" / "drop-over-steps.png").exists()
     # Everything has ended: no worker is started, and nothing is printed.
     study.write_text(STUDY.replace(", -1", ""), encoding="utf-8")
-    assert main([*arguments, "--quiet", "--no-plot"]) == ExitCode.OK
+    assert main([*arguments, "--quiet"]) == ExitCode.OK
     assert capfd.readouterr() == ("", "")
 
 

@@ -1,11 +1,11 @@
-"""Scene files of a live page read nothing outside their folder, and run no code."""
+"""Scene files read nothing outside their folder where they are confined to it, and run no code."""
 
 import os
 
 import pytest
 
 import supple as sp
-from supple.app.scene_file.entries.mesh_sources import ConfinedMeshStore
+from supple.app.cli.app import main
 from supple.app.scene_file.loader import load_run
 from supple.errors import SceneError, SuppleError
 
@@ -34,7 +34,7 @@ def place(tmp_path):
 def load(home, source):
     path = home / "scene.yaml"
     path.write_text(SCENE.format(source=source))
-    return load_run(path, ConfinedMeshStore)
+    return load_run(path, confine=True)
 
 
 @pytest.mark.parametrize(
@@ -81,6 +81,42 @@ def test_a_run_from_the_shell_reads_any_file(place):
     assert load_run(path).scene.body("cube")
 
 
+ROBOT = (
+    '<robot name="r"><link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+    '<collision><geometry><mesh filename="{file}"/></geometry></collision></link></robot>'
+)
+
+
+def test_a_robot_reads_nothing_outside_its_folder(place):
+    (place / "link.stl").symlink_to(place.parent / "outside.stl")
+    sp.shapes.box_surface((1, 1, 1), (1, 1, 1)).save(place / "meshes" / "inside.stl")
+    path = place / "robot.urdf"
+    for file in ("../outside.stl", str(place.parent / "outside.stl"), "link.stl", "package://outside.stl"):
+        path.write_text(ROBOT.format(file=file))
+        assert len(sp.load_scene(path).body("a").triangles) == 12
+        with pytest.raises(SceneError, match=r"robot.urdf:1: link 'a': .*outside the scene file's folder"):
+            sp.load_scene(path, confine=True)
+    path.write_text(ROBOT.format(file="package://home/meshes/inside.stl"))
+    assert len(sp.load_scene(path, confine=True).body("a").triangles) == 12
+
+
+@pytest.mark.parametrize("command", ["run", "info", "view"])
+def test_commands_are_confined(place, command, monkeypatch, capsys):
+    """`run` and `info` where they are asked to, `view` where it is not asked not to."""
+    shown = []
+    monkeypatch.setattr("supple.app.cli.commands.view.serve_page", lambda source, *_: shown.append(source))
+    path = place / "scene.yaml"
+    path.write_text(SCENE.format(source="mesh: {file: ../outside.msh}"))
+    more = ["-o", str(place / "out"), "--steps", "0", "-q", "--no-page", "--no-plot"] if command == "run" else []
+    confined, free = ([], ["--no-confine"]) if command == "view" else (["--confine"], [])
+    assert main([command, str(path), *more, *confined]) == 2
+    assert (
+        "scene.yaml:4: bodies[0].mesh.file: ../outside.msh is outside the scene file's folder"
+        in capsys.readouterr().err
+    )
+    assert main([command, str(path), *more, *free]) in (0, None)
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
 def test_a_pipe_is_an_error_without_waiting_for_it(place):
     os.mkfifo(place / "pipe.msh")
@@ -108,6 +144,6 @@ def test_hostile_files_are_errors_and_run_no_code(tmp_path, text):
     marker, path = tmp_path / "marker", tmp_path / "scene.yaml"
     path.write_text(text.replace("{marker}", str(marker)))
     with pytest.raises(SuppleError) as caught:
-        load_run(path, ConfinedMeshStore)
+        load_run(path, confine=True)
     assert "\n" not in str(caught.value)
     assert not marker.exists()

@@ -79,8 +79,8 @@ def test_a_robot_becomes_rigid_bodies_and_joints(robot_file, caplog):
     assert (elbow.damping, elbow.friction, elbow.max_effort) == (0.0, 0.3, None)
     assert [joint.max_velocity for joint in (shoulder, elbow, grip)] == [1.0, None, None]
     assert scene.gravity.tolist() == [0, 0, -9.81]
-    for name in ("<transmission>", "<mimic> of joint 'grip'", "1 of the 2 collision geometries of link 'lower'"):
-        assert name in caplog.text
+    for text in ("not used: <transmission>\n", "<mimic> is not simulated (it only gives the start): joint 'grip'\n"):
+        assert f"arm.urdf: {text}" in caplog.text
 
 
 def test_a_robot_is_shown_live(robot_file, monkeypatch):
@@ -102,7 +102,10 @@ def test_inertia_and_places_are_those_of_the_links(robot_file):
     given = np.array([[0.02, 0.0005, 0], [0.0005, 0.0205, 0], [0, 0, 0.002]])
     R = (upper.place(np.eye(3)) - upper.place(np.zeros((1, 3)))).T
     np.testing.assert_allclose(R @ upper.properties.inertia @ R.T, own @ given @ own.T, atol=1e-12)
-    np.testing.assert_allclose(np.ptp(lower.place(lower.points), axis=0), [0.2, 0.06, 0.06], atol=1e-12)
+    # Both collision geometries, the box of .06 x .06 x .2 m and the ball about the link's origin.
+    parts = lower.surface.components
+    assert parts.count == 2
+    np.testing.assert_allclose(np.ptp(lower.place(lower.points), axis=0), [0.2, 0.2, 0.2], atol=0.01)
     np.testing.assert_allclose(np.linalg.eigvalsh(finger.properties.inertia), [1e-4, 1.1e-4, 1.2e-4], rtol=1e-6)
 
 
@@ -164,7 +167,9 @@ BAD = {
     "joint without name": ARM.replace('joint name="flange"', "joint"),
     "joint without type": ARM.replace('name="elbow" type="continuous"', 'name="elbow"'),
     "unknown type": ARM.replace("continuous", "screw"),
-    "planar": ARM.replace("continuous", "planar"),
+    "macros": ARM.replace('<link name="tool"/>', '<xacro:property name="m" value="2"/>'),
+    "a limit below the other by default": ARM.replace('lower="-1" upper="1.5"', 'lower="1"'),
+    "nothing to simulate": '<robot name="r"><link name="a"/></robot>',
     "unknown parent": ARM.replace('parent link="upper"', 'parent link="nobody"'),
     "unknown child": ARM.replace('child link="lower"', 'child link="nobody"'),
     "no parent": ARM.replace('<parent link="upper"/>', ""),
@@ -180,13 +185,11 @@ BAD = {
     "infinite place": ARM.replace('xyz="0 0 0.4"', 'xyz="0 inf 0.4"'),
     "no limit": ARM.replace('<limit lower="0" upper="0.04"/>', ""),
     "limits exchanged": ARM.replace('lower="-1" upper="1.5"', 'lower="1.5" upper="-1"'),
-    "limits without the start": ARM.replace('lower="-1" upper="1.5"', 'lower="0.5" upper="1.5"'),
     "NaN limit": ARM.replace('lower="-1"', 'lower="nan"'),
     "negative effort": ARM.replace('effort="10"', 'effort="-1"'),
     "negative velocity": ARM.replace('velocity="1"', 'velocity="-1"'),
     "velocity of text": ARM.replace('velocity="1"', 'velocity="fast"'),
     "negative damping": ARM.replace('damping="0.2"', 'damping="-1"'),
-    "no mass": ARM.replace('<mass value="2"/>', ""),
     "two masses": ARM.replace('<mass value="2"/>', '<mass value="2"/><mass value="3"/>'),
     "two axes": ARM.replace('<axis xyz="1 0 0"/>', '<axis xyz="1 0 0"/><axis xyz="0 1 0"/>'),
     "two limits": ARM.replace('<limit lower="0" upper="0.04"/>', '<limit lower="0" upper="0.04"/>' * 2),
@@ -194,27 +197,16 @@ BAD = {
     "mass below all numbers": ARM.replace('mass value="2"', 'mass value="1e-320"'),
     "huge mass": ARM.replace('mass value="2"', 'mass value="1e300"'),
     "a separator of digits": ARM.replace('xyz="0 0 0.4"', 'xyz="0 0 1_0"'),
-    "zero mass": ARM.replace('mass value="2"', 'mass value="0"'),
     "negative mass": ARM.replace('mass value="2"', 'mass value="-2"'),
     "mass of text": ARM.replace('mass value="2"', 'mass value="heavy"'),
     "NaN inertia": ARM.replace('iyy="0.0205"', 'iyy="nan"'),
     "half an inertia": ARM.replace('iyy="0.0205" ', ""),
-    "inertia of no body": ARM.replace('izz="0.002"', 'izz="0.2"'),
-    "negative inertia": ARM.replace('izz="0.002"', 'izz="-0.002"'),
-    "no mesh": ARM.replace("lower.stl", "missing.stl"),
-    "mesh of another kind": ARM.replace("lower.stl", "lower.dae"),
     "mesh of nothing": ARM.replace("package://arm/meshes/lower.stl", ""),
-    "folder as a mesh": ARM.replace("meshes/lower.stl", "meshes"),
-    "scale": ARM.replace('scale="0.001 0.001 0.001"', 'scale="1 2 3"'),
-    "negative scale": ARM.replace('scale="0.001 0.001 0.001"', 'scale="-1 -1 -1"'),
     "unknown geometry": ARM.replace('<cylinder radius="0.03" length="0.2"/>', "<capsule/>"),
     "no geometry": ARM.replace('<cylinder radius="0.03" length="0.2"/>', ""),
     "two geometries": ARM.replace('<box size="0.2 0.2 0.1"/>', '<box size="1 1 1"/><box size="1 1 1"/>'),
-    "flat box": ARM.replace('size="0.2 0.2 0.1"', 'size="0.2 0.2 0"'),
     "negative radius": ARM.replace('radius="0.03"', 'radius="-0.03"'),
     "no length": ARM.replace(' length="0.2"', ""),
-    "a moving frame": ARM.replace('name="flange" type="fixed"', 'name="flange" type="continuous"'),
-    "name of a path": ARM.replace('"upper"', '"up/per"'),
     "binary": "\x00\x01\x02",
     "huge inertia": ARM.replace('ixx="0.02" ixy="0.0005"', 'ixx="1e308" ixy="0.0005"'),
     "huge angle": ARM.replace('rpy="0 0 0.3"', 'rpy="0 0 1e308"'),
@@ -222,13 +214,9 @@ BAD = {
     "huge damping": ARM.replace('damping="0.2"', 'damping="1e300"'),
     "mass with a unit": ARM.replace('mass value="2"', 'mass value="2 kg"'),
     "limits with a unit": ARM.replace('lower="0" upper="0.04"', 'lower="0deg" upper="90deg"'),
-    "sphere of nothing": ARM.replace('<cylinder radius="0.03" length="0.2"/>', '<sphere radius="0"/>'),
     "scale of nothing": ARM.replace('scale="0.001 0.001 0.001"', 'scale="0 0 0"'),
-    "mesh outside": ARM.replace("package://arm/meshes/lower.stl", "../../../../../../etc/passwd"),
-    "mesh of the net": ARM.replace("package://arm/meshes/lower.stl", "http://localhost:1/lower.stl"),
     "part of a mesh": ARM.replace("lower.stl", "broken.stl"),
     "macro": ARM.replace('mass value="2"', 'mass value="${m}"'),
-    "namespace": ARM.replace("<robot name", '<robot xmlns="http://x" name'),
     "attribute twice": ARM.replace('mass value="2"', 'mass value="2" value="3"'),
     "deep": "<robot>" + "<link>" * 100_000 + "</link>" * 100_000 + "</robot>",
     "no end of depth": "<robot>" + "<a>" * 100_000,
@@ -253,11 +241,11 @@ def test_bad_robots_are_refused_in_one_line(what, robot_file, capsys):
 
 def test_links_are_placed_in_one_pass(tmp_path, monkeypatch):
     """A file of a megabyte may have thousands of links in one line."""
-    from supple.app.scene_file.urdf import describe
+    from supple.app.scene_file.urdf.robot import Placement
 
     asked = []
-    is_body = describe._is_body
-    monkeypatch.setattr(describe, "_is_body", lambda link, robot: asked.append(link) or is_body(link, robot))
+    then = Placement.then
+    monkeypatch.setattr(Placement, "then", lambda outer, inner: asked.append(inner) or then(outer, inner))
     path = tmp_path / "chain.urdf"
     path.write_text(_chain(400).replace('<link name="l0">', f'<link name="l0">{MASS}'))
     (body,) = sp.load_scene(path).bodies

@@ -10,7 +10,6 @@ import time
 import pytest
 
 import supple as sp
-from supple.app.studies.workers import SUPERVISOR
 
 FALL_STEPS, FALL_DT = 10, 0.01
 
@@ -56,7 +55,7 @@ def cluster(tmp_path_factory):
     scheduler = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
     started = [start(*scheduler, "--host", "127.0.0.1", "--port", "0")]
     options = "--nworkers 2 --nthreads 1 --memory-limit 2GB --local-directory"
-    started.append(start(*SUPERVISOR, *options.split(), str(folder)))
+    started.append(start(sys.executable, "-m", "distributed.cli.dask_worker", *options.split(), str(folder)))
     while not contact.exists():
         assert started[0].poll() is None
         time.sleep(0.05)

@@ -18,7 +18,9 @@ def test_the_files_of_the_page(tmp_path):
     points = described.design.points(described.factors)
     assert len(points) == 12
     for point in points:
-        described.source.check({path: point[name] for name in point for path in described.paths[name]})
+        described.source.check(
+            {path: point[name] for name in point for path in described.factors[name].paths or [name]}
+        )
 
 
 def test_the_program_of_the_page_runs(tmp_path, monkeypatch):
@@ -29,4 +31,3 @@ def test_the_program_of_the_page_runs(tmp_path, monkeypatch):
     assert lines[0] == "case,youngs [Pa],friction,measure [m],status,reason"
     assert len(lines) == 7
     assert all(",done," in line for line in lines[1:])
-    assert {path.name for path in (tmp_path / "slide" / "plots").iterdir()} == {"measure.png", "measure-tornado.png"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.studies.measures import SERIES, BodyMeasure, Measures, SeriesMeasure
+from supple.app.studies.measures import NUMBERS, VECTORS, Measure, Measures
 
 from .conftest import FALL_DT, FALL_STEPS, fallen, make_fall
 
@@ -27,20 +27,20 @@ SPEED = G * FALL_DT * FALL_STEPS
 @pytest.mark.parametrize(
     ("measure", "expected"),
     [
-        (SeriesMeasure("kinetic_energy"), 500.0 * SPEED**2),
-        (SeriesMeasure("kinetic_energy", time="first"), 0.0),
-        (SeriesMeasure("min_det_F", time="min"), 1.0),
-        (SeriesMeasure("linear_momentum", axis="y"), -1000.0 * SPEED),
-        (SeriesMeasure("linear_momentum", axis="length", time="max"), 1000.0 * SPEED),
-        (SeriesMeasure("potential_energy", time="range"), 1000.0 * G * -fallen(G)),
-        (BodyMeasure("displacement", "cube", axis="y"), fallen(G)),
-        (BodyMeasure("displacement", "cube"), -fallen(G)),
-        (BodyMeasure("displacement", "cube", axis="x", time="max"), 0.0),
-        (BodyMeasure("position", "cube", axis="y", over="max", time="first"), 2.5),
-        (BodyMeasure("position", "cube", axis="y", over="range", time="mean"), 1.0),
-        (BodyMeasure("position", "cube", axis="x", vertices=(0,)), -0.5),
-        (BodyMeasure("velocity", "cube", axis="y", time="min"), -SPEED),
-        (BodyMeasure("velocity", "cube", axis="y", time="sum"), fallen(G) / FALL_DT),
+        (Measure("kinetic_energy"), 500.0 * SPEED**2),
+        (Measure("kinetic_energy", time="first"), 0.0),
+        (Measure("min_det_F", time="min"), 1.0),
+        (Measure("linear_momentum", axis="y"), -1000.0 * SPEED),
+        (Measure("linear_momentum", time="max"), 1000.0 * SPEED),
+        (Measure("potential_energy", time="range"), 1000.0 * G * -fallen(G)),
+        (Measure("displacement", "cube", axis="y"), fallen(G)),
+        (Measure("displacement", "cube"), -fallen(G)),
+        (Measure("displacement", "cube", axis="x", time="max"), 0.0),
+        (Measure("position", "cube", axis="y", over="max", time="first"), 2.5),
+        (Measure("position", "cube", axis="y", over="range", time="mean"), 1.0),
+        (Measure("position", "cube", axis="x", vertices=(0,)), -0.5),
+        (Measure("velocity", "cube", axis="y", time="min"), -SPEED),
+        (Measure("velocity", "cube", axis="y", time="sum"), fallen(G) / FALL_DT),
     ],
 )
 def test_measures_equal_the_formula(recording, measure, expected):
@@ -48,18 +48,16 @@ def test_measures_equal_the_formula(recording, measure, expected):
 
 
 def test_every_series_is_one_that_recordings_have(recording):
-    for name in SERIES:
+    for name in (*NUMBERS, *VECTORS):
         assert len(recording.series(name)) == FALL_STEPS + 1
 
 
 @pytest.mark.parametrize(
     ("measure", "words"),
     [
-        (SeriesMeasure("linear_momentum"), "give an axis"),
-        (SeriesMeasure("kinetic_energy", axis="x"), "has no axis"),
-        (SeriesMeasure("largest_stitch_stretch"), "is in no frame"),
-        (BodyMeasure("position", "ball"), "body 'ball' does not exist"),
-        (BodyMeasure("position", "cube", vertices=(1, 8)), "8 vertices; vertex 8 does not exist"),
+        (Measure("largest_stitch_stretch"), "is in no frame"),
+        (Measure("position", "ball"), "body 'ball' does not exist"),
+        (Measure("position", "cube", vertices=(1, 8)), "8 vertices; vertex 8 does not exist"),
     ],
 )
 def test_what_cannot_be_measured_is_one_line(recording, measure, words):
@@ -69,7 +67,24 @@ def test_what_cannot_be_measured_is_one_line(recording, measure, words):
 
 
 def test_measures_have_names_and_units(recording):
-    measures = Measures({"drop": BodyMeasure("displacement", "cube"), "energy": SeriesMeasure("kinetic_energy")})
+    measures = Measures({"drop": Measure("displacement", "cube"), "energy": Measure("kinetic_energy")})
     assert list(measures(recording)) == ["drop", "energy"]
     assert measures.units == {"drop": "m", "energy": "J"}
     assert all(np.isfinite(list(measures(recording).values())))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"quantity": "kinetic_energy", "axis": "x"}, "kinetic_energy has no axis; remove it"),
+        ({"quantity": "kinetic_energy", "body": "cube"}, "is of the whole scene; remove body"),
+        ({"quantity": "linear_momentum", "over": "max"}, "linear_momentum has no over; remove it"),
+        ({"quantity": "velocity"}, "velocity needs a body"),
+        ({"quantity": "speed"}, "quantity is 'speed'; give 'kinetic_energy'"),
+        ({"quantity": "velocity", "body": "cube", "vertices": [-1]}, "vertices is -1; give a whole number"),
+    ],
+)
+def test_measures_that_make_no_sense_are_refused_in_one_line(arguments, words):
+    with pytest.raises(sp.StudyError, match=words) as caught:
+        Measure(**arguments)
+    assert "\n" not in str(caught.value)

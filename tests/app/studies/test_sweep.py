@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.studies.measures import BodyMeasure, Measures
+from supple.app.studies.measures import Measure, Measures
 
 from .conftest import FALL_DT, FALL_STEPS, SCENE, fallen, make_fall
 
-DROP = Measures({"drop": BodyMeasure("displacement", "cube", axis="y")})
+DROP = Measures({"drop": Measure("displacement", "cube", axis="y")})
 SETTINGS = {"solver": sp.XPBD(substeps=1, contact=None), "dt": FALL_DT, "steps": FALL_STEPS}
 
 
@@ -99,7 +99,7 @@ def test_cases_that_have_ended_are_not_simulated_again(cluster, scene_file, tmp_
     np.testing.assert_allclose(table["drop"], [fallen(g) for g in (1.0, 2.0, 3.0)], rtol=1e-9)
     # Another measure is taken from the recordings.
     other = study(
-        [-1.0, -2.0, -3.0], Measures({"top": BodyMeasure("position", "cube", axis="y", over="max", time="first")})
+        [-1.0, -2.0, -3.0], Measures({"top": Measure("position", "cube", axis="y", over="max", time="first")})
     )
     assert result_times(tmp_path / "s") == second
     np.testing.assert_allclose(other["top"], 2.5)
@@ -188,8 +188,6 @@ def killing(marks: Path, victims: str):
         with mark.open("a") as file:
             file.write("x")
         if case == 3 and (victims == "always" or mark.stat().st_size == 1):
-            if victims == "supervisor too":
-                os.kill(os.getsid(0), signal.SIGKILL)
             os.kill(os.getpid(), signal.SIGKILL)
         cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
         return sp.Scene([cube], gravity=(0, -1.0 * case, 0))
@@ -198,12 +196,12 @@ def killing(marks: Path, victims: str):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="kills processes by signals")
-def test_a_worker_killed_with_its_supervisor_loses_no_case(tmp_path):
+def test_a_killed_process_loses_no_case(tmp_path):
     marks = tmp_path / "marks"
     marks.mkdir()
-    cases = [1, 2, 3, 4, 5, 6]
-    make = killing(marks, "supervisor too")
-    table = sp.sweep(make, {"case": cases}, measure=DROP, folder=tmp_path / "s", workers=2, **SETTINGS)
+    cases = [2, 3, 4]
+    make = killing(marks, "once")
+    table = sp.sweep(make, {"case": cases}, measure=DROP, folder=tmp_path / "s", workers=1, **SETTINGS)
     assert table.done.all(), table.reasons
     np.testing.assert_allclose(table["drop"], [fallen(g) for g in cases], rtol=1e-9)
     assert (marks / "case-3").stat().st_size >= 2
@@ -326,18 +324,18 @@ def test_two_studies_in_one_folder_are_refused(tmp_path):
 
 
 def test_a_case_that_another_worker_is_busy_with_is_lost_and_not_damaged(tmp_path):
-    from supple.app.studies.run_case import run_case
+    from supple.app.studies.run_case import Measuring, run_case
     from supple.app.studies.sources import FunctionJob
     from supple.runtime.lock import FolderLock
 
     job = FunctionJob(make_fall, {"gravity": 1.0}, SETTINGS["solver"], FALL_DT, FALL_STEPS)
     held = FolderLock(tmp_path)
-    result = run_case(job, tmp_path, DROP, "", 30.0)
+    result = run_case(job, tmp_path, Measuring(DROP, "", 30.0))
     assert (result.status, result.lost) == ("failed", True)
     assert "another run is writing to it" in result.reason
     assert [path.name for path in tmp_path.iterdir()] == [".supple.lock"]
     held.release()
-    assert run_case(job, tmp_path, DROP, "", 30.0).status == "done"
+    assert run_case(job, tmp_path, Measuring(DROP, "", 30.0)).status == "done"
     with pytest.raises(sp.StudyError, match="checkpoint_seconds is -1; give a number of zero or more"):
         sp.sweep(make_fall, {"gravity": [1.0]}, measure=DROP, folder=tmp_path, checkpoint_seconds=-1, **SETTINGS)
 
@@ -371,7 +369,7 @@ def test_a_case_that_always_kills_its_worker_fails_and_the_others_do_not(cluster
     ],
 )
 def test_a_study_that_cannot_be_carried_out_is_refused_in_one_line(scene_file, tmp_path, monkeypatch, arguments, words):
-    monkeypatch.setattr("supple.app.studies.workers._CONNECT_SECONDS", 1)
+    monkeypatch.setattr("supple.app.studies.executors._CONNECT_SECONDS", 1)
     given = {"factors": {"steps": [1]}, "measure": DROP, "folder": tmp_path / "s"} | arguments
     with pytest.raises(sp.SuppleError, match=words) as caught:
         sp.sweep(scene_file, **given)

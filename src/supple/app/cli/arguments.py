@@ -86,6 +86,7 @@ Pixels = Annotated[tuple[int, int] | None, Parameter(converter=pixels, n_tokens=
 Vector = Annotated[tuple[float, float, float] | None, Parameter(negative="")]
 Seconds = Annotated[float | None, Parameter(converter=seconds)]
 CheckpointEvery = Annotated[Checkpoints, Parameter(converter=checkpoints, n_tokens=1, accepts_keys=False)]
+Confine = Annotated[bool, Parameter(negative="")]
 Overwrite = Annotated[bool, Parameter(negative="")]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
+import warnings
 from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from enum import IntEnum
@@ -12,6 +13,8 @@ from typing import TextIO
 
 from rich.console import Console
 from rich.markup import escape
+
+from supple.errors import SuppleWarning
 
 
 class ExitCode(IntEnum):
@@ -97,6 +100,7 @@ def set_up_log(*, quiet: bool) -> None:
     """
     given = logging.getLevelNamesMapping().get(os.environ.get("SUPPLE_LOG", "").upper())
     logging.basicConfig(level=logging.WARNING if given is None else given, format="%(message)s", handlers=[_Handler()])
+    warnings.filterwarnings("ignore", category=SuppleWarning)  # the log has the same text
     for name in _ANNOUNCED:
         logging.getLogger(name).setLevel(logging.NOTSET if quiet or given is not None else logging.INFO)
 

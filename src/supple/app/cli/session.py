@@ -180,11 +180,7 @@ def _driven(frames: Generator[Frame], products: Products, strict: bool = False) 
         print_error(f"interrupted; {recording} is complete{last}; continue with: supple resume {products.folder}")
         return outcome
     if outcome.last is not None and not outcome.last.report.status.can_go_on:
-        report = outcome.last.report
         outcome.code = ExitCode.SOLVER
-        print_error(
-            f"stopped at frame {outcome.last.index} ({report.status}): {report.message}; {recording} is complete"
-        )
     elif strict and not outcome.all_converged:
         outcome.code = ExitCode.FAILED
     _warn_of_older_files(products)

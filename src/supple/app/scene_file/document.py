@@ -11,7 +11,7 @@ from supple.app.scene_file.entries import spelling as spelling  # registers how 
 from supple.app.scene_file.entries.bodies import BodyModel
 from supple.app.scene_file.entries.families import SOLVERS, model_of_kind
 from supple.app.scene_file.entries.kinds import KindModel, entry_of
-from supple.app.scene_file.model import Model, Vector, number_or_fraction
+from supple.app.scene_file.model import Model, Name, Number, Vector, number_or_fraction
 from supple.kinds.kind import Kind
 from supple.model.loads.build import LOADS
 from supple.results.readings.fields import FIELDS
@@ -91,6 +91,11 @@ class _SceneFileModel(Model):
     supple: Literal[1] = Field(default=1, description="version of this format")
     bodies: list[BodyModel] = Field(min_length=1, max_length=10_000)
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
+    joint_positions: dict[Name, Number] = Field(
+        default={},
+        max_length=10_000,
+        description="of hinges and sliders at the start, by name [rad] or [m]: bodies are placed so",
+    )
     solver: KindModel
     dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s], or a fraction such as 1/60")
     steps: int = Field(default=300, ge=0, le=MAX_STEPS, description="number of frames")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from supple.app.scene_file.document import KINDS_OF_LISTS, OutputModel, SceneFileModel
 from supple.app.scene_file.entries.bodies import BodyModel
 from supple.app.scene_file.entries.kinds import built
-from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES, MeshStore
+from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES, ConfinedMeshStore, MeshStore
 from supple.app.scene_file.new_scenes import read_surface_scene
 from supple.app.scene_file.urdf.document import read_urdf
 from supple.app.scene_file.validation_errors import scene_error
@@ -84,14 +84,14 @@ def _body(body: BodyModel, meshes: MeshStore, number: int) -> BodyModel:
 
 
 def _sets(body: BodyModel, meshes: MeshStore) -> MeshSets:
-    if body.mesh is None or body.mesh.is_surface():
+    if body.mesh is None or not meshes.holds_tets(body.mesh):
         raise SceneError(f"body {body.name!r} has no file of tets with named sets (.inp or .msh)")
     return meshes.tets(body.mesh).sets
 
 
 logger = logging.getLogger(__name__)
 
-_READERS = {".urdf": read_urdf, **dict.fromkeys(SURFACE_FILES, read_surface_scene)}
+URDF_FILES = (".urdf", ".xacro")
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ class Run:
         return {"initial_positions": self.initial_positions} if self.initial_positions else {}
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, *, confine: bool = False) -> Scene:
     """The scene of a scene file (YAML), or of a robot (URDF). Paths in it are relative to the file.
 
     The format of scene files: `supple schema`; what is read of a URDF: docs/learn/robots.md.
@@ -134,39 +134,63 @@ def load_scene(path: str | Path) -> Scene:
     Parameters
     ----------
     path : of the scene file.
+    confine : whether meshes are read from the folder of the file, and folders below, only; for files of strangers.
 
     Raises
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
-    run = load_run(path)
+    run = load_run(path, confine=confine)
     for name in run.initial_positions:
         logger.warning("%s: the deformed start of %r is not a part of the scene; load_run returns it", path, name)
     return run.scene
 
 
-def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) -> Run:
+def load_run(path: str | Path, *, confine: bool = False) -> Run:
     """The scene of a scene file, with its solver, timing and start.
 
     Parameters
     ----------
     path : of the scene file (YAML), of a robot (URDF), or of a surface, which becomes a body above a floor.
-    meshes : makes the store of meshes from the file's folder; `ConfinedMeshStore` reads only files in this folder.
+    confine : as of `load_scene`
 
     Raises
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
-    document = _READERS.get(Path(path).suffix.lower(), read_yaml)(path)
+    store, suffix = (ConfinedMeshStore if confine else MeshStore)(Path(path).parent), Path(path).suffix.lower()
+    if suffix in URDF_FILES:
+        document = read_urdf(path, store)
+        if pairs := overlaps(_run(path, document, store).scene):
+            document = document.with_pairs(pairs)
+    else:
+        document = (read_surface_scene if suffix in SURFACE_FILES else read_yaml)(path)
+    return _run(path, document, store)
+
+
+def _run(path: str | Path, document: YamlDocument, store: MeshStore) -> Run:
     model = validated(document)
     try:
         with spelled_for("yaml"):
-            run = _built(model, meshes(Path(path).parent))
+            run = _built(model, store)
         return replace(run, text=document.text, description=model, folder=Path(path).parent)
     except LocatedError as error:
         if Path(path).suffix.lower() in SURFACE_FILES:  # its lines are not those of the document
             raise SceneError(f"{path}: {error}") from None
         raise document.error(_keys_of_message(document.data, error.keys, str(error)), str(error)) from None
+
+
+def overlaps(scene: Scene) -> list[tuple[str, str]]:
+    """The pairs of bodies whose surfaces meet where the scene places them, or are inside each other."""
+    from supple.contact.start.intersections import intersections_of
+    from supple.contact.start.surfaces import start_surfaces
+    from supple.model.system import build_system, initial_state
+    from supple.scene.contact_pairs import pair_table
+
+    start = initial_state(scene)
+    surfaces = start_surfaces(build_system(scene, start), start.positions, start.time)
+    found = intersections_of(surfaces, pair_table(scene))
+    return list({(scene.bodies[one.first].name, scene.bodies[one.second].name): None for one in found})
 
 
 def validated(document: YamlDocument) -> SceneFileModel:
@@ -203,9 +227,20 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
         solver = built(model.solver, meshes)
     with at():
         scene = Scene(list(bodies.values()), gravity=model.gravity, **parts)
+    if model.joint_positions:
+        with at("joint_positions"):
+            there, scene = scene, scene.with_joint_positions(model.joint_positions)
+            for name in starts:
+                if _is_moved(there.body(name), scene.body(name)):
+                    raise SceneError(f"they move body {name!r}, which has a deformed start; remove one of the two")
+    with at():
         # The pairs are found here, where an error's place in the file is known; the scene caches them.
         logger.debug("%d stitched pairs", len(scene.stitching))
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
+
+
+def _is_moved(before: PlacedBody, after: PlacedBody) -> bool:
+    return any(not np.array_equal(getattr(before, key), getattr(after, key)) for key in ("position", "rotation"))
 
 
 def _keys_of_message(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Key, ...]:

@@ -44,7 +44,7 @@ class CaseResult:
     reason : one line, why it failed
     measured_by : the identity of what measured; other measures are taken from the recording
     simulated : whether the recording is complete, so that other measures can be taken from it
-    lost : whether it failed because workers were lost, which is worth another try
+    lost : whether it failed because its worker was lost, which is worth another try
     bytes_needed : estimate [bytes]; 0 where the case was not built
     """
 
@@ -66,6 +66,7 @@ def case_key(identity: str) -> str:
 
 def write_result(folder: Path, result: CaseResult) -> None:
     """Keep a result in the case's folder."""
+    folder.mkdir(parents=True, exist_ok=True)
     with whole_file(folder / RESULT) as fresh:
         fresh.write_text(json.dumps(asdict(result), indent=1) + "\n", encoding="utf-8")
 

@@ -3,185 +3,163 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import StudyError
+from supple.errors import SceneError, StudyError
+from supple.kinds.forms import Form, Limits, Name, Whole
+from supple.kinds.kind import Kind
 
 MOST_LEVELS = 100_000
 
 
-class Factor(ABC):
-    """The values of one quantity that a study varies."""
+@dataclass(frozen=True)
+class Values(Form):
+    """A list of values of the form `item`, or of any that JSON has."""
 
-    @abstractmethod
+    item: Form | None = None
+
+    def checked(self, value: Any, what: str) -> tuple[Any, ...]:
+        if isinstance(value, str) or not isinstance(value, Sequence | np.ndarray):
+            raise SceneError(f"{what} is {value!r}; give a list")
+        if not 0 < len(value) <= MOST_LEVELS:
+            raise SceneError(f"{what}: the list has {len(value)} values; give from 1 to {MOST_LEVELS}")
+        return tuple(plain(one, what) if self.item is None else self.item.checked(one, what) for one in value)
+
+
+_RANGE = Limits("give the lower one first")
+
+
+@dataclass(frozen=True)
+class Factor(Kind):
+    """The values of one quantity: a list, or a range.
+
+    Parameters
+    ----------
+    values : numbers, texts, lists or mappings, each equally likely
+    uniform : a range of numbers, in the unit of the factor, equally likely everywhere
+    loguniform : a range of numbers above zero, in its unit, whose logarithms are equally likely everywhere
+    count : levels of a range in a grid, with both ends
+    paths : what the factor sets in the scene file; without them, its name is the path
+
+    Raises
+    ------
+    StudyError : where not exactly one of values and ranges is given, or a value is not allowed.
+    """
+
+    kind: ClassVar[str] = "factor"
+    error: ClassVar[type[StudyError]] = StudyError
+    exactly_one: ClassVar[tuple[str, ...]] = ("values", "uniform", "loguniform")
+
+    values: Annotated[tuple[Any, ...] | None, Values()] = None
+    uniform: Annotated[tuple[float, float] | None, _RANGE] = None
+    loguniform: Annotated[tuple[float, float] | None, _RANGE] = None
+    count: Annotated[int | None, Whole(1, MOST_LEVELS)] = None
+    paths: Annotated[tuple[str, ...] | None, Values(Name())] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for key in ("uniform", "loguniform"):
+            ends = getattr(self, key)
+            if ends is not None and not (np.isfinite(ends).all() and (key == "uniform" or ends[0] > 0.0)):
+                bound = "finite" if key == "uniform" else "finite and above zero"
+                raise StudyError(f"factor: {key} is {list(ends)}; both ends must be {bound}")
+
     def levels(self, name: str) -> list[Any]:
         """The values that a grid uses.
 
         Raises
         ------
-        StudyError : where the factor has none; the text begins with `name`.
+        StudyError : where a range has no `count`.
         """
-
-    @abstractmethod
-    def quantiles(self, u: NDArray[np.float64]) -> list[Any]:
-        """The values at the shares u (n,) of the distribution, 0 <= u < 1."""
-
-    @abstractmethod
-    def extremes(self) -> tuple[Any, Any, Any]:
-        """The low, the middle and the high value."""
-
-
-@dataclass(frozen=True)
-class Levels(Factor):
-    """A list of values, each equally likely."""
-
-    values: tuple[Any, ...]
-
-    def __post_init__(self) -> None:
-        if not self.values:
-            raise StudyError("a list of values is empty; give at least one value")
-        if len(self.values) > MOST_LEVELS:
-            raise StudyError(f"a list has {len(self.values)} values; at most {MOST_LEVELS} are allowed")
-        object.__setattr__(self, "values", tuple(plain(value) for value in self.values))
-
-    def levels(self, name: str) -> list[Any]:
-        return list(self.values)
-
-    def quantiles(self, u: NDArray[np.float64]) -> list[Any]:
-        last = len(self.values) - 1
-        return [self.values[min(int(share * len(self.values)), last)] for share in u]
-
-    def extremes(self) -> tuple[Any, Any, Any]:
-        return self.values[0], self.values[len(self.values) // 2], self.values[-1]
-
-
-@dataclass(frozen=True)
-class _Range(Factor):
-    low: float
-    high: float
-    count: int | None = None
-
-    def __post_init__(self) -> None:
-        ends, name = (self.low, self.high), type(self).__name__.lower()
-        if any(isinstance(end, bool) or not isinstance(end, int | float | np.number) for end in ends):
-            raise StudyError(f"{name}({self.low!r}, {self.high!r}): give two numbers")
-        if not all(math.isfinite(end) for end in ends) or not self.low < self.high:
-            raise StudyError(f"{self._text}: give two finite numbers, the lower one first")
-        n = self.count
-        if n is not None and (isinstance(n, bool) or not isinstance(n, int) or not 0 < n <= MOST_LEVELS):
-            raise StudyError(f"{self._text}: count is {n!r}; give a whole number from 1 to {MOST_LEVELS}")
-        object.__setattr__(self, "low", float(self.low))
-        object.__setattr__(self, "high", float(self.high))
-
-    @property
-    def _text(self) -> str:
-        return f"{type(self).__name__.lower()}({self.low:g}, {self.high:g})"
-
-    def levels(self, name: str) -> list[float]:
+        if self.values is not None:
+            return list(self.values)
         if self.count is None:
-            call = f"{self._text[:-1]}, count)"
-            raise StudyError(f"factor {name!r}: a grid needs the number of levels; give {call}")
+            raise StudyError(f"factor {name!r}: a grid needs the number of levels of a range; give its count")
         return self.quantiles(np.linspace(0.0, 1.0, self.count))
 
-
-class Uniform(_Range):
-    """See `uniform`."""
-
-    def quantiles(self, u: NDArray[np.float64]) -> list[float]:
-        # Not low + u (high - low), which can miss `high` by round-off at u = 1.
-        return [float((1.0 - share) * self.low + share * self.high) for share in u]
-
-    def extremes(self) -> tuple[float, float, float]:
-        return self.low, 0.5 * (self.low + self.high), self.high
-
-
-class LogUniform(_Range):
-    """See `loguniform`."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.low <= 0.0:
-            raise StudyError(f"{self._text}: the low end must be above zero")
-
-    def quantiles(self, u: NDArray[np.float64]) -> list[float]:
-        ratio = math.log(self.high / self.low)
-        return [self.high if share == 1.0 else min(self.low * math.exp(share * ratio), self.high) for share in u]
-
-    def extremes(self) -> tuple[float, float, float]:
-        return self.low, math.sqrt(self.low) * math.sqrt(self.high), self.high
+    def quantiles(self, u: NDArray[np.float64]) -> list[Any]:
+        """The values at the shares u (n,) of the distribution, 0 <= u <= 1."""
+        if self.values is not None:
+            last = len(self.values) - 1
+            return [self.values[min(int(share * len(self.values)), last)] for share in u]
+        if self.uniform is not None:
+            low, high = self.uniform
+            # Not low + u (high - low), which can miss `high` by round-off at u = 1.
+            return [float((1.0 - share) * low + share * high) for share in u]
+        assert self.loguniform is not None
+        low, high = self.loguniform
+        ratio = math.log(high / low)
+        return [high if share == 1.0 else min(low * math.exp(share * ratio), high) for share in u]
 
 
-def uniform(low: float, high: float, count: int | None = None) -> Uniform:
+def uniform(low: float, high: float, count: int | None = None) -> Factor:
     """Numbers from `low` to `high`, equally likely everywhere.
 
     Parameters
     ----------
     low, high : ends of the range, in the unit of the factor.
-    count : number of levels in a grid, evenly spaced, with both ends. Random designs do not need it.
+    count : number of levels in a grid, evenly spaced, with both ends. A Latin hypercube does not need it.
 
     Raises
     ------
     StudyError : where the range is empty or not finite, or `count` is not a whole number above zero.
     """
-    return Uniform(low, high, count)
+    return Factor(uniform=(low, high), count=count)
 
 
-def loguniform(low: float, high: float, count: int | None = None) -> LogUniform:
+def loguniform(low: float, high: float, count: int | None = None) -> Factor:
     """Numbers from `low` to `high`, whose logarithms are equally likely everywhere.
 
     Parameters
     ----------
     low, high : ends of the range, in the unit of the factor; above zero.
-    count : number of levels in a grid, in constant ratios, with both ends. Random designs do not need it.
+    count : number of levels in a grid, in constant ratios, with both ends. A Latin hypercube does not need it.
 
     Raises
     ------
     StudyError : as for `uniform`, and where `low` is not above zero.
     """
-    return LogUniform(low, high, count)
+    return Factor(loguniform=(low, high), count=count)
 
 
 def as_factor(name: str, given: Any) -> Factor:
-    """A factor as it is, or a list of values as `Levels`.
+    """A factor as it is, or a list of values as one.
 
     Raises
     ------
-    StudyError : where it is neither, or a value is neither number, text nor a list of these.
+    StudyError : where it is neither, or a value is not one of JSON's.
     """
     if isinstance(given, Factor):
         return given
     if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
-        raise StudyError(
-            f"factor {name!r} is {given!r}; give a list of values, sp.studies.uniform(...) or "
-            "sp.studies.loguniform(...)"
-        )
+        hint = "give a list of values, sp.studies.uniform(...) or sp.studies.loguniform(...)"
+        raise StudyError(f"factor {name!r} is {given!r}; {hint}")
     try:
-        return Levels(tuple(given))
+        return Factor(values=tuple(given))
     except StudyError as error:
-        raise StudyError(f"factor {name!r}: {error}") from None
+        raise StudyError(f"factor {name!r}: {str(error).removeprefix('factor: ')}") from None
 
 
-def plain(value: Any) -> Any:
+def plain(value: Any, what: str) -> Any:
     """A value as JSON has it: None, true, false, a finite number, a text, or lists and mappings of these.
 
     Raises
     ------
-    StudyError : where it is none of these.
+    SceneError : where it is none of these; the text begins with `what`.
     """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float) and not math.isfinite(value):
-        raise StudyError(f"the value {value!r} is not finite")
+        raise SceneError(f"{what}: the value {value!r} is not finite")
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [plain(item, what) for item in value]
     if isinstance(value, dict) and all(isinstance(key, str) for key in value):
-        return {key: plain(item) for key, item in value.items()}
-    raise StudyError(f"the value {value!r} is a {type(value).__name__}; give numbers, texts, or lists of these")
+        return {key: plain(item, what) for key, item in value.items()}
+    raise SceneError(f"{what}: the value {value!r} is a {type(value).__name__}; give numbers, texts, or lists of these")

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.app.studies.factors import Values
 from supple.errors import StudyError
+from supple.kinds.forms import Choice, Name, Whole
+from supple.kinds.kind import Kind
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
 
+Array = NDArray[np.float64]
 AXES = ("x", "y", "z")
-
-SERIES = {
+NUMBERS = {
     "kinetic_energy": "J",
     "elastic_energy": "J",
     "potential_energy": "J",
@@ -23,135 +26,105 @@ SERIES = {
     "min_det_F": "",
     "min_distance": "m",
     "largest_stitch_stretch": "",
-    "linear_momentum": "kg m/s",
-    "angular_momentum": "kg m^2/s",
     "wall_seconds": "s",
 }
+VECTORS = {"linear_momentum": "kg m/s", "angular_momentum": "kg m^2/s"}
 """Quantities of the whole scene, which every frame reports, and their units."""
-
-_VECTORS = ("linear_momentum", "angular_momentum")
-
-
-def _displacements(frame: RecordedFrame, body: str) -> NDArray[np.float64]:
-    return frame.positions[body] - RecordedFrame(frame.recording, 0).positions[body]
-
-
-BODY_QUANTITIES: dict[str, tuple[str, Callable[[RecordedFrame, str], NDArray[np.float64]]]] = {
+OF_BODY: dict[str, tuple[str, Callable[[RecordedFrame, str], Array]]] = {
     "position": ("m", lambda frame, body: frame.positions[body]),
-    "displacement": ("m", _displacements),
+    "displacement": (
+        "m",
+        lambda frame, body: frame.positions[body] - RecordedFrame(frame.recording, 0).positions[body],
+    ),
     "velocity": ("m/s", lambda frame, body: frame.velocities[body]),
 }
 """Vectors of the vertices of one body, and their units; displacements are from the first frame."""
-
-OVER: dict[str, Callable[[NDArray[np.float64]], Any]] = {
-    "min": np.min,
-    "mean": np.mean,
-    "max": np.max,
-    "range": np.ptp,
-}
+OVER: dict[str, Callable[[Array], Any]] = {"min": np.min, "mean": np.mean, "max": np.max, "range": np.ptp}
 """From the numbers of vertices, or of frames, to one."""
-
-IN_TIME: dict[str, Callable[[NDArray[np.float64]], Any]] = {
-    **OVER,
-    "first": lambda numbers: numbers[0],
-    "last": lambda numbers: numbers[-1],
-    "sum": np.sum,
-}
+IN_TIME = OVER | {"first": lambda numbers: numbers[0], "last": lambda numbers: numbers[-1], "sum": np.sum}
 
 
 @dataclass(frozen=True)
-class SeriesMeasure:
-    """A number of the whole scene in time.
+class Measure(Kind):
+    """A number taken from a recording.
 
-    Attributes
+    Parameters
     ----------
-    quantity : one of `SERIES`
-    axis : of a vector: "x", "y", "z" or "length"; None for numbers
-    time : one of `IN_TIME`
+    quantity : what is measured
+    body : whose position, displacement or velocity
+    axis : of a vector; default: its length
+    vertices : numbers of vertices of the body's mesh; default: all
+    over : how the vertices' numbers become one; default: mean
+    time : how the frames' numbers become one
     """
 
-    quantity: str
-    axis: str | None = None
-    time: str = "last"
+    kind: ClassVar[str] = "measure"
+    error: ClassVar[type[StudyError]] = StudyError
+
+    quantity: Annotated[str, Choice((*NUMBERS, *VECTORS, *OF_BODY))]
+    body: Annotated[str | None, Name()] = None
+    axis: Annotated[str | None, Choice((*AXES, "length"))] = None
+    vertices: Annotated[tuple[int, ...] | None, Values(Whole())] = None
+    over: Annotated[str | None, Choice(tuple(OVER))] = None
+    time: Annotated[str, Choice(tuple(IN_TIME))] = "last"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.quantity in OF_BODY) != (self.body is not None):
+            need = "needs a body" if self.body is None else "is of the whole scene; remove body"
+            raise StudyError(f"{self.quantity} {need}")
+        unused = {"axis": self.quantity in NUMBERS, "vertices": self.body is None, "over": self.body is None}
+        for key, without in unused.items():
+            if without and getattr(self, key) is not None:
+                raise StudyError(f"{self.quantity} has no {key}; remove it")
 
     @property
     def unit(self) -> str:
-        return SERIES[self.quantity]
+        return OF_BODY[self.quantity][0] if self.body else (NUMBERS | VECTORS)[self.quantity]
 
     def of(self, recording: Recording) -> float:
         """The number.
 
         Raises
         ------
-        StudyError : where the scene has no such quantity, or an axis is missing.
+        OutputError, StudyError : where the recording has no such body, vertex or quantity.
         """
-        values = recording.series(self.quantity)
-        if (self.quantity in _VECTORS) != (self.axis is not None):
-            raise StudyError(f"{self.quantity}: " + ("give an axis" if self.axis is None else "has no axis; remove it"))
-        numbers = values if self.axis is None else _component(values, self.axis)
+        numbers = recording.series(self.quantity) if self.body is None else self._of_body(recording, self.body)
+        if self.quantity in VECTORS:
+            numbers = self._component(numbers)
         numbers = numbers[np.isfinite(numbers)]  # the distance is not known before the first step
         if not len(numbers):
             raise StudyError(f"{self.quantity} is in no frame of this scene")
         return float(IN_TIME[self.time](numbers))
 
-
-@dataclass(frozen=True)
-class BodyMeasure:
-    """A number of one body in time.
-
-    Attributes
-    ----------
-    quantity : one of `BODY_QUANTITIES`; body : its name
-    axis : "x", "y", "z" or "length"
-    vertices : numbers of vertices of the body's mesh; None for all
-    over : how the vertices' numbers become one, of `OVER`; time : how the frames' do, of `IN_TIME`
-    """
-
-    quantity: str
-    body: str
-    axis: str = "length"
-    vertices: tuple[int, ...] | None = None
-    over: str = "mean"
-    time: str = "last"
-
-    @property
-    def unit(self) -> str:
-        return BODY_QUANTITIES[self.quantity][0]
-
-    def of(self, recording: Recording) -> float:
-        """The number.
-
-        Raises
-        ------
-        OutputError, StudyError : where no such body exists, or no such vertex.
-        """
-        body = recording.body(self.body)
-        count = body.point_count
-        rows: Any = slice(None) if self.vertices is None else list(self.vertices)
+    def _of_body(self, recording: Recording, name: str) -> Array:
+        count = recording.body(name).point_count
         if self.vertices is not None and max(self.vertices) >= count:
-            raise StudyError(f"{self.body!r} has {count} vertices; vertex {max(self.vertices)} does not exist")
-        vectors = BODY_QUANTITIES[self.quantity][1]
+            raise StudyError(f"{name!r} has {count} vertices; vertex {max(self.vertices)} does not exist")
+        rows: Any = slice(None) if self.vertices is None else list(self.vertices)
+        vectors = OF_BODY[self.quantity][1]
         ends = {"first": [recording[0]], "last": [recording[-1]]}  # the other frames need not be read
-        numbers = [
-            OVER[self.over](_component(vectors(frame, self.body)[rows], self.axis))
-            for frame in ends.get(self.time, recording)
-        ]
-        return float(IN_TIME[self.time](np.array(numbers)))
+        of_frames = [vectors(frame, name)[rows] for frame in ends.get(self.time, recording)]
+        return np.array([OVER[self.over or "mean"](self._component(of_frame)) for of_frame in of_frames])
+
+    def _component(self, vectors: Array) -> Array:
+        if self.axis in AXES:
+            return vectors[..., AXES.index(self.axis)]
+        return np.linalg.norm(vectors, axis=-1)
 
 
 @dataclass(frozen=True)
 class Measures:
     """Named measures, as one function of a recording."""
 
-    named: Mapping[str, SeriesMeasure | BodyMeasure]
+    named: Mapping[str, Measure]
 
     def __call__(self, recording: Recording) -> dict[str, float]:
         return {name: measure.of(recording) for name, measure in self.named.items()}
 
+    def __repr__(self) -> str:
+        return repr({name: asdict(measure) for name, measure in self.named.items()})
+
     @property
     def units(self) -> dict[str, str]:
         return {name: measure.unit for name, measure in self.named.items()}
-
-
-def _component(vectors: NDArray[np.float64], axis: str) -> NDArray[np.float64]:
-    return np.linalg.norm(vectors, axis=-1) if axis == "length" else vectors[..., AXES.index(axis)]

@@ -9,7 +9,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +33,28 @@ _LONGEST_REASON = 500
 _PROGRAM = 300_000_000
 
 
-def run_case(job: Job, folder: Path, measure: Measure, measured_by: str, checkpoint_seconds: float) -> CaseResult:
+@dataclass(frozen=True)
+class Measuring:
+    """What a worker does with each case.
+
+    Attributes
+    ----------
+    measure : takes the recording; identity : of the measure
+    checkpoint_seconds : time from checkpoint to checkpoint [s]
+    memory : what a case may use [bytes]; None where it is unknown
+    """
+
+    measure: Measure
+    identity: str
+    checkpoint_seconds: float
+    memory: int | None = None
+
+
+def run_case(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
     """Simulate, record and measure a case, and keep the result in its folder. Nothing is raised: a failure is a result.
 
     A case that is finished is not simulated again; where other measures were taken, its recording is measured. One that
-    another worker is still busy with counts as lost: the scheduler has given it up, and it may be there later.
+    another worker is still busy with counts as lost: the scheduler of a cluster has given it up.
     """
     with _ONE_CASE, numba_threads(_threads()):
         try:
@@ -46,20 +63,20 @@ def run_case(job: Job, folder: Path, measure: Measure, measured_by: str, checkpo
         except (SuppleError, OSError) as error:
             return CaseResult("failed", reason=_reason(error), lost=True)
         try:
-            return _kept(job, folder, measure, measured_by, checkpoint_seconds)
+            return _kept(job, folder, measuring)
         finally:
             lock.release()
 
 
-def _kept(job: Job, folder: Path, measure: Measure, measured_by: str, checkpoint_seconds: float) -> CaseResult:
+def _kept(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
     """The result of a case in a folder that no other worker uses; it is kept there."""
     began = time.perf_counter()
     result = CaseResult("failed")
     try:
-        result = _earlier(folder) or _simulated(job, folder, checkpoint_seconds)
+        result = _earlier(folder) or _simulated(job, folder, measuring)
         if result.simulated:
             result = replace(result, status="failed", reason="", measures={})
-            result = replace(result, status="done", measures=_measured(folder / RECORDING, measure))
+            result = replace(result, status="done", measures=_measured(folder / RECORDING, measuring.measure))
     # Of any kind: the function that makes the scene, and the measure, are the user's.
     except (Exception, SystemExit) as error:
         with contextlib.suppress(OSError):
@@ -67,7 +84,7 @@ def _kept(job: Job, folder: Path, measure: Measure, measured_by: str, checkpoint
         result = replace(result, reason=_reason(error))
     if result.status == "deferred":
         return result
-    result = replace(result, measured_by=measured_by, wall_seconds=result.wall_seconds or _since(began))
+    result = replace(result, measured_by=measuring.identity, wall_seconds=result.wall_seconds or _since(began))
     try:
         write_result(folder, result)
     except (SuppleError, OSError) as error:
@@ -81,12 +98,12 @@ def _earlier(folder: Path) -> CaseResult | None:
     return result if result is not None and result.simulated and (folder / RECORDING).exists() else None
 
 
-def _simulated(job: Job, folder: Path, checkpoint_seconds: float) -> CaseResult:
+def _simulated(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
     run = job.load(folder)
-    needed, allowed = _PROGRAM + run.solver.bytes_needed(run.scene), _memory_limit()
-    if allowed is not None and needed > allowed:
+    needed = _PROGRAM + run.solver.bytes_needed(run.scene)
+    if measuring.memory is not None and needed > measuring.memory:
         return CaseResult("deferred", bytes_needed=needed)
-    frames, problem = simulate_recorded(run, folder / RECORDING, folder / CHECKPOINT, checkpoint_seconds)
+    frames, problem = simulate_recorded(run, folder / RECORDING, folder / CHECKPOINT, measuring.checkpoint_seconds)
     status = "failed" if problem else "done"
     reason = problem[:_LONGEST_REASON]
     return CaseResult(status, reason=reason, frames=frames, simulated=not problem, bytes_needed=needed)
@@ -113,17 +130,6 @@ def _threads() -> int:
     """Of Numba: as many as the environment gives this worker, otherwise one, because workers share the cores."""
     most: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
     return most if "NUMBA_NUM_THREADS" in os.environ else 1
-
-
-def _memory_limit() -> int | None:
-    """Of this worker [bytes]; None where it has none."""
-    from distributed import get_worker
-
-    try:
-        limit = get_worker().memory_manager.memory_limit
-    except (ValueError, AttributeError):  # not in a worker, or one without limits
-        return None
-    return int(limit) if limit else None
 
 
 def _reason(error: BaseException) -> str:

@@ -29,7 +29,7 @@ def _by_name(module: ModuleType) -> tuple[Callable[[str], ModuleType], tuple[str
 
 
 # A function that says `sp.Scene` refers to the module `supple`, which is of a class of lazy_loader's. It is sent to
-# workers by its name, as all other modules are. The scheduler, which sends jobs on, imports this file too.
+# workers by its name, as all other modules are.
 copyreg.pickle(type(sys.modules["supple"]), _by_name)  # pyright: ignore[reportArgumentType]
 
 SCENE_FILE = "scene.yaml"

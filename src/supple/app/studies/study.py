@@ -5,27 +5,45 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
+import logging
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 from supple.app.studies.cases import Case, CaseResult, case_key, read_result, write_result
 from supple.app.studies.designs import Design
+from supple.app.studies.executors import Task, run_here, run_on_cluster
 from supple.app.studies.factors import Factor
 from supple.app.studies.measures import Measures
-from supple.app.studies.run_case import Measure
-from supple.app.studies.runner import Measuring, StudyProgress, Tally, Task, run_tasks
+from supple.app.studies.run_case import Measure, Measuring
 from supple.app.studies.sources import Source
 from supple.app.studies.table import StudyTable
-from supple.app.studies.workers import Opener, cluster_workers, local_workers
 from supple.errors import StudyError, SuppleError
 from supple.runtime.lock import FolderLock
 from supple.runtime.replacing import output_error, whole_file
 
-TABLE, DESCRIPTION, LOGS = "table.csv", "study.json", "workers"
+logger = logging.getLogger(__name__)
+
+TABLE, DESCRIPTION = "table.csv", "study.json"
 # A checkpoint takes some hundredths of a second, most of which is the wait for the disk.
 CHECKPOINT_SECONDS = 30.0
+
+
+@dataclass(frozen=True)
+class StudyProgress:
+    """How far a study is.
+
+    Attributes
+    ----------
+    cases : all; done, failed : of them, with those of earlier runs
+    seconds_left : estimate [s]; None before the first case has ended
+    """
+
+    cases: int
+    done: int
+    failed: int
+    seconds_left: float | None
 
 
 def ignore_progress(progress: StudyProgress) -> None:
@@ -39,7 +57,7 @@ class Study:
     Attributes
     ----------
     source : what varies
-    factors : by name; paths : what each of them sets in the source
+    factors : by name
     design : which combinations are simulated
     measure : takes a recording, and returns a number, or numbers by name
     units : of factors and measures, by name
@@ -47,7 +65,6 @@ class Study:
 
     source: Source
     factors: Mapping[str, Factor]
-    paths: Mapping[str, tuple[str, ...]]
     design: Design
     measure: Measure
     units: Mapping[str, str]
@@ -71,53 +88,67 @@ class Study:
         """Simulate the cases that have not ended yet; the table of all. See `supple.sweep`."""
         if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
             raise StudyError(f"workers is {workers!r}; give a whole number above zero")
-        folder = Path(folder).absolute()
         if not isinstance(checkpoint_seconds, int | float) or not checkpoint_seconds >= 0.0:
             raise StudyError(f"checkpoint_seconds is {checkpoint_seconds!r}; give a number of zero or more [s]")
-        plan = self._plan(folder, retry_failed)
-        opener = local_workers(workers, folder / LOGS) if scheduler is None else cluster_workers(scheduler)
+        folder = Path(folder).absolute()
+        measuring = Measuring(self.measure, measure_identity(self.measure), float(checkpoint_seconds))
+        plan = self._plan(folder, measuring.identity, retry_failed)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise output_error(folder, error) from None
         lock = FolderLock(folder)
         try:
-            measuring = Measuring(self.measure, plan.measured_by, float(checkpoint_seconds))
-            return self._carried_out(plan, folder, opener, measuring, progress)
-        finally:
+            self._describe(folder)
+            for case, result in plan.refused:
+                write_result(case.folder(folder), result)
+            self._simulate(plan, workers, scheduler, measuring, progress)
+        finally:  # also after Ctrl-C: the cases that have ended are in the table
+            units = {name: self.source.unit(self._paths(name)[0]) for name in self.factors} | dict(self.units)
+            table = StudyTable.of(folder, tuple(self.factors), units, plan.cases, plan.results)
+            table.write_csv(folder / TABLE)
             lock.release()
+        return table
 
-    def _carried_out(
-        self,
+    @staticmethod
+    def _simulate(
         plan: _Plan,
-        folder: Path,
-        opener: Opener,
+        workers: int | None,
+        scheduler: str | None,
         measuring: Measuring,
         progress: Callable[[StudyProgress], None],
-    ) -> StudyTable:
-        """The table, after all cases have ended, in a folder that no other study uses."""
-        self._describe(folder)
-        for case, result in plan.refused:
-            case.folder(folder).mkdir(parents=True, exist_ok=True)
-            write_result(case.folder(folder), result)
-            plan.results[case.key] = result
-        units = {name: self.source.unit(paths[0]) for name, paths in self.paths.items()} | dict(self.units)
+    ) -> None:
+        began, before = time.monotonic(), len(plan.results)
 
-        def table() -> StudyTable:
-            return StudyTable.of(folder, tuple(self.factors), units, plan.cases, plan.results)
+        def report() -> None:
+            failed, ended = sum(one.status == "failed" for one in plan.results.values()), len(plan.results)
+            recent = ended - before
+            left = (len(plan.cases) - ended) * (time.monotonic() - began) / recent if recent else None
+            progress(StudyProgress(len(plan.cases), ended - failed, failed, left))
 
-        try:
-            tally = Tally(len(plan.cases), progress, plan.results)
-            run_tasks(plan.tasks, opener, measuring, tally)
-        finally:  # also after Ctrl-C: the cases that have ended are in the table
-            table().write_csv(folder / TABLE)
-        return table()
+        def keep(task: Task, result: CaseResult) -> None:
+            if result.reason:  # also of cases that did not end in a worker
+                try:
+                    write_result(task.folder, result)
+                except (OSError, SuppleError) as error:
+                    logger.warning("%s", error)
+            plan.results[task.case.key] = result
+            report()
 
-    def _plan(self, folder: Path, retry_failed: bool) -> _Plan:
-        plan = _Plan(measure_identity(self.measure))
-        known: set[str] = set()
+        if plan.tasks:
+            report()
+            if scheduler is None:
+                run_here(plan.tasks, workers, measuring, keep)
+            else:
+                run_on_cluster(plan.tasks, scheduler, measuring, keep)
+
+    def _paths(self, name: str) -> tuple[str, ...]:
+        return self.factors[name].paths or (name,)
+
+    def _plan(self, folder: Path, measured_by: str, retry_failed: bool) -> _Plan:
+        plan, known = _Plan(), set()
         for point in self.design.points(self.factors):
-            values = {path: value for name, value in point.items() for path in self.paths[name]}
+            values = {path: value for name, value in point.items() for path in self._paths(name)}
             job = self.source.job(values)
             case = Case(case_key(self.source.identity(values)), point)
             if case.key in known:
@@ -127,10 +158,11 @@ class Study:
             try:
                 self.source.check(values)
             except SuppleError as error:
-                plan.refused.append((case, CaseResult("failed", reason=str(error), measured_by=plan.measured_by)))
+                plan.results[case.key] = CaseResult("failed", reason=str(error), measured_by=measured_by)
+                plan.refused.append((case, plan.results[case.key]))
                 continue
             result = read_result(case.folder(folder))
-            if result is not None and _is_final(result, plan.measured_by, retry_failed):
+            if result is not None and _is_final(result, measured_by, retry_failed):
                 plan.results[case.key] = result
             else:
                 plan.tasks.append(Task(case, job, case.folder(folder)))
@@ -140,20 +172,17 @@ class Study:
 
     def _describe(self, folder: Path) -> None:
         """Keep beside the results what the study was."""
-        described = {
-            "design": _fields(self.design),
-            "factors": {name: {"sets": self.paths[name], **_fields(one)} for name, one in self.factors.items()},
-            "units": dict(self.units),
-        }
+        design = {"kind": self.design.kind, **asdict(self.design)}
+        factors = {name: asdict(factor) for name, factor in self.factors.items()}
         with whole_file(folder / DESCRIPTION) as fresh:
-            fresh.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
+            text = json.dumps({"design": design, "factors": factors, "units": dict(self.units)}, indent=1)
+            fresh.write_text(text + "\n", encoding="utf-8")
 
 
 @dataclass
 class _Plan:
-    """What is to be done: cases whose values are not allowed, those that have ended, and those to simulate."""
+    """What is to be done: the cases, those with values that are not allowed, the results so far, what to simulate."""
 
-    measured_by: str
     cases: list[Case] = field(default_factory=list)
     refused: list[tuple[Case, CaseResult]] = field(default_factory=list)
     results: dict[str, CaseResult] = field(default_factory=dict)
@@ -169,14 +198,10 @@ def _is_final(result: CaseResult, measured_by: str, retry_failed: bool) -> bool:
 def measure_identity(measure: Measure) -> str:
     """A hash of what a measure is: of its description, or of the text of its function."""
     if isinstance(measure, Measures):
-        text = json.dumps([[name, type(one).__name__, asdict(one)] for name, one in measure.named.items()])
+        text = repr(measure)
     else:
         try:
             text = inspect.getsource(measure)
         except (OSError, TypeError):
             text = getattr(measure, "__qualname__", type(measure).__qualname__)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _fields(described: Any) -> dict[str, Any]:
-    return {"kind": type(described).__name__, **asdict(described)}

@@ -2,156 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
-from supple.app.scene_file.model import FilePath, Model, Name, Number
+from supple.app.scene_file.entries.kinds import built, entry_of, model_of, spelled
+from supple.app.scene_file.entries.mesh_sources import MeshStore
+from supple.app.scene_file.model import FilePath, Model, Name
 from supple.app.scene_file.validation_errors import scene_error
-from supple.app.scene_file.yaml_files import YamlDocument, read_yaml
-from supple.app.studies import designs
-from supple.app.studies.factors import MOST_LEVELS, Factor, Levels, LogUniform, Uniform
-from supple.app.studies.measures import BodyMeasure, Measures, SeriesMeasure
+from supple.app.scene_file.yaml_files import read_yaml
+from supple.app.studies.designs import DESIGNS, Grid
+from supple.app.studies.factors import MOST_LEVELS, Factor, Values
+from supple.app.studies.measures import Measure, Measures
 from supple.app.studies.sources import FileSource
 from supple.app.studies.study import Study
 from supple.errors import StudyError
-
-Samples = Annotated[int, Field(ge=1, le=designs.MOST_CASES, description="number of cases")]
-Seed = Annotated[int, Field(ge=0, lt=2**63, description="of the random numbers")]
-Time = Annotated[Literal["first", "last", "min", "mean", "max", "range", "sum"], Field(description="over the frames")]
-Over = Annotated[Literal["min", "mean", "max", "range"], Field(description="over the vertices")]
-Axis = Literal["x", "y", "z", "length"]
+from supple.scene.located import LocatedError
 
 
-class FactorModel(Model):
-    """The values of one quantity: a list, or a range."""
-
-    paths: list[Name] | None = Field(
-        default=None, min_length=1, max_length=1000, description="what it sets; default: the factor's name is the path"
-    )
-    values: list[Any] | None = Field(default=None, min_length=1, max_length=MOST_LEVELS)
-    uniform: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="instead of `values`: a range of numbers"
-    )
-    loguniform: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="instead of `values`: a range of numbers, evenly in their logarithms"
-    )
-    count: int | None = Field(default=None, ge=1, le=MOST_LEVELS, description="levels of a range in a grid")
-
-    def build(self) -> Factor:
-        given = [key for key in ("values", "uniform", "loguniform") if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise StudyError("a factor needs one of `values`, `uniform` and `loguniform`")
-        if self.values is not None:
-            return Levels(tuple(self.values))
-        if self.uniform is not None:
-            return Uniform(self.uniform[0], self.uniform[1], self.count)
-        assert self.loguniform is not None
-        return LogUniform(self.loguniform[0], self.loguniform[1], self.count)
+@spelled.register
+def _(form: Values) -> Any:
+    item: Any = Any if form.item is None else spelled(form.item)
+    return Annotated[list[item], Field(min_length=1, max_length=MOST_LEVELS)]
 
 
-class GridModel(Model):
-    """Every combination of all values."""
-
-    kind: Literal["grid"]
-
-    def build(self) -> designs.Design:
-        return designs.Grid()
-
-
-class PairedModel(Model):
-    """The first values of all factors, then the second ones, and so on."""
-
-    kind: Literal["paired"]
-
-    def build(self) -> designs.Design:
-        return designs.Paired()
-
-
-class OneAtATimeModel(Model):
-    """The middle values, then each factor alone at its low and at its high value."""
-
-    kind: Literal["one_at_a_time"]
-
-    def build(self) -> designs.Design:
-        return designs.OneAtATime()
-
-
-class LatinHypercubeModel(Model):
-    """Random points, one in each stratum of every factor."""
-
-    kind: Literal["latin_hypercube"]
-    samples: Samples
-    seed: Seed = 0
-
-    def build(self) -> designs.Design:
-        return designs.LatinHypercube(self.samples, self.seed)
-
-
-class SobolModel(Model):
-    """The scrambled sequence of Sobol'."""
-
-    kind: Literal["sobol"]
-    samples: Samples
-    seed: Seed = 0
-
-    def build(self) -> designs.Design:
-        return designs.Sobol(self.samples, self.seed)
-
-
-DesignModel = Annotated[
-    GridModel | PairedModel | OneAtATimeModel | LatinHypercubeModel | SobolModel, Field(discriminator="kind")
-]
-
-
-class _SeriesModel(Model):
-    time: Time = "last"
-
-    def build(self) -> SeriesMeasure:
-        return SeriesMeasure(**self.model_dump())
-
-
-class NumberMeasureModel(_SeriesModel):
-    """A number that every frame reports."""
-
-    quantity: Literal[
-        "kinetic_energy",
-        "elastic_energy",
-        "potential_energy",
-        "stitch_energy",
-        "min_det_F",
-        "min_distance",
-        "largest_stitch_stretch",
-        "wall_seconds",
-    ]
-
-
-class VectorMeasureModel(_SeriesModel):
-    """A vector that every frame reports."""
-
-    quantity: Literal["linear_momentum", "angular_momentum"]
-    axis: Axis = "length"
-
-
-class BodyMeasureModel(Model):
-    """A vector of the vertices of a body."""
-
-    quantity: Literal["position", "displacement", "velocity"]
-    body: Name
-    axis: Axis = "length"
-    vertices: list[Annotated[int, Field(ge=0)]] | None = Field(default=None, min_length=1, description="default: all")
-    over: Over = "mean"
-    time: Time = "last"
-
-    def build(self) -> BodyMeasure:
-        vertices = None if self.vertices is None else tuple(self.vertices)
-        return BodyMeasure(**self.model_dump(exclude={"vertices"}), vertices=vertices)
-
-
-MeasureModel = Annotated[NumberMeasureModel | VectorMeasureModel | BodyMeasureModel, Field(discriminator="quantity")]
+if TYPE_CHECKING:
+    FactorModel = DesignModel = MeasureModel = Any
+else:
+    FactorModel, DesignModel, MeasureModel = model_of(Factor, False), entry_of(DESIGNS), model_of(Measure, False)
 
 
 class StudyFileModel(Model):
@@ -162,7 +42,7 @@ class StudyFileModel(Model):
     factors: dict[Name, FactorModel] = Field(
         min_length=1, max_length=100, description="by dotted path into the scene file: bodies.bear.material.youngs"
     )
-    design: DesignModel = Field(default_factory=lambda: GridModel(kind="grid"))
+    design: DesignModel | None = Field(default=None, description="default: a grid")
     measures: dict[Name, MeasureModel] = Field(min_length=1, max_length=1000)
 
 
@@ -187,24 +67,24 @@ def load_study(path: str | Path) -> Study:
     SceneError, StudyError : where one of them cannot be read, or is not valid; one line that begins with the file.
     """
     document = read_yaml(path)
+    document = replace(document, data=_explicit(document.data))
     try:
-        model = StudyFileModel.model_validate(_explicit(document.data))
+        model = StudyFileModel.model_validate(document.data)
+        parts = built([*model.factors.values(), model.design, *model.measures.values()], MeshStore(Path(path).parent))
     except ValidationError as error:
-        raise scene_error(replace(document, data=_explicit(document.data)), error) from None
-    factors = {name: _located(document, described.build, "factors", name) for name, described in model.factors.items()}
-    paths = {name: tuple(described.paths or [name]) for name, described in model.factors.items()}
-    design = _located(document, model.design.build, "design")
-    measures = Measures({name: measure.build() for name, measure in model.measures.items()})
+        raise scene_error(document, error) from None
+    except LocatedError as error:
+        index, *keys = error.keys
+        names = [
+            *(("factors", key) for key in model.factors),
+            ("design",),
+            *(("measures", key) for key in model.measures),
+        ]
+        raise StudyError(str(document.error((*names[int(index)], *keys), str(error)))) from None
+    factors = dict(zip(model.factors, parts, strict=False))
+    measures = Measures(dict(zip(model.measures, parts[len(factors) + 1 :], strict=True)))
     source = FileSource(Path(path).parent / model.scene)
-    return Study(source, factors, paths, design, measures, measures.units)
-
-
-def _located(document: YamlDocument, build: Callable[[], Any], *keys: str) -> Any:
-    """What `build` makes; its errors begin with file, line and keys."""
-    try:
-        return build()
-    except StudyError as error:
-        raise StudyError(str(document.error(keys, str(error)))) from None
+    return Study(source, factors, parts[len(factors)] or Grid(), measures, measures.units)
 
 
 def _explicit(data: Any) -> Any:

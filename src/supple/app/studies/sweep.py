@@ -10,9 +10,8 @@ from supple.app.scene_file.loader import Run
 from supple.app.studies.designs import Design, Grid
 from supple.app.studies.factors import Factor, as_factor
 from supple.app.studies.run_case import Measure
-from supple.app.studies.runner import StudyProgress
 from supple.app.studies.sources import FileSource, FunctionSource, Source
-from supple.app.studies.study import CHECKPOINT_SECONDS, Study, ignore_progress
+from supple.app.studies.study import CHECKPOINT_SECONDS, Study, StudyProgress, ignore_progress
 from supple.app.studies.table import StudyTable
 from supple.scene.scene import Scene
 from supple.solvers.solver import Solver
@@ -38,7 +37,7 @@ def sweep(
     """Simulate every case of a study, and return the table of results, which is also in `folder/table.csv`.
 
     A case that has ended is not simulated again, so that an interrupted study goes on where it was. A case that fails
-    is in the table with its reason. A case whose worker is lost goes on in another one, from its last checkpoint.
+    is in the table with its reason. A case whose process is lost goes on in another one, from its last checkpoint.
 
     Parameters
     ----------
@@ -46,11 +45,11 @@ def sweep(
         of a scene file, in which factors are dotted paths such as "bodies.bear.material.youngs".
     factors : by name, lists of values, `sp.studies.uniform(...)` or `sp.studies.loguniform(...)`.
     measure : takes a `Recording`, and returns a number, or numbers by name.
-    design : `sp.studies.Grid()` (the default), `Paired()`, `OneAtATime()`, `LatinHypercube(...)` or `Sobol(...)`.
+    design : `sp.studies.Grid()` (the default) or `sp.studies.LatinHypercube(...)`.
     folder : for the table, and for a folder per case. On a cluster all machines must have it under the same path.
     solver, dt, steps : for a function that returns a `Scene`; dt in [s].
     units : of factors and measures, by name. Those of a scene file's values are known.
-    workers : number of processes on this machine; None: one per core. Fewer are used where the memory requires it.
+    workers : number of processes on this machine; None: one per core.
     scheduler : address of a scheduler of dask.distributed, such as "tcp://node1:8786", instead of `workers`.
     retry_failed : simulate cases again that failed in an earlier run.
     checkpoint_seconds : time from checkpoint to checkpoint of a case [s]; shorter cases have none
@@ -64,8 +63,7 @@ def sweep(
     """
     chosen: Source = FunctionSource(source, solver, dt, steps) if callable(source) else FileSource(source)
     named = {name: as_factor(name, given) for name, given in factors.items()}
-    paths = {name: (name,) for name in named}
-    study = Study(chosen, named, paths, Grid() if design is None else design, measure, dict(units or {}))
+    study = Study(chosen, named, Grid() if design is None else design, measure, dict(units or {}))
     return study.run(
         folder,
         workers=workers,

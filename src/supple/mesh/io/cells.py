@@ -9,22 +9,61 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Cell types by VTK's numbers.
-TRIANGLE, TRIANGLE_STRIP, POLYGON, PIXEL, QUAD, TETRA = 5, 6, 7, 8, 9, 10
-QUADRATIC_EDGE, QUADRATIC_TRIANGLE, QUADRATIC_TETRA = 21, 22, 24
+TRIANGLE, TRIANGLE_STRIP, POLYGON, PIXEL, QUAD = 5, 6, 7, 8, 9
+TETRA, VOXEL, HEXAHEDRON, WEDGE, PYRAMID, PENTAGONAL_PRISM, HEXAGONAL_PRISM = 10, 11, 12, 13, 14, 15, 16
+QUADRATIC_TRIANGLE, QUADRATIC_TETRA = 22, 24
 # The cells that are written, by their number of points.
 CELL_OF_WIDTH = {3: TRIANGLE, 4: TETRA, 10: QUADRATIC_TETRA}
-CELL_NAMES = {
-    1: "vertex", 2: "poly-vertex", 3: "line", 4: "poly-line", 5: "triangle", 6: "triangle strip", 7: "polygon",
-    8: "pixel", 9: "quad", 10: "tetrahedron", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid",
-    21: "quadratic edge", 22: "quadratic triangle", 24: "quadratic tetrahedron",
-    25: "quadratic hexahedron", 42: "polyhedron",
+
+
+class CellKind(NamedTuple):
+    """Names of a type of cells, its dimension, its number of corners (0: any), and the type that the corners make."""
+
+    name: str
+    plural: str
+    dimension: int
+    corners: int
+    linear: int
+
+
+_LINEAR = {
+    1: ("vertex", "vertices", 0, 1),
+    2: ("poly-vertex", "poly-vertices", 0, 0),
+    3: ("line", "lines", 1, 2),
+    4: ("poly-line", "poly-lines", 1, 0),
+    TRIANGLE: ("triangle", "triangles", 2, 3),
+    TRIANGLE_STRIP: ("triangle strip", "triangle strips", 2, 0),
+    POLYGON: ("polygon", "polygons", 2, 0),
+    PIXEL: ("pixel", "pixels", 2, 4),
+    QUAD: ("quad", "quads", 2, 4),
+    TETRA: ("tetrahedron", "tetrahedra", 3, 4),
+    VOXEL: ("voxel", "voxels", 3, 8),
+    HEXAHEDRON: ("hexahedron", "hexahedra", 3, 8),
+    WEDGE: ("wedge", "wedges", 3, 6),
+    PYRAMID: ("pyramid", "pyramids", 3, 5),
+    PENTAGONAL_PRISM: ("pentagonal prism", "pentagonal prisms", 3, 10),
+    HEXAGONAL_PRISM: ("hexagonal prism", "hexagonal prisms", 3, 12),
+}
+# Of higher order, with the type that their corners make, which come first: quadratic cells, then Lagrange, then Bezier.
+_HIGHER = {
+    21: 3, 22: 5, 23: 9, 24: 10, 25: 12, 26: 13, 27: 14, 28: 9, 29: 12, 30: 9, 31: 13, 32: 13, 33: 12, 34: 5, 35: 3,
+    37: 14, 68: 3, 69: 5, 70: 9, 71: 10, 72: 12, 73: 13, 74: 14, 75: 3, 76: 5, 77: 9, 78: 10, 79: 12, 80: 13, 81: 14,
 }  # fmt: skip
+KINDS = {number: CellKind(*own, number) for number, own in _LINEAR.items()}
+KINDS |= {
+    number: KINDS[linear]._replace(name=f"{order} {KINDS[linear].name}", plural=f"{order} {KINDS[linear].plural}")
+    for number, linear in _HIGHER.items()
+    for order in ("quadratic" if number < 68 else "higher-order",)
+}
 
 
 class FormatError(Exception):
-    """A file does not follow its format: the reason, and the line (1-based) where lines are known."""
+    """A file does not follow its format: the reason, and the line (1-based) where lines are known.
 
-    def __init__(self, reason: str, line: int | None = None) -> None:
+    line : of a file that the file names, the name of that one, a colon, and its line
+    """
+
+    def __init__(self, reason: str, line: int | str | None = None) -> None:
         super().__init__(reason)
         self.reason = reason
         self.line = line
@@ -65,49 +104,58 @@ class CellSoup(NamedTuple):
 
 
 class MeshFile(NamedTuple):
-    """Points and cells of a file, and by name the rows of points, and of its tets, that belong to named sets."""
+    """What a file holds.
+
+    Attributes
+    ----------
+    soup : its points and cells
+    node_sets, cell_sets : by name, rows of points, and of cells
+    notes : what its reader left out or took otherwise, a line each
+    up : the axis of the file that points up
+    """
 
     soup: CellSoup
     node_sets: Mapping[str, NDArray[np.int64]] = {}
-    tet_sets: Mapping[str, NDArray[np.int64]] = {}
+    cell_sets: Mapping[str, NDArray[np.int64]] = {}
+    notes: Sequence[str] = ()
+    up: str = "y"
 
 
 def checked(soup: CellSoup) -> CellSoup:
-    """The same soup, or a `FormatError` where an index points outside."""
+    """The same soup, or a `FormatError` where an index points outside, or a cell is of an unknown type or too short."""
     flat = soup.connectivity
     outside = (flat < 0) | (flat >= len(soup.points))
     if outside.any():
         k = int(np.flatnonzero(outside)[0])
         cell = int(np.searchsorted(soup.offsets, k, side="right")) - 1
         raise FormatError(f"cell {cell} names point {flat[k]}, but points run from 0 to {len(soup.points) - 1}")
+    sizes = np.diff(soup.offsets)
+    for number in np.unique(soup.types):
+        if number not in KINDS:
+            name = {36: "quadratic polygon", 41: "convex point set", 42: "polyhedron"}.get(number, f"type {number}")
+            raise FormatError(f"it has {name} cells, which cannot be read: convert or remesh it")
+        kind, own = KINDS[number], soup.types == number
+        wrong = own & (sizes < kind.corners if number in _HIGHER else (kind.corners > 0) & (sizes != kind.corners))
+        if wrong.any():
+            cell = int(np.flatnonzero(wrong)[0])
+            raise FormatError(f"cell {cell} is a {kind.name} of {sizes[cell]} points, not {kind.corners}")
     return soup
 
 
-def tets_of(soup: CellSoup) -> NDArray[np.int64]:
-    """The tets of a soup, (m, 4) or, of quadratic ones, (m, 10) in VTK's order of nodes.
+def dimensions(soup: CellSoup) -> NDArray[np.int64]:
+    """The dimension of each cell: 0 of points, 1 of lines, 2 of surfaces, 3 of solids."""
+    table = np.full(256, -1)
+    table[list(KINDS)] = [kind.dimension for kind in KINDS.values()]
+    return table[soup.types]
 
-    Points, lines and surface cells are ignored; other cells, and tets of both kinds together, are errors.
-    """
-    soup = checked(soup)
-    solid = (soup.types > QUAD) & (soup.types != QUADRATIC_EDGE) & (soup.types != QUADRATIC_TRIANGLE)
-    kinds = np.unique(soup.types[solid])
-    others = kinds[(kinds != TETRA) & (kinds != QUADRATIC_TETRA)]
-    if len(others):
-        name = CELL_NAMES.get(int(others[0]), f"type {others[0]}")
-        raise FormatError(f"it has {name} cells; only tetrahedra of 4 or 10 nodes can be used: convert or remesh it")
-    if len(kinds) == 0:
-        raise FormatError(
-            "it has no tetrahedra; a surface is loaded with SurfaceMesh.load and meshed with tetrahedralize"
-        )
-    if len(kinds) == 2:
-        raise FormatError("it has both linear and quadratic tetrahedra; save it with one kind")
-    width = 4 if kinds[0] == TETRA else 10
-    cells = np.flatnonzero(solid)
-    starts, sizes = soup.offsets[cells], soup.offsets[cells + 1] - soup.offsets[cells]
-    if (sizes != width).any():
-        cell = int(cells[np.flatnonzero(sizes != width)[0]])
-        raise FormatError(
-            f"cell {cell} is a {CELL_NAMES[int(kinds[0])]} of {soup.offsets[cell + 1] - soup.offsets[cell]} points, "
-            f"not {width}"
-        )
-    return soup.connectivity[starts[:, None] + np.arange(width)]
+
+def cut_to_corners(soup: CellSoup, cells: NDArray[np.bool_]) -> CellSoup:
+    """The chosen cells, of which those of higher order keep their corners alone."""
+    corners, linear = np.zeros(256, dtype=np.int64), np.arange(256)
+    corners[list(_HIGHER)] = [KINDS[number].corners for number in _HIGHER]
+    linear[list(_HIGHER)] = list(_HIGHER.values())
+    sizes = np.diff(soup.offsets)
+    kept = np.where(corners[soup.types] > 0, corners[soup.types], sizes)
+    place = np.arange(len(soup.connectivity)) - np.repeat(soup.offsets[:-1], sizes)
+    flat = soup.connectivity[(place < np.repeat(kept, sizes)) & np.repeat(cells, sizes)]
+    return CellSoup.of_blocks(soup.points, [(linear[soup.types[cells]], kept[cells], flat)])

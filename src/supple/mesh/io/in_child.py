@@ -40,11 +40,13 @@ def read_in_child(data: bytes, library: str, suffix: str) -> MeshFile:
     with _folder(library) as folder:
         file = folder / f"file{suffix}"
         file.write_bytes(data)
-        sets = _run(library, "read_file", file, folder)["sets"]
+        facts = _run(library, "read_file", file, folder)
         with np.load(folder / "arrays.npz") as arrays:
             soup = CellSoup(*(arrays[field] for field in CellSoup._fields))
-            named = [{each: arrays[f"{kind}_{k}"] for k, each in enumerate(sets[kind])} for kind in ("node", "tet")]
-        return MeshFile(soup, *named)
+            nodes, cells = (
+                {name: arrays[f"{kind}_{k}"] for k, name in enumerate(facts[kind])} for kind in ("node", "cell")
+            )
+        return MeshFile(soup, nodes, cells, facts["notes"], facts["up"])
 
 
 def arrays_in_child(path: Path, library: str) -> tuple[dict[str, Any], dict[str, Any], Any]:
@@ -106,9 +108,10 @@ def _run(library: str, function: str, source: Path, folder: Path) -> dict[str, A
 
 def _contents(found: MeshFile) -> tuple[dict[str, Any], dict[str, Any]]:
     """A mesh file as facts and arrays."""
-    named = {"node": found.node_sets, "tet": found.tet_sets}
+    named = {"node": found.node_sets, "cell": found.cell_sets}
     sets = {f"{kind}_{k}": rows for kind, own in named.items() for k, rows in enumerate(own.values())}
-    return {"sets": {kind: list(own) for kind, own in named.items()}}, {**found.soup._asdict(), **sets}
+    facts = {kind: list(own) for kind, own in named.items()}
+    return facts | {"notes": list(found.notes), "up": found.up}, {**found.soup._asdict(), **sets}
 
 
 def main(library: str, function: str, path: Path, folder: Path, limits: tuple[int, float, int]) -> int:

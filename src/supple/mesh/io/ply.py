@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import POLYGON, CellSoup, FormatError
+from supple.mesh.io.cells import POLYGON, TRIANGLE_STRIP, Block, CellSoup, FormatError
 from supple.mesh.io.text import integer, shortened, without_mark
 
 SCALARS = {
@@ -16,6 +16,7 @@ SCALARS = {
     "double": "f8", "float64": "f8", "int64": "i8", "uint64": "u8",
 }  # fmt: skip
 FACE_LISTS = ("vertex_indices", "vertex_index")
+FACES = ("face", "tristrips")
 
 
 class Property(NamedTuple):
@@ -35,7 +36,7 @@ class Element(NamedTuple):
 
 
 def read(data: bytes) -> CellSoup:
-    """Polygons of a PLY file; other elements and columns are ignored."""
+    """Polygons and strips of triangles of a PLY file; other elements and columns are ignored."""
     data = without_mark(data)
     order, elements, start, line = _header(data)
     if order == "":  # text: its numbers are read as those of a binary file in double precision
@@ -45,18 +46,27 @@ def read(data: bytes) -> CellSoup:
         ]
     body = _Body(data, start, order)
     points: NDArray[np.float64] | None = None
-    faces: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
+    blocks: list[Block] = []
     for element in elements:
         body.expect(element)
         if element.name == "vertex":
             points = body.points(element)
         elif element.name == "face":
-            faces = body.lists(element)
-        elif points is None or faces is None:
+            blocks.append((POLYGON, *body.lists(element)))
+        elif element.name == "tristrips":
+            blocks.append((TRIANGLE_STRIP, *_strips(*body.lists(element))))
+        elif points is None or not blocks:
             body.lists(element)
-    if points is None or faces is None:
+    if points is None or not blocks:
         raise FormatError("it has no 'vertex' element with x, y, z, or no 'face' element: it has no surface")
-    return CellSoup.of_blocks(points, [(POLYGON, *faces)])
+    return CellSoup.of_blocks(points, blocks)
+
+
+def _strips(sizes: NDArray[np.int64], flat: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Sizes and corners of strips, which end at the end of a list and at -1."""
+    strip = np.repeat(np.arange(len(sizes)), sizes) + np.cumsum(flat < 0)
+    _, which, counts = np.unique(strip[flat >= 0], return_inverse=True, return_counts=True)
+    return counts[counts > 2], flat[flat >= 0][counts[which] > 2]
 
 
 def _numbers_of_text(body: bytes, line: int) -> bytes:
@@ -124,7 +134,7 @@ def _columns(element: Element) -> list[int]:
 def _which_list(element: Element) -> int:
     """The column with the corners of the faces; -1 where the element is not a face."""
     found = [k for k, p in enumerate(element.properties) if p.length and p.name in FACE_LISTS]
-    if element.name == "face" and not found:
+    if element.name in FACES and not found:
         raise FormatError("its faces have no list 'vertex_indices' or 'vertex_index'")
     return found[0] if found else -1
 

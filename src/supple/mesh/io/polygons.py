@@ -8,36 +8,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.io.cells import (
-    CELL_NAMES,
     PIXEL,
-    POLYGON,
-    QUAD,
-    TRIANGLE,
     TRIANGLE_STRIP,
     CellSoup,
     FormatError,
-    checked,
+    cut_to_corners,
+    dimensions,
 )
 
 MOST_CORNERS = 4_000  # of a concave face: the time to cut it grows with their square, and is seconds here
-SURFACE_TYPES = (TRIANGLE, TRIANGLE_STRIP, POLYGON, PIXEL, QUAD)
 
 
 def triangles_of(soup: CellSoup) -> NDArray[np.int64]:
-    """Triangles (m, 3) of the surface cells; points and lines are ignored, solid cells are errors.
+    """Triangles (m, 3) of the surface cells of a checked soup, of higher order by their corners; none are allowed.
 
     Convex polygons are cut as fans, concave ones by their ears.
     """
-    soup = checked(soup)
-    solid = np.unique(soup.types[soup.types > QUAD])
-    if len(solid):
-        name = CELL_NAMES.get(int(solid[0]), f"type {solid[0]}")
-        hint = "; load it with TetMesh.load, whose .surface is the boundary" if name == "tetrahedron" else ""
-        raise FormatError(f"it has {name} cells, which are not a surface{hint}")
-    cells = np.flatnonzero(np.isin(soup.types, SURFACE_TYPES))
-    if len(cells) == 0:
-        raise FormatError("it has no triangles or polygons")
-    types, starts = soup.types[cells], soup.offsets[cells]
+    soup = cut_to_corners(soup, dimensions(soup) == 2)
+    if len(soup.types) == 0:
+        return np.zeros((0, 3), dtype=np.int64)
+    cells = np.arange(len(soup.types))
+    types, starts = soup.types, soup.offsets[:-1]
     sizes = soup.offsets[cells + 1] - starts
     if (sizes < 3).any():
         k = int(np.flatnonzero(sizes < 3)[0])

@@ -128,10 +128,12 @@ class JointGeometry:
             assert isinstance(body, RigidBody)
             place, axes, holds = joint.place(body), joint.axes(), joint.conditions()
             size = min(side.size for side in (first, second))
-            vectors = {"apart": first.point(place) - second.point(place)}
+            R, shift = joint.motion_to_start()
+            point = first.point(R @ place + shift)
+            vectors = {"apart": point - second.point(place)}
             for k, e in enumerate(axes):
-                vectors[f"first.{k}"], vectors[f"second.{k}"] = first.direction(e), second.direction(e)
-            centers.append((j, first.point(place)))
+                vectors[f"first.{k}"], vectors[f"second.{k}"] = first.direction(R @ e), second.direction(e)
+            centers.append((j, point))
             differences += [(j, vectors["apart"])] if holds.together else []
             differences += [(j, size * (vectors[f"first.{k}"] - vectors[f"second.{k}"])) for k in holds.parallel]
             for one in holds.functions:

@@ -101,7 +101,7 @@ def followed(
 ) -> NDArray[np.float64]:
     """Values (s,) of the functions, with angles over all turns: near those that are known [rad], by name of the joint.
 
-    Others are at a start: of the angles between the limits, up to `slack` [rad], that nearest to zero.
+    Others are at a start: of the angles between the limits, up to `slack` [rad], that nearest to the joint's own start.
     """
     out = g.copy()
     for j, joint in enumerate(geometry.joints):
@@ -109,7 +109,8 @@ def followed(
         if row < 0 or geometry.functions[row] != ANGLE:
             continue
         near = known.get(str(joint.name))
-        out[row] = wrapped(g[row]) if near is None else near + wrapped(g[row] - near)
+        begin = getattr(joint, "start", 0.0) if near is None else near
+        out[row] = begin + wrapped(g[row] - begin)
         below, above = geometry.limits[row] + (-slack, slack) - out[row]
         if near is None and not below <= 0.0 <= above:
             turns = np.ceil(below / TURN) if below > 0.0 else np.floor(above / TURN)

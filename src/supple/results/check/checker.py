@@ -137,7 +137,8 @@ def _checked(
         if "times" not in source.knows:
             results = tuple(replace(result, time=None) for result in results)
         failures = [result for result in results if result.verdict is Verdict.FAIL]
-        return CheckReport(source.path, len(source), len(numbers), results, source.notes, place_of(scene, failures))
+        place, unfinished = place_of(scene, failures), getattr(source, "unfinished", "")
+        return CheckReport(source.path, len(source), len(numbers), results, source.notes, place, unfinished)
 
 
 def _check_of(name: str, knows: frozenset[str]) -> type[FrameCheck]:

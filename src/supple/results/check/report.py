@@ -57,6 +57,7 @@ class CheckReport(Displayed):
     path : of the recording; frames : how many it has; frames_checked : number of frames that were checked
     results : one for each check, in order; notes : what was assumed of the files, one sentence each
     place : where the first failure is, as `shown.picture` draws it; None without one
+    unfinished : how a run ended before its last frame; "" where it has all frames
     """
 
     path: Path
@@ -65,6 +66,7 @@ class CheckReport(Displayed):
     results: tuple[CheckResult, ...]
     notes: tuple[str, ...] = ()
     place: Any = None
+    unfinished: str = ""
 
     def _facts(self) -> dict[str, str]:
         facts = {"frames": f"{self.frames_checked} of {self.frames}", "failed": str(len(self.failures))}
@@ -94,6 +96,7 @@ class CheckReport(Displayed):
         """One line: what was checked, and what failed, first the check that failed first."""
         checked = "all" if self.frames == self.frames_checked else f"{self.frames_checked} of"
         begin = f"{self.path}: {checked} {self.frames} frames checked"
+        begin += f" ({self.unfinished})" if self.unfinished else ""
         if self.ok:
             passed = sum(result.verdict is Verdict.PASS for result in self.results)
             return f"{begin}, {passed} checks passed"
@@ -122,6 +125,7 @@ class CheckReport(Displayed):
             "frames_checked": self.frames_checked,
             "results": [asdict(result) for result in self.results],
             "notes": self.notes,
+            "unfinished": self.unfinished,
             "verdict": self.verdict,
             "ok": self.ok,
         }

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from supple.errors import SceneError
 from supple.model.pin_reactions import pin_labels
 from supple.model.state import SolverDetails, State
 from supple.model.system import System
@@ -31,13 +29,8 @@ def driven_names(scene: Scene) -> list[str]:
     return names
 
 
-def driven_readings(
-    system: System, state: State, details: SolverDetails, reactions: Callable[[], Mapping[str, NDArray[np.float64]]]
-) -> dict[str, DrivenReading]:
-    """By name, what the obstacles and pins of a system do.
-
-    reactions : the forces of pins by label; where it raises `SceneError`, they are not known
-    """
+def driven_readings(system: System, state: State, details: SolverDetails) -> dict[str, DrivenReading]:
+    """By name, what the obstacles and pins of a system do."""
     pushes, drags = (getattr(details, name, {}) for name in ("contact_forces", "friction_forces"))
     names = driven_names(system.scene)
     found: dict[str, DrivenReading] = {}
@@ -46,14 +39,10 @@ def driven_readings(
         key, center = str(obstacle.name), obstacle.center
         force = 0.0 - (pushes[key] + drags[key]) if key in pushes and key in drags else _UNKNOWN
         found[name] = DrivenReading(R @ center + t - center, float(Rotation.from_matrix(R).magnitude()), force)
-    try:
-        forces = reactions() if system.pins else {}
-    except SceneError:
-        forces = {}
     for name, pin, label in zip(names[len(found) :], system.pins, pin_labels(system), strict=True):
         there = state.positions[pin.vertices]
         moved = (there - pin.anchors).mean(axis=0)
-        found[name] = DrivenReading(moved, _turned(pin.anchors, there), forces.get(label, _UNKNOWN))
+        found[name] = DrivenReading(moved, _turned(pin.anchors, there), details.reaction_forces.get(label, _UNKNOWN))
     return found
 
 

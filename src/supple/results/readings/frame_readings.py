@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.pin_reactions import balanced_reactions
+from supple.errors import SceneError
+from supple.model.pin_reactions import pin_labels
 from supple.model.state import ContactPoints, SolverDetails, State
 from supple.model.system import System
 from supple.results.readings.by_body import ByBody
@@ -119,24 +120,27 @@ class FrameReadings(TetReadings):
     def reactions(self) -> dict[str, NDArray[np.float64]]:
         """The force of each pin on its body by the pin's label, (3,) [N].
 
-        Of `Implicit` the exact ones, `report.details.reaction_forces`; of `XPBD` those of `balanced_reactions`.
+        Of `Implicit` those at the end of the step, of `XPBD` the means over it.
+
+        Raises
+        ------
+        SceneError : where one is not known; see `SolverDetails.reaction_forces`.
         """
-        exact = getattr(self.report.details, "reaction_forces", None)
-        if exact is not None:
-            return dict(exact)
-        rigid = {part.name for part in self.system.rigid_bodies}
-        for pin in self.system.pins:
-            if pin.pin.body not in rigid:
-                self.first_piola[pin.pin.body]  # raises where it is not defined
-        P = self.first_piola.values_of_all
-        return balanced_reactions(self.system, self._x, self.state.time, P, self.contacts, self.report.details)
+        known = self.report.details.reaction_forces
+        for label in pin_labels(self.system):
+            if label not in known:
+                raise SceneError(
+                    f"{label}: its force is not known: no step was taken, or XPBD was, and a body has rigid edges or "
+                    "volumes; give EdgesAndVolume compliances above zero"
+                )
+        return dict(known)
 
     @cached_property
     def sensors(self) -> dict[str, Reading]:
         """By name, what the scene's sensors feel, such as `ForceReading`; then a `DrivenReading` of each obstacle and
         pin, a pin without a name being "BODY.pin"."""
         contacts = self.contacts if self.system.scene.sensors else None
-        driven = driven_readings(self.system, self.state, self.report.details, lambda: self.reactions)
+        driven = driven_readings(self.system, self.state, self.report.details)
         return sensor_readings(self.system, self._x, contacts) | driven
 
     def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:

@@ -86,6 +86,8 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
             elif name in obstacles:
                 R, t = obstacles[name].pose(0.0)
             placed.append(np.column_stack([R, t]))
+        R, shift = joint.motion_to_start()
+        placed[0] = np.column_stack([R.T @ placed[0][:, :3], R.T @ (placed[0][:, 3] - shift)])  # at coordinate zero
         first = bodies[joint.first]
         assert isinstance(first, RigidBody)
         most = [getattr(getattr(joint, "motor", None), "max_force", None), getattr(joint, "max_velocity", None)]

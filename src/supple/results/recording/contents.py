@@ -107,6 +107,14 @@ class RecordedContents(RecordedScene):
             raise file.of_another_version("a frame has an unknown status")
         self.statuses: tuple[Status, ...] = tuple(Status(self.statuses_of_codes[code]) for code in codes)
 
+    @property
+    def unfinished(self) -> str:
+        """How the recording ends before the last frame that was asked for; "" where it has all frames."""
+        last, wanted, status = self._count - 1, self.steps, self.statuses[-1]
+        if not status.can_go_on:
+            return f"the solver stopped at frame {last} of {wanted} ({status})"
+        return f"it ends at frame {last} of {wanted}" if last < wanted else ""
+
     @cached_property
     def triangles(self) -> NDArray[np.int32]:
         """(t, 3) boundaries of all bodies."""

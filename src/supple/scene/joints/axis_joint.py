@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Direction, Limits, OneOf
+from supple.kinds.forms import ANY_NUMBER, NON_NEGATIVE, POSITIVE, Direction, Limits, OneOf
 from supple.scene.joints.joint import FREE, Conditions, Function, Joint
 from supple.scene.joints.motors import MOTORS, Motor
+from supple.scene.rotation import rotation_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +22,7 @@ class AxisJoint(Joint):
     ----------
     axis : (3,) its direction in the world where the scene places everything, of any length [-]; it moves with the
         second.
+    start : the coordinate where the scene places everything [rad] or [m].
     limits : the smallest and the largest coordinate, (low, high) [rad] or [m]; an end may be infinite. None: no limits.
     motor : `PositionMotor`, `VelocityMotor` or `ForceMotor`; None: it moves freely.
     damping : effort against each unit of its rate [N m s/rad] or [N s/m].
@@ -30,6 +33,7 @@ class AxisJoint(Joint):
     """
 
     axis: Annotated[ArrayLike, Direction()] = (0.0, 0.0, 1.0)
+    start: Annotated[float, ANY_NUMBER] = 0.0
     limits: Annotated[tuple[float, float] | None, Limits("exchange them, or use a FixedJoint")] = None
     motor: Annotated[Motor | None, OneOf(MOTORS, "PositionMotor(...) or another motor", Motor)] = None
     damping: Annotated[float, NON_NEGATIVE] = 0.0
@@ -48,7 +52,7 @@ class HingeJoint(AxisJoint):
     """Two bodies that turn against each other about an axis; see `Joint` and `AxisJoint`.
 
     The coordinate is the angle [rad] by which the first has turned about the axis against the second, over all turns:
-    limits and targets may be many turns away. At a start it is the one nearest to zero of those between the limits.
+    limits and targets may be many turns away. At a start it is the one nearest to `start` of those between the limits.
 
     Raises
     ------
@@ -57,6 +61,10 @@ class HingeJoint(AxisJoint):
 
     kind: ClassVar[str] = "hinge"
     required: ClassVar[tuple[str, ...]] = ("point",)
+
+    def motion_to_start(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        R, point = rotation_matrix(self.start * np.asarray(self.axis)), np.asarray(self.point)
+        return R, point - R @ point
 
     def conditions(self) -> Conditions:
         angle = Function("angle", ("first.1", "second.1", "second.2"), self.limits or FREE)
@@ -75,6 +83,9 @@ class SliderJoint(AxisJoint):
     """
 
     kind: ClassVar[str] = "slider"
+
+    def motion_to_start(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return np.eye(3), self.start * np.asarray(self.axis)
 
     def conditions(self) -> Conditions:
         travel = Function("product", ("apart", "second.0"), self.limits or FREE)

@@ -81,7 +81,8 @@ class Conditions:
 class Joint(Kind, ABC):
     """Two things that move against each other in some ways only: a rigid body, and another, an obstacle or the world.
 
-    Points and axes are those of the world where the scene places everything; there the coordinate of a joint is zero.
+    Points and axes are those of the world where the scene places everything; there the coordinate of a joint is zero,
+    or its `start`.
 
     Parameters
     ----------
@@ -117,6 +118,10 @@ class Joint(Kind, ABC):
     def axes(self) -> NDArray[np.float64]:
         """(3, 3) three perpendicular unit vectors (rows), right-handed, which `conditions` refers to by number."""
         return axes_along(getattr(self, "axis", None))
+
+    def motion_to_start(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rotation (3, 3) and shift (3,) [m] that took the first from coordinate zero to where it is placed."""
+        return np.eye(3), np.zeros(3)
 
     @abstractmethod
     def conditions(self) -> Conditions:

@@ -1,4 +1,4 @@
-"""Joints that hold a point: ball, fixed and universal (Cardan's, or Hooke's) joints."""
+"""Joints without motors: ball, fixed, planar and universal (Cardan's, or Hooke's) joints."""
 
 from __future__ import annotations
 
@@ -86,6 +86,29 @@ class FixedJoint(Joint):
 
     def conditions(self) -> Conditions:
         return Conditions(parallel=(0, 1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarJoint(Joint):
+    """Two bodies of which one shifts in a plane of the other and turns about the plane's normal; see `Joint`.
+
+    Parameters
+    ----------
+    axis : (3,) the normal of the plane in the world where the scene places everything, of any length [-]; it moves with
+        the second.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind, or both ends are one body.
+    """
+
+    kind: ClassVar[str] = "planar"
+
+    axis: Annotated[ArrayLike, Direction()] = (0.0, 0.0, 1.0)
+
+    def conditions(self) -> Conditions:
+        height = Function("product", ("apart", "second.0"), vanishes=True)
+        return Conditions(together=False, parallel=(0,), functions=(height,), lines=("second.0",))
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,15 @@ class Welding:
         if len(self):
             x[self.vertices] = np.einsum("sk,ski->si", self.weights, x[self.control])
 
+    def reduced(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces, or a gradient (n, 3), by the vertices that are not welded: those on welded vertices act on control
+        points, by the transpose of `follow`."""
+        out = forces.copy()
+        if len(self):
+            out[self.vertices] = 0.0
+            np.add.at(out, self.control, self.weights[:, :, None] * forces[self.vertices][:, None, :])
+        return out
+
 
 def weld_together(welds: Sequence[Weld], bodies: Sequence[PlacedBody]) -> Welding:
     """The welds of bodies in their scene's order.

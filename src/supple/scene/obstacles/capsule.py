@@ -10,9 +10,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.geometry.convex_hull import convex_hull
 from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import lengths_and_directions
-from supple.scene.obstacles.polyhedra import SegmentObstacle, hull, round_ball
+from supple.scene.obstacles.polyhedra import SegmentObstacle, round_ball
 from supple.scene.obstacles.shape import Shape, concave_contact
 
 
@@ -53,7 +54,7 @@ class Capsule(SegmentObstacle):
         """Of the polyhedra of both ends."""
         ball = self.radius * round_ball(inscribed=self.inside)[0]
         ends = [ball + np.array([x, 0.0, 0.0]) for x in (-self.half_length, self.half_length)]
-        points, triangles = hull(np.concatenate(ends))
+        points, triangles = convex_hull(np.concatenate(ends))
         return self.placed(points), triangles
 
     def shapes(self) -> tuple[Shape, ...]:

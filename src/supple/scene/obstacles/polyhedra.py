@@ -91,16 +91,3 @@ def prism(inscribed: bool, sides: int = CYLINDER_SIDES) -> tuple[NDArray[np.floa
     walls = [np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])]
     caps = [np.column_stack([np.full(n, 2 * n), j, i]), np.column_stack([np.full(n, 2 * n + 1), i + n, j + n])]
     return points, np.concatenate([*walls, *caps])
-
-
-def hull(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
-    """The convex hull of points (n, 3): its vertices and triangles, facing outwards."""
-    from scipy.spatial import ConvexHull
-
-    found = ConvexHull(points)
-    triangles = found.simplices.astype(np.int64)
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
-    triangles[inward] = triangles[inward][:, [0, 2, 1]]
-    used, compact = np.unique(triangles, return_inverse=True)
-    return points[used], compact.reshape(-1, 3)

@@ -33,7 +33,6 @@ class ImplicitDetails(SolverDetails):
     dhat : distance at which contact begins [m]; None without contact
     contact_stiffness : of the barrier at the end [Pa]; None without contact
     contact_forces, friction_forces : by name of the body or obstacle, (3,) [N]; each sum to zero
-    reaction_forces : of the pins on their bodies, by label of the pin, (3,) [N]
     orthogonality_errors : |F^T F - 1| of the rigid bodies, by name [-]
     weld_forces : of the rigid bodies on the soft ones that are welded to them, by name of the weld, (3,) [N]
     time_error : estimate of the error of the positions that the integrator added in the step, the root mean square over
@@ -55,7 +54,6 @@ class ImplicitDetails(SolverDetails):
     contact_stiffness: float | None = None
     contact_forces: Forces = field(default_factory=dict)
     friction_forces: Forces = field(default_factory=dict)
-    reaction_forces: Forces = field(default_factory=dict)
     orthogonality_errors: Mapping[str, float] = field(default_factory=dict)
     weld_forces: Forces = field(default_factory=dict)
     time_error: float | None = None

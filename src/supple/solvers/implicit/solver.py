@@ -15,6 +15,7 @@ from supple.model.actuator_readings import actuator_fields, start_of
 from supple.model.energy_balance import add_works, no_works, works_of_actuators
 from supple.model.joints.at_state import initial_joint_details, refuse_apart, refuse_moved_welds
 from supple.model.joints.geometry import JointGeometry
+from supple.model.pin_reactions import pin_reactions
 from supple.model.state import State, Status, StepReport
 from supple.model.stitched_points import with_stitched_points
 from supple.model.system import System
@@ -38,8 +39,7 @@ from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.linear_solver import LinearSolver
 from supple.solvers.implicit.newton.trace import NewtonRow
 from supple.solvers.implicit.stepping.integrators import INTEGRATORS, Integrator, Static, integrator_of
-from supple.solvers.implicit.stepping.reactions import reaction_forces, weld_forces
-from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors
+from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors, weld_forces
 from supple.solvers.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.solvers.implicit.stepping.substepping import Substepping
 from supple.solvers.implicit.stepping.workspace import Workspace
@@ -190,7 +190,7 @@ class Implicit(Solver):
         return ImplicitDetails(
             contact_forces=pushes,
             friction_forces=pushes,
-            reaction_forces=reaction_forces(system, zero)[0],
+            reaction_forces=pin_reactions(system, zero)[0],
             weld_forces=weld_forces(system, zero),
             orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
             **initial_joint_details(workspace.joints, workspace.checked or system.start_states[-1]),
@@ -275,9 +275,7 @@ class Implicit(Solver):
         if last is not None:
             gradient = last.outcome.end.gradient / last.contact.weight
             left, of_welds = norm(workspace.tools.freed(gradient)), weld_forces(system, gradient)
-            if workspace.tools.linear_solver.reduction is not None:
-                workspace.tools.linear_solver.reduction.reduce(gradient)
-            totals, by_vertex = reaction_forces(system, gradient)
+            totals, by_vertex = pin_reactions(system, workspace.system.welding.reduced(gradient))
             details = replace(details, unbalanced_force=left, weld_forces=of_welds)
             details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
             details, nearest, contacts = last.contact.measured(details, last.state.positions)

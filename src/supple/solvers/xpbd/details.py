@@ -25,8 +25,7 @@ class XPBDDetails(SolverDetails):
     softening : by body, the share of its stiffness that it lacks at this length of the substep, estimated (see
         `supple.solvers.xpbd.assessment.softening`)
     energy_gained : energy without a source that has not been lost since, over the energy of the scene [-]
-    weld_forces : of the rigid bodies that no pin holds on what is welded to them, by name of the weld, (3,) means over
-        the frame [N]; zero where they sleep
+    weld_forces : of the rigid bodies on what is welded to them, by name of the weld, (3,) means over the frame [N]
     contact_forces, friction_forces : by name of the body or obstacle, (3,) means over the frame [N]; each sum to zero
     asleep : by body, whether it rests, so that no substep was taken for it (see `supple.solvers.xpbd.sleep`)
     held_back : substeps in which motion was shortened by more than the error that contacts may leave, so that no tet

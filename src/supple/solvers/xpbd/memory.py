@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,7 @@ class XPBDMemory:
     sleep : of bodies at rest; None at the start
     futile : the statuses of the last frame that repetitions did not remove
     control : of rigid bodies; None where nothing is welded to any
+    at_rest : the last forces of joints, welds and pins of sleeping bodies, by field of `XPBDDetails` and name
     """
 
     contact: ContactMemory | None = None
@@ -58,3 +60,4 @@ class XPBDMemory:
     futile: frozenset[str] = frozenset()
     sleep: SleepMemory | None = None
     control: ControlMemory | None = None
+    at_rest: Mapping[str, Mapping[str, NDArray[np.float64]]] = field(default_factory=dict)

@@ -264,5 +264,6 @@ class XPBD(Solver):
             **actuator_fields(system, *start_of(system)),
             weld_forces={name: np.zeros(3) for name in workspace.welded.names},
             **workspace.joints.initial_fields(workspace.welded.inner(system.start_states[-1])),
+            reaction_forces={label: np.zeros(3) for label in workspace.works.held.reactions},
             work=no_works(system),
         )

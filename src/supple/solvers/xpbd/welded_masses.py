@@ -107,33 +107,23 @@ class WeldedMasses:
 
     @property
     def names(self) -> list[str]:
-        """Of the welds to rigid bodies that no pin holds."""
-        return list(self._free())
+        """Of the welds."""
+        return [str(weld.name) for weld in self.system.scene.welds]
 
     def forces(
-        self, rigid: RigidBodies, velocities: NDArray[np.float64], dt: float, asleep: NDArray[np.bool_]
+        self, rigid: RigidBodies, velocities: NDArray[np.float64], on_held: NDArray[np.float64], dt: float
     ) -> dict[str, NDArray[np.float64]]:
-        """By name of the weld, the mean forces (3,) of free rigid bodies on what is welded to them, over a frame [N].
+        """By name of the weld, the mean forces (3,) of rigid bodies on what is welded to them, over a frame [N].
 
         Parameters
         ----------
         rigid : these bodies, at the end of the frame; velocities : (n, 3) then, in their numbering; dt : its length [s]
-        asleep : (b,) the bodies that rest; their welds have no force, as their joints
+        on_held : (n, 3) impulses of all forces in the frame on vertices that are welded to held bodies [N s]
         """
-        impulses = rigid.welded_impulses(self._masses, velocities)
-        bodies = [part.name for part in self.system.bodies]
-        found = {}
-        for name, (body, mine) in self._free().items():
-            force = impulses[mine].sum(axis=0) / dt - self._masses[mine].sum() * self.system.gravity
-            found[name] = np.zeros(3) if asleep[bodies.index(body)] else force
-        return found
-
-    def _free(self) -> dict[str, tuple[str, NDArray[np.bool_]]]:
-        """By name of such a weld, its soft body and which of all welded vertices (s,) are its."""
-        welding = self.system.welding
-        free = ~np.isin(welding.control[:, 0], self.system.pinned_vertices)
-        welds = enumerate(self.system.scene.welds)
-        return {str(weld.name): (weld.body, mine) for k, weld in welds if (mine := free & (welding.weld == k)).any()}
+        impulses = rigid.welded_impulses(self._masses, velocities) - on_held[rigid.welding.vertices]
+        impulses -= dt * self._masses[:, None] * self.system.gravity
+        weld = self.system.welding.weld
+        return {name: impulses[weld == k].sum(axis=0) / dt for k, name in enumerate(self.names)}
 
     def _anchors(self, pin: PinRange) -> NDArray[np.float64]:
         """(k, 3) those of a pin; of a rigid body, its control points."""

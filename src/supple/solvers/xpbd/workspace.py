@@ -128,7 +128,7 @@ class XPBDWorkspace:
         before = float(elastic.of(self.points).sum())
         self.growth = laws.growth
         shapes = laws.stress_free.Dm_inv, laws.stress_free.volumes
-        for each in (*self.sets, self.assessment.balance.elastic, self.works.at_pins):
+        for each in (*self.sets, self.assessment.balance.elastic, self.works.held.elements):
             if isinstance(each, (StableNeoHookeanConstraints, ElasticEnergy)):
                 each.grow(*shapes)
         return float(elastic.of(self.points).sum()) - before

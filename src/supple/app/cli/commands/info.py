@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from supple.app.cli.arguments import Confine
 from supple.app.cli.console import print_table
 
 if TYPE_CHECKING:
@@ -21,13 +22,15 @@ if TYPE_CHECKING:
     from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene.stitches.stitching import Stitching
 
-SCENE_FILES = (".yaml", ".yml", ".urdf")
+SCENE_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 
-def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negative="")] = False) -> None:
+def info(
+    file: Path | None = None, /, *, time: Annotated[bool, Parameter(negative="")] = False, confine: Confine = False
+) -> None:
     """Print what a file contains: counts, sizes, quality, problems. Without a file: versions, platform and threads.
 
     Parameters
@@ -36,6 +39,8 @@ def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negativ
         A scene (.yaml), a robot (.urdf), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
     time
         Of a scene: simulate its first frames, and print how long one takes. The first run of a solver compiles it.
+    confine
+        Of a scene: read meshes from the folder of its file, and folders below, only.
     """
     if file is None:
         print_table(_platform(), "Supple")
@@ -47,7 +52,7 @@ def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negativ
         return
     suffix = file.suffix.lower()
     if suffix in SCENE_FILES:
-        _scene(file, time)
+        _scene(file, time, confine)
     elif suffix in RECORDINGS:
         _recording(file)
     else:
@@ -129,40 +134,29 @@ def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
 
 def _mesh(file: Path, suffix: str) -> None:
     from supple.errors import MeshError
-    from supple.mesh.io.mesh_files import SURFACE_READERS, TET_EXTENSIONS
-    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.io.mesh_files import READERS
+    from supple.mesh.io.tetgen_family import SUFFIXES
+    from supple.mesh.mesh_file import load_mesh
     from supple.mesh.tetmesh import TetMesh
 
-    known = (*SCENE_FILES, *RECORDINGS[:1], *dict.fromkeys((*SURFACE_READERS, *TET_EXTENSIONS)))
+    known = (*SCENE_FILES, *RECORDINGS[:1], *READERS, *SUFFIXES)
     if suffix not in known:
         raise MeshError(f"{file}: unknown extension {suffix or '(none)'}; known are {', '.join(known)}")
-    mesh: TetMesh | SurfaceMesh
-    if suffix not in TET_EXTENSIONS:
-        mesh = SurfaceMesh.load(file)
-    else:
-        try:
-            mesh = TetMesh.load(file)
-        except MeshError as error:
-            if suffix not in SURFACE_READERS:
-                raise
-            try:  # a file of this format may hold a surface
-                mesh = SurfaceMesh.load(file)
-            except MeshError:
-                raise error from None
+    mesh = load_mesh(file)
     rows = _tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh, file)
-    if isinstance(mesh, TetMesh) and suffix in (".inp", ".msh"):
+    if isinstance(mesh, TetMesh) and suffix in (".inp", ".msh", ".mesh"):
         rows += [(f"sets of {kind}", listed) for kind, listed in mesh.sets.listed().items()]
     print_table(rows, str(file))
 
 
-def _scene(file: Path, timed: bool) -> None:
+def _scene(file: Path, timed: bool, confine: bool) -> None:
     from supple.app.cli.console import reading
     from supple.app.scene_file.loader import load_run
     from supple.model.system import build_system, initial_state
     from supple.scene.rigid.rigid_body import RigidBody
 
     with reading():
-        run = load_run(file)
+        run = load_run(file, confine=confine)
     start = initial_state(run.scene, **{key.removeprefix("initial_"): value for key, value in run.start.items()})
     scene, system = run.scene, build_system(run.scene, start)
     points = system.split(start.positions)
@@ -335,15 +329,7 @@ def _recording(file: Path) -> None:
             ("scene file", "inside" if recording.scene_text else "none"),
             ("written by", f"supple {recording.supple_version}"),
         ]
-        bad = [k for k, status in enumerate(recording.statuses) if not status.can_go_on]
-        rows.append(("problems", _recording_problems(float(J.min()), bad)))
+        problems = [*(["a tetrahedron is inverted or flat (J <= 0)"] if J.min() <= 0.0 else [])]
+        problems += [recording.unfinished] if recording.unfinished else []
+        rows.append(("problems", "; ".join(problems) or "none"))
     print_table(rows, str(file))
-
-
-def _recording_problems(smallest_J: float, stopped: list[int]) -> str:
-    problems = []
-    if smallest_J <= 0.0:
-        problems.append("a tetrahedron is inverted or flat (J <= 0)")
-    if stopped:
-        problems.append(f"the solver stopped at frame {stopped[0]}")
-    return "; ".join(problems) or "none"

@@ -42,7 +42,7 @@ def mesh(
     Parameters
     ----------
     surface
-        STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file.
+        STL, OBJ, PLY, OFF, GLB, glTF, DAE, 3MF, VTP, VTK, VTU, MSH, INP, MESH or USD file.
     output
         One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu, .vtk, .inp or
         USD file. Without it, the surface's name with .vtu, in this folder.

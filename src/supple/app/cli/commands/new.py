@@ -26,7 +26,7 @@ def new(
     scene
         The file to write (.yaml).
     surface
-        STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file that becomes the body.
+        STL, OBJ, PLY, OFF, GLB, glTF, DAE, 3MF, VTP, VTK, VTU, MSH, INP, MESH or USD file that becomes the body.
     scale
         Factor of the surface's coordinates; without it, 0.001 where the surface is longer than 10 m, otherwise 1.
     overwrite

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Overwrite, Seconds, Steps
+from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Confine, Overwrite, Seconds, Steps
 
 if TYPE_CHECKING:
     from supple.app.scene_file.loader import Run
@@ -29,6 +29,7 @@ def run(
     plot: bool | None = None,
     fields: str | None = None,
     checkpoint_every: CheckpointEvery = ON_THE_WAY,
+    confine: Confine = False,
     overwrite: Overwrite = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> int:
@@ -66,6 +67,8 @@ def run(
     checkpoint_every
         Number of frames from checkpoint to checkpoint, or a time such as 30s; 0: only at the start and the end.
         Without this, 100 frames or 30 s, whichever is shorter.
+    confine
+        Read meshes from the folder of the scene file, and folders below, only: for a file of a stranger.
     overwrite
         Replace an earlier run in the folder.
     quiet
@@ -86,7 +89,7 @@ def run(
 
         refuse_to_replace(scene, trace)
     with reading():
-        described = load_run(scene)
+        described = load_run(scene, confine=confine)
     if separate:
         described = moved_apart(described)
     used = described.solver if solver is None else solver_of_kind(solver)

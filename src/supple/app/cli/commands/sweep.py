@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
-    from supple.app.studies.runner import StudyProgress
+    from supple.app.studies.study import StudyProgress
 
 
 def sweep(
@@ -24,7 +24,6 @@ def sweep(
     workers: Steps = None,
     scheduler: str | None = None,
     retry_failed: Annotated[bool, Parameter(negative="")] = False,
-    plot: bool = True,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> int:
     """Simulate a scene with many values of its parameters, and write one table of results.
@@ -36,20 +35,17 @@ def sweep(
     study
         The study file (.yaml): scene file, factors, design and measures; docs/reference/studies.md describes it.
     output
-        Folder for table.csv, plots, and a folder for each case.
+        Folder for table.csv, and a folder for each case.
     workers
-        Number of processes on this machine; without this, one per core. Fewer are used where the memory requires it.
+        Number of processes on this machine; without this, one per core.
     scheduler
         Address of a scheduler of dask.distributed, such as tcp://node1:8786, instead of processes on this machine.
     retry_failed
         Simulate cases again that failed before.
-    plot
-        Write plots of every measure.
     quiet
         Print neither progress nor summary.
     """
     from supple.app.cli.console import ExitCode
-    from supple.app.studies.plots import plot_study
     from supple.app.studies.study import TABLE, ignore_progress
     from supple.app.studies.study_file import load_study
 
@@ -62,7 +58,6 @@ def sweep(
             retry_failed=retry_failed,
             progress=ignore_progress if quiet else bar.show,
         )
-    plots = plot_study(table, output / "plots") if plot else []
     failed = [(key, reason) for key, reason in zip(table.keys, table.reasons, strict=True) if reason]
     if not quiet:
         from rich.markup import escape
@@ -74,8 +69,6 @@ def sweep(
         for key, reason in failed[:5]:
             console.print(f"  {key}: {escape(reason)}")
         console.print(f"table  {escape(str(output / TABLE))}")
-        if plots:
-            console.print(f"plots  {escape(str(output / 'plots'))}")
     return ExitCode.FAILED if failed else ExitCode.OK
 
 

@@ -16,7 +16,7 @@ Port = Annotated[int | None, Parameter(name="--port", converter=whole_number)]
 Full = Annotated[bool, Parameter(name="--full", negative="")]
 Open = Annotated[bool, Parameter(name="--open")]
 
-SCENE_FILES = (".yaml", ".yml", ".urdf")
+SCENE_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 
 
@@ -28,11 +28,12 @@ def view(
     full: Full = False,
     port: Port = None,
     open_: Open = True,
+    confine: bool = True,
 ) -> None:
     """Show a recording, or a scene that is simulated live and can be dragged and tuned, in a browser.
 
     Runs until Ctrl-C. Only this machine can open the page, at an address that contains a secret; from another one, use
-    `ssh -L`. A scene's meshes must be in the folder of its file.
+    `ssh -L`.
 
     Parameters
     ----------
@@ -48,6 +49,8 @@ def view(
         Port to serve at; without it, 8080 or the next free one.
     open_
         Open the page in a browser.
+    confine
+        Read meshes from the folder of the scene file, and folders below, only.
     """
 
     found = find_source(source)
@@ -61,12 +64,11 @@ def view(
 
     from supple.app.cli.console import reading
     from supple.app.scene_file.entries.families import solver_of_kind
-    from supple.app.scene_file.entries.mesh_sources import ConfinedMeshStore
     from supple.app.scene_file.loader import load_run
     from supple.app.viewer.protocol.live_source import LiveSource
 
     with reading():
-        run = load_run(found, ConfinedMeshStore)
+        run = load_run(found, confine=confine)
     used = run.solver if solver is None else solver_of_kind(solver)
     live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions, not full, solver is not None)
     serve_page(live, port, open_)

@@ -151,13 +151,19 @@ class BuiltBody:
 
 
 class BodyModel(Model):
-    """One body. Give `mesh` (a file) or `shape`, and `material` for a soft body or `rigid` for a rigid one."""
+    """One body. Give `mesh` (a file), `shape` or `surfaces`; and `material`, or `rigid` for a rigid one."""
 
-    alternatives = ("mesh", "shape", "a body needs either `mesh` or `shape`; give one of them")
+    alternatives = ("mesh", "shape", "surfaces", "a body needs either `mesh` or `shape`; give one of them")
 
     name: Name = Field(description="unique in the scene")
     mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
     shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: a ready-made shape")
+    surfaces: list[SurfaceModel] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=1000,
+        description="instead of `mesh`, of a rigid body: closed surfaces that are its shape together, and may overlap",
+    )
     order: Literal[1, 2] | None = Field(
         default=None,
         description="of the tets: 2 for quadratic ones (implicit solver), 1 for linear ones; default: as in the file",
@@ -195,6 +201,8 @@ class BodyModel(Model):
     def _soft_or_rigid(self) -> BodyModel:
         if (self.material is None) == (self.rigid is None):
             raise ValueError("a body needs either `material` or `rigid`; give one of them")
+        if self.surfaces is not None and self.rigid is None:
+            raise ValueError("`surfaces` are of rigid bodies; give a soft one a `mesh` or a `shape`")
         if self.rigid is not None:
             for key in ("regions", "skin", "collide", "initial", "order"):
                 if getattr(self, key) is not None:
@@ -225,6 +233,9 @@ class BodyModel(Model):
         if self.mesh is not None:
             with at("mesh"):
                 shape = meshes.solid(self.mesh)
+        elif self.surfaces is not None:
+            with at("surfaces"):
+                shape = meshes.joined(self.surfaces)
         else:
             assert self.shape is not None
             with at("shape"):

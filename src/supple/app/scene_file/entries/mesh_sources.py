@@ -7,22 +7,26 @@ import logging
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, Field
 
 from supple.app.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, SurfaceShapeModel
 from supple.app.scene_file.model import FilePath, Model, Positive, Vector
 from supple.app.scene_file.yaml_files import printable
 from supple.errors import MeshError, SceneError
+from supple.mesh.io.mesh_files import SURFACE_READERS
+from supple.mesh.mesh_file import load_mesh
 from supple.mesh.meshing.units import warn_of_millimetres
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
+from supple.numerics.geometry.convex_hull import convex_hull
 from supple.scene.located import at
 from supple.scene.rotation import rotation_matrix
 
 logger = logging.getLogger(__name__)
 
-SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".glb", ".vtp")
-TET_FILES = (".node", ".ele", ".edge", ".face", ".msh", ".inp", ".usd", ".usda", ".usdc")
+SURFACE_FILES = tuple(SURFACE_READERS)
+KEEP_AXES = "true: coordinates of a .dae or USD file whose x or z axis points up are not turned to y"
 MESHING_OPTIONS = (
     "tets",
     "edge",
@@ -38,7 +42,7 @@ MESHING_OPTIONS = (
 
 
 class MeshFileModel(Model):
-    """A mesh file. A surface is filled with tetrahedra according to the meshing options.
+    """A mesh file. Where it holds a surface, that is filled with tetrahedra according to the meshing options.
 
     Without a size, a surface whose triangles need more than 5,000 tetrahedra is filled with so many. A surface that is
     reduced for that, or by `decimate`, is the skin of the body.
@@ -60,19 +64,12 @@ class MeshFileModel(Model):
         default=None, ge=4, le=10**8, description="number of triangles to which the surface is reduced first"
     )
     time_limit: Positive | None = Field(default=None, description="of the mesher [s]")
+    keep_axes: bool = Field(default=False, description=KEEP_AXES)
 
     @property
     def meshing(self) -> dict[str, Any]:
         """The meshing options that were given."""
         return {key: getattr(self, key) for key in MESHING_OPTIONS if getattr(self, key) is not None}
-
-    def is_surface(self) -> bool:
-        """Whether the file is a surface to be filled: by its extension; where it can be both, by the options."""
-        suffix = Path(self.file).suffix.lower()
-        if suffix in TET_FILES and self.meshing:
-            with at(next(iter(self.meshing))):
-                raise MeshError(f"{self.file} already holds tetrahedra; remove this")
-        return suffix in SURFACE_FILES or (suffix not in TET_FILES and bool(self.meshing))
 
 
 class SurfaceModel(Model):
@@ -82,9 +79,13 @@ class SurfaceModel(Model):
 
     file: FilePath | None = Field(default=None, description="relative to the scene file")
     shape: SurfaceShapeModel | None = Field(default=None, description="instead of `file`")
-    scale: Positive = Field(default=1.0, description="of all coordinates")
+    scale: Positive | Vector = Field(
+        default=1.0, description="of all coordinates, or of x, y and z; a negative one mirrors"
+    )
     rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the origin [rad]")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
+    hull: bool = Field(default=False, description="true: the convex hull of the surface instead")
+    keep_axes: bool = Field(default=False, description=KEEP_AXES)
 
     def build(self, meshes: MeshStore) -> SurfaceMesh:
         return meshes.surface(self)
@@ -122,9 +123,11 @@ class MeshStore:
 
     def solid(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
         """The surface in a file as it is, without meshing options; otherwise its tet mesh."""
-        if not source.is_surface() or source.meshing:
-            return self.tets(source)
-        return self._once(source, lambda: self._read_surface(source), "solid ")
+        return self.tets(source) if source.meshing else self._loaded(source)
+
+    def holds_tets(self, source: MeshFileModel) -> bool:
+        """Whether a file holds tets, or other solid cells, and not a surface to be filled."""
+        return isinstance(self._loaded(source), TetMesh)
 
     def solid_shape(self, shape: ShapeModel) -> SurfaceMesh | TetMesh:
         """The surface of a shape, or its tet mesh where the surface has no other description."""
@@ -135,6 +138,13 @@ class MeshStore:
     def surface(self, source: SurfaceModel) -> SurfaceMesh:
         """The surface of a file or a shape, placed."""
         return self._once(source, lambda: self._surface(source))
+
+    def joined(self, sources: list[SurfaceModel]) -> SurfaceMesh:
+        """Several surfaces as one."""
+        surfaces = [self.surface(source) for source in sources]
+        begins = np.cumsum([0, *(len(one.vertices) for one in surfaces)])
+        triangles = [one.triangles + begin for one, begin in zip(surfaces, begins[:-1], strict=True)]
+        return SurfaceMesh(np.concatenate([one.vertices for one in surfaces]), np.concatenate(triangles))
 
     def located(self, file: str) -> Path:
         """The path of a mesh file that a scene names.
@@ -147,36 +157,53 @@ class MeshStore:
 
     def _read(self, source: MeshFileModel) -> tuple[TetMesh, SurfaceMesh | None]:
         """The mesh; and the surface where it was reduced before it was filled."""
-        if source.is_surface():
-            from supple.mesh.meshing.sizes import automatic_tets
-            from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
+        loaded = self._loaded(source)
+        if isinstance(loaded, TetMesh):
+            return loaded, None
+        from supple.mesh.meshing.sizes import automatic_tets
+        from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
 
-            surface, options = self._read_surface(source), source.meshing
-            if not options.keys() & {"tets", "edge", "max_volume", "decimate", "keep_surface"}:
-                options["tets"] = automatic_tets(surface)
-            mesh, report = tetrahedralize_reported(surface, **options)
-            if report.reduced:
-                logger.info("%s: its %d triangles are drawn, as the skin", source.file, len(report.fine.triangles))
-            return mesh, report.fine if report.reduced else None
-        with at("file"):
-            mesh = TetMesh.load(self.located(source.file))
-        warn_of_millimetres(source.file, mesh.vertices, source.scale)
-        return (mesh if source.scale == 1.0 else mesh.transformed(source.scale)), None
+        options = source.meshing
+        if not options.keys() & {"tets", "edge", "max_volume", "decimate", "keep_surface"}:
+            options["tets"] = automatic_tets(loaded)
+        mesh, report = tetrahedralize_reported(loaded, **options)
+        if report.reduced:
+            logger.info("%s: its %d triangles are drawn, as the skin", source.file, len(report.fine.triangles))
+        return mesh, report.fine if report.reduced else None
 
-    def _read_surface(self, source: MeshFileModel) -> SurfaceMesh:
-        with at("file"):
-            surface = SurfaceMesh.load(self.located(source.file))
-        warn_of_millimetres(source.file, surface.vertices, source.scale)
-        return surface if source.scale == 1.0 else surface.transformed(source.scale)
+    def _loaded(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
+        """What a file holds, scaled."""
+
+        def load() -> SurfaceMesh | TetMesh:
+            with at("file"):
+                mesh = load_mesh(self.located(source.file), keep_axes=source.keep_axes)
+            warn_of_millimetres(source.file, mesh.vertices, source.scale)
+            return mesh if source.scale == 1.0 else mesh.transformed(source.scale)
+
+        loaded = self._once(source, load, "loaded ")
+        if isinstance(loaded, TetMesh) and source.meshing:
+            with at(next(iter(source.meshing))):
+                raise MeshError(f"{source.file} already holds tetrahedra; remove this")
+        return loaded
 
     def _surface(self, source: SurfaceModel) -> SurfaceMesh:
         if source.file is not None:
+            file = source.file
             with at("file"):
-                surface = SurfaceMesh.load(self.located(source.file))
+                surface = self._once(
+                    MeshFileModel(file=file, keep_axes=source.keep_axes),
+                    lambda: SurfaceMesh.load(self.located(file), keep_axes=source.keep_axes),
+                    "surface in ",
+                )
         else:
             assert source.shape is not None
             with at("shape"):
                 surface = source.shape.build_surface()
+        if source.hull:
+            try:
+                surface = SurfaceMesh(*convex_hull(surface.vertices))
+            except ValueError as error:
+                raise MeshError(f"{source.file}: no convex hull: {error}") from None
         if source.scale == 1.0 and not any(source.rotation) and not any(source.position):
             return surface
         return surface.transformed(source.scale, rotation_matrix(source.rotation), source.position)
@@ -208,6 +235,9 @@ class ConfinedMeshStore(MeshStore):
         except (OSError, ValueError, RuntimeError):
             raise SceneError(f"{printable(file)} cannot be read") from None
         if not inside or Path(file).is_absolute():
-            raise SceneError(f"{printable(file)} is outside the scene file's folder; a live page reads no files there")
+            raise SceneError(
+                f"{printable(file)} is outside the scene file's folder, to which reading is confined; "
+                "move it there, or do not confine reading (--no-confine, confine=False)"
+            )
         if exists and not regular:
             raise SceneError(f"{printable(file)} is not a regular file of at most {LARGEST_FILE // 2**20} MiB")

@@ -1,27 +1,36 @@
 """Reading a URDF file: links with inertia and collision geometry, and the joints between them.
 
-What this file does not read is named in `Robot.ignored`.
-
 Source: the specification of URDF, https://wiki.ros.org/urdf/XML.
 """
 
 from __future__ import annotations
 
-import os
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from xml.etree import ElementTree
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES
-from supple.app.scene_file.urdf.elements import Problem, attribute, child_of, ignore_others, numbers, only, parsed
+from supple.app.scene_file.urdf.elements import Element, Problem, parsed
+from supple.app.scene_file.urdf.notes import Notes
 from supple.app.scene_file.yaml_files import printable
-from supple.errors import SceneError
 from supple.scene.rotation import rotation_matrix
 
-JOINTS = ("fixed", "revolute", "continuous", "prismatic", "floating")
+JOINTS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
+
+# Of the shapes of a geometry, the attributes with lengths, and how many each has.
+_SHAPES = {
+    "box": (("size", 3),),
+    "cylinder": (("radius", 1), ("length", 1)),
+    "capsule": (("radius", 1), ("length", 1)),
+    "sphere": (("radius", 1),),
+}
+_UNUSED = "not used"
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,36 +44,59 @@ class Placement:
         """The placement of what `inner` places in this frame."""
         return Placement(self.rotation @ inner.rotation, self.rotation @ inner.translation + self.translation)
 
+    def relative_to(self, outer: Placement) -> Placement:
+        """This placement in the frame of another."""
+        back = outer.rotation.T
+        return Placement(back @ self.rotation, back @ (self.translation - outer.translation))
+
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """A collision geometry: kind "box" (3 lengths), "cylinder" (radius, height), "sphere" (radius) or "mesh" (scale).
+    """A collision geometry: "box" (3 lengths), "cylinder" or "capsule" (radius, length), "sphere" (radius) or "mesh".
 
-    file : of a mesh, relative to the URDF's folder
+    numbers : its lengths [m], or the three scales of a mesh; file : of a mesh, as the URDF names it
+    hull : whether its convex hull counts
     """
 
     kind: str
     numbers: tuple[float, ...]
     placement: Placement
     file: str = ""
+    hull: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
-    """mass : [kg]; tensor : (3, 3) about the center [kg m^2], in the axes of `placement`, which has the center."""
+    """mass : [kg], above zero; tensor : (3, 3) about the center [kg m^2], in the axes of `placement`, which has the
+    center; zero where the file has none."""
 
     mass: float
     tensor: NDArray[np.float64]
     placement: Placement
 
+    def in_frame(self) -> NDArray[np.float64]:
+        """(3, 3) about the center, in the axes of the link [kg m^2]."""
+        tensor = self.placement.rotation @ self.tensor @ self.placement.rotation.T
+        return 0.5 * (tensor + tensor.T)
+
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """One link; without `inertia` it is a frame without mass."""
+    """One link; without `inertia` it has no mass."""
 
     name: str
     inertia: Inertia | None
-    collision: Geometry | None
+    collisions: tuple[Geometry, ...]
+    line: int
+
+
+@dataclass(frozen=True, eq=False)
+class Mimic:
+    """The coordinate that a joint should have: multiplier * that of another joint + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,52 +118,66 @@ class RobotJoint:
     friction: float
     effort: float
     velocity: float
+    mimic: Mimic | None
+    line: int
+
+    def moved(self, q: float) -> Placement:
+        """How the child's frame moves with the coordinate."""
+        axis = self.axis / (np.linalg.norm(self.axis) or 1.0)
+        if self.kind in ("revolute", "continuous"):
+            return Placement(rotation_matrix(q * axis))
+        return Placement(translation=q * axis) if self.kind == "prismatic" else Placement()
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A tree of links. ignored : what the file has and this program does not use."""
+    """A tree of links; links and joints by name, in the file's order."""
 
-    name: str
     links: dict[str, Link]
-    joints: tuple[RobotJoint, ...]
+    joints: dict[str, RobotJoint]
     root: str
-    ignored: tuple[str, ...]
+
+    @cached_property
+    def above(self) -> dict[str, RobotJoint]:
+        """By link, the joint to its parent."""
+        return {joint.child: joint for joint in self.joints.values()}
+
+    def downwards(self) -> list[str]:
+        """The links, parents first."""
+        children: dict[str, list[str]] = {}
+        for joint in self.joints.values():
+            children.setdefault(joint.parent, []).append(joint.child)
+        order = [self.root]
+        for name in order:  # which grows
+            order += children.get(name, [])
+        return order
 
 
-def read_robot(path: Path) -> Robot:
-    """Read a URDF file.
+def read_robot(path: Path, notes: Notes) -> Robot:
+    """Read a URDF file. What it has and this program does not use is noted.
 
     Raises
     ------
-    SceneError : where the file cannot be read, or does not describe a tree of links; one line with the path first.
+    Problem : where the file cannot be read, or does not describe a tree of links.
     """
-    try:
-        return _robot(parsed(path), path.parent)
-    except Problem as problem:
-        raise SceneError(f"{path}: {problem}") from None
-
-
-def _robot(root: ElementTree.Element, folder: Path) -> Robot:
-    ignored: dict[str, None] = {}
-    links = {}
-    for element in root.findall("link"):
-        link = _link(element, folder, ignored)
-        if link.name in links:
-            raise Problem(f"two links are called {printable(link.name)!r}; give each a different name")
-        links[link.name] = link
+    root = parsed(path)
+    for element in root.children:
+        if element.tag not in ("link", "joint", "material"):
+            notes.add(_UNUSED, f"<{element.tag}>")
+    links = _by_name(root.all("link"), lambda element: _link(element, notes))
     if not links:
         raise Problem("it has no link")
-    joints: dict[str, RobotJoint] = {}
-    for element in root.findall("joint"):
-        joint = _joint(element, links, ignored)
-        if joint.name in joints:
-            raise Problem(f"two joints are called {printable(joint.name)!r}; give each a different name")
-        joints[joint.name] = joint
-    for element in root:
-        if element.tag not in ("link", "joint", "material"):
-            ignored[f"<{printable(str(element.tag))}>"] = None
-    return Robot(root.get("name", "robot"), links, tuple(joints.values()), _root(links, joints), tuple(ignored))
+    joints = _by_name(root.all("joint"), lambda element: _joint(element, links, notes))
+    return Robot(links, joints, _root(links, joints))
+
+
+def _by_name(elements: list[Element], read: Callable[[Element], T]) -> dict[str, T]:
+    things: dict[str, T] = {}
+    for element in elements:
+        if (name := element.text("name")) in things:
+            raise element.problem(f"another {element.tag} has this name; give each a different one")
+        things[name] = read(element)
+    return things
 
 
 def _root(links: dict[str, Link], joints: dict[str, RobotJoint]) -> str:
@@ -139,145 +185,141 @@ def _root(links: dict[str, Link], joints: dict[str, RobotJoint]) -> str:
     parents: dict[str, str] = {}
     for joint in joints.values():
         if joint.child in parents:
-            raise Problem(f"link {printable(joint.child)!r} is the child of two joints; links must be a tree")
+            raise Problem(
+                f"link {printable(joint.child)!r} is the child of two joints; links must be a tree", joint.line
+            )
         parents[joint.child] = joint.parent
     roots = [name for name in links if name not in parents]
     if len(roots) > 1:
         text = ", ".join(repr(printable(name)) for name in roots[:5])
-        raise Problem(f"links {text} have no parent; join them, so that the links are one tree")
-    children: dict[str, list[str]] = {}
-    for child, parent in parents.items():
-        children.setdefault(parent, []).append(child)
-    reached, waiting = set(roots), list(roots)
-    while waiting:
-        below = children.get(waiting.pop(), [])
-        reached.update(below)
-        waiting += below
-    if len(reached) < len(links):
+        raise Problem(f"links {text} have no parent; join them, so that the links are one tree", links[roots[1]].line)
+    if not roots or len(Robot(links, joints, roots[0]).downwards()) < len(links):
+        reached = set(Robot(links, joints, roots[0]).downwards()) if roots else set()
         here = next(name for name in links if name not in reached)
         for _ in links:  # upwards, into the loop
             here = parents[here]
-        raise Problem(f"link {printable(here)!r} is its own ancestor; links must be a tree without loops")
+        text = f"link {printable(here)!r} is its own ancestor; links must be a tree without loops"
+        raise Problem(text, links[here].line)
     return roots[0]
 
 
-def _link(element: ElementTree.Element, folder: Path, ignored: dict[str, None]) -> Link:
-    name = attribute(element, "name", "a link")
-    what = f"link {printable(name)!r}"
-    found = element.findall("collision")
+def _note_others(element: Element, known: tuple[str, ...], notes: Notes) -> None:
+    for child in element.children:
+        if child.tag not in known:
+            notes.add(_UNUSED, f"<{child.tag}> of {element.owner}")
+
+
+def _link(element: Element, notes: Notes) -> Link:
+    _note_others(element, ("inertial", "collision", "visual"), notes)
+    found = [_geometry(one, notes) for one in element.all("collision")]
+    collisions = tuple(one for one in found if one is not None)
+    return Link(element.text("name"), _inertia(element, notes), collisions, element.line)
+
+
+def _inertia(element: Element, notes: Notes) -> Inertia | None:
+    found = element.all("inertial")
+    if not found:
+        return None
     if len(found) > 1:
-        ignored[f"{len(found) - 1} of the {len(found)} collision geometries of {what}"] = None
-    collision = _geometry(found[0], what, folder, ignored) if found else None
-    inertial = only(element, "inertial", what)
-    ignore_others(element, ("inertial", "collision", "visual"), what, ignored)
-    return Link(name, None if inertial is None else _inertia(inertial, what), collision)
+        notes.add("several <inertial>, of which the first counts", element.owner)
+    inertial = found[0]
+    if inertial.only("mass") is None:
+        notes.add("<inertial> without <mass>, as if there were none", element.owner)
+        return None
+    mass = inertial.child("mass").number("value")
+    if mass < 0.0:
+        raise inertial.problem(f"its mass is {mass:g} kg; it must be zero or more")
+    tensor = np.zeros((3, 3))
+    if (given := inertial.only("inertia")) is not None:
+        xx, yy, zz = (given.number(key) for key in ("ixx", "iyy", "izz"))
+        xy, xz, yz = (given.number(key, 0.0) for key in ("ixy", "ixz", "iyz"))
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return Inertia(mass, tensor, _origin(inertial)) if mass > 0.0 else None
 
 
-def _inertia(element: ElementTree.Element, what: str) -> Inertia:
-    mass = numbers(child_of(element, "mass", what), "value", what, 1)[0]
-    if mass <= 0.0:
-        raise Problem(f"{what}: its mass is {mass:g} kg; it must be above zero")
-    given = child_of(element, "inertia", what)
-    xx, xy, xz, yy, yz, zz = (numbers(given, key, what, 1)[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-    return Inertia(mass, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), _origin(element, what))
-
-
-def _geometry(element: ElementTree.Element, what: str, folder: Path, ignored: dict[str, None]) -> Geometry:
-    inside = list(child_of(element, "geometry", what))
+def _geometry(element: Element, notes: Notes) -> Geometry | None:
+    """None where it has no size: such are marks of points."""
+    inside = element.child("geometry").children
     if len(inside) != 1:
-        raise Problem(f"{what}: its collision geometry has {len(inside)} shapes; give one")
-    shape, placement = inside[0], _origin(element, what)
+        raise element.problem(f"its collision geometry has {len(inside)} shapes; give one")
+    shape, placement = inside[0], _origin(element)
     if shape.tag == "mesh":
-        scale = numbers(shape, "scale", what, 3) if "scale" in shape.attrib else (1.0, 1.0, 1.0)
-        if not scale[0] == scale[1] == scale[2] > 0.0:
-            raise Problem(f"{what}: the scale of its mesh is {scale}; give three equal numbers above zero")
-        return Geometry("mesh", scale[:1], placement, _mesh_file(attribute(shape, "filename", what), what, folder))
-    keys = {"box": (("size", 3),), "cylinder": (("radius", 1), ("length", 1)), "sphere": (("radius", 1),)}
-    if shape.tag not in keys:
-        raise Problem(
-            f"{what}: geometry <{printable(str(shape.tag))}> does not exist; there are box, cylinder, sphere, mesh"
-        )
-    lengths = tuple(number for key, count in keys[shape.tag] for number in numbers(shape, key, what, count))
-    if min(lengths) <= 0.0:
-        raise Problem(f"{what}: its {shape.tag} has a length of {min(lengths):g} m; it must be above zero")
+        scale = shape.numbers("scale", 3, 1.0)
+        if 0.0 in scale:
+            raise shape.problem(f"the scale of its mesh is {scale}; give numbers that are not zero")
+        return Geometry("mesh", scale, placement, shape.text("filename"))
+    if shape.tag not in _SHAPES:
+        names = ", ".join(_SHAPES)
+        raise shape.problem(f"geometry <{printable(shape.tag)}> does not exist; there are {names}, mesh")
+    lengths = tuple(number for key, count in _SHAPES[shape.tag] for number in shape.numbers(key, count))
+    if min(lengths) < 0.0:
+        raise shape.problem(f"its {shape.tag} has a length of {min(lengths):g} m; it must be above zero")
+    if min(lengths) == 0.0 and (shape.tag, lengths[-1]) != ("capsule", 0.0):
+        notes.add("collision geometry of size 0, left out", element.owner)
+        return None
     return Geometry(shape.tag, lengths, placement)
 
 
-def _mesh_file(name: str, what: str, folder: Path) -> str:
-    """The file of a mesh relative to the folder; of a package, below the nearest folder above with its name."""
-    path = Path(name.removeprefix("file://"))
-    if path.suffix.lower() not in SURFACE_FILES:
-        raise Problem(f"{what}: the mesh {printable(name)!r} is not one of {', '.join(SURFACE_FILES)}; convert it")
-    if name.startswith("package://"):
-        package, _, rest = name.removeprefix("package://").partition("/")
-        above = [folder.resolve(), *folder.resolve().parents]
-        home = next((one for one in above if one.name == package), None) or next(
-            (one / package for one in above[:3] if (one / package).is_dir()), folder
-        )
-        path = home / rest
-    try:
-        there = (folder / path).resolve()
-        if not there.is_file():
-            raise Problem(f"{what}: mesh {printable(name)!r} does not exist")
-        return Path(os.path.relpath(there, folder.resolve())).as_posix()
-    except (OSError, ValueError):
-        raise Problem(f"{what}: the mesh {printable(name)!r} cannot be read") from None
-
-
-def _joint(element: ElementTree.Element, links: dict[str, Link], ignored: dict[str, None]) -> RobotJoint:
-    name = attribute(element, "name", "a joint")
-    what = f"joint {printable(name)!r}"
-    kind = attribute(element, "type", what)
+def _joint(element: Element, links: dict[str, Link], notes: Notes) -> RobotJoint:
+    kind = element.text("type")
     if kind not in JOINTS:
-        raise Problem(f"{what}: its type {printable(kind)!r} is not supported; there are {', '.join(JOINTS)}")
-    parent, child = (attribute(child_of(element, key, what), "link", what) for key in ("parent", "child"))
+        raise element.problem(f"its type {printable(kind)!r} is not supported; there are {', '.join(JOINTS)}")
+    parent, child = (element.child(key).text("link") for key in ("parent", "child"))
     for end in (parent, child):
         if end not in links:
-            raise Problem(f"{what}: link {printable(end)!r} does not exist")
+            raise element.problem(f"link {printable(end)!r} does not exist")
     if parent == child:
-        raise Problem(f"{what}: it joins link {printable(parent)!r} to itself")
-    ignore_others(element, ("parent", "child", "origin", "axis", "limit", "dynamics"), what, ignored)
+        raise element.problem(f"it joins link {printable(parent)!r} to itself")
+    _note_others(element, ("parent", "child", "origin", "axis", "limit", "dynamics", "mimic"), notes)
     axis = np.array([1.0, 0.0, 0.0])
-    if (given := only(element, "axis", what)) is not None:
-        axis = np.array(numbers(given, "xyz", what, 3))
-    if kind in ("revolute", "continuous", "prismatic") and not axis.any():
-        raise Problem(f"{what}: its axis has no length; give a direction")
-    dynamics = only(element, "dynamics", what)
-    damping, friction = (
-        0.0 if dynamics is None or key not in dynamics.attrib else numbers(dynamics, key, what, 1)[0]
-        for key in ("damping", "friction")
+    if (given := element.only("axis")) is not None:
+        axis = np.array(given.numbers("xyz", 3))
+    if kind not in ("fixed", "floating") and not axis.any():
+        raise element.problem("its axis has no length; give a direction")
+    efforts = _amounts(element, "dynamics", ("damping", "friction"))
+    most = _amounts(element, "limit", ("effort", "velocity"))
+    limits, mimic = _limits(element, kind, notes), None
+    if kind != "fixed" and (given := element.only("mimic")) is not None:
+        notes.add("<mimic> is not simulated (it only gives the start)", element.owner)
+        mimic = Mimic(given.text("joint"), given.number("multiplier", 1.0), given.number("offset", 0.0))
+    name, origin, line = element.text("name"), _origin(element), element.line
+    damping, friction, effort, velocity = (*efforts, *most)
+    joint = RobotJoint(
+        name, kind, parent, child, origin, axis, limits, damping, friction, effort, velocity, mimic, line
     )
-    if damping < 0.0 or friction < 0.0:
-        raise Problem(f"{what}: its damping or friction is below zero")
-    limits = _limits(element, kind, what)
-    limit = only(element, "limit", what)
-    most = {}
-    for key in ("effort", "velocity"):
-        most[key] = 0.0 if limit is None or key not in limit.attrib else numbers(limit, key, what, 1)[0]
-        if most[key] < 0.0:
-            raise Problem(f"{what}: its {key} limit is {most[key]:g}; it must be zero or more")
-    return RobotJoint(name, kind, parent, child, _origin(element, what), axis, limits, damping, friction, **most)
+    if limits is None or limits[0] < limits[1]:
+        return joint
+    notes.add("fixed, since its limits leave no travel (those that are not given are 0)", element.owner)
+    return replace(joint, kind="fixed", placement=origin.then(joint.moved(limits[0])), limits=None, mimic=None)
 
 
-def _limits(element: ElementTree.Element, kind: str, what: str) -> tuple[float, float] | None:
+def _amounts(element: Element, tag: str, keys: tuple[str, ...]) -> list[float]:
+    """Attributes of a child that are zero where they are not given, and may not be below."""
+    given = element.only(tag)
+    values = [0.0 if given is None else given.number(key, 0.0) for key in keys]
+    for key, value in zip(keys, values, strict=True):
+        if value < 0.0:
+            raise element.problem(f"its {key} is {value:g}; it must be zero or more")
+    return values
+
+
+def _limits(element: Element, kind: str, notes: Notes) -> tuple[float, float] | None:
+    """The ends of the coordinate; those that are not given are zero, as the format says."""
     if kind not in ("revolute", "prismatic"):
         return None
-    limit = child_of(element, "limit", what)
-    low, high = (numbers(limit, key, what, 1)[0] if key in limit.attrib else 0.0 for key in ("lower", "upper"))
-    if not low < high:
-        raise Problem(f"{what}: its limits are {low:g} and {high:g}; the lower one must be below the upper one")
+    limit = element.child("limit")
+    low, high = limit.number("lower", 0.0), limit.number("upper", 0.0)
+    if low > high:
+        raise limit.problem(f"its limits are {low:g} and {high:g}; the lower one must be below the upper one")
     return low, high
 
 
-def _origin(element: ElementTree.Element, what: str) -> Placement:
+def _origin(element: Element) -> Placement:
     """Of the child <origin>: fixed axes, roll about x first, then pitch about y, then yaw about z."""
-    origin = only(element, "origin", what)
+    origin = element.only("origin")
     if origin is None:
         return Placement()
-    place, angles = (
-        numbers(origin, key, what, 3) if key in origin.attrib else (0.0, 0.0, 0.0) for key in ("xyz", "rpy")
-    )
     R = np.eye(3)
-    for angle, axis in zip(angles, np.eye(3), strict=True):
+    for angle, axis in zip(origin.numbers("rpy", 3, 0.0), np.eye(3), strict=True):
         R = rotation_matrix(angle * axis) @ R
-    return Placement(R, np.array(place))
+    return Placement(R, np.array(origin.numbers("xyz", 3, 0.0)))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import POLYGON, CellSoup, FormatError
+from supple.mesh.io.cells import POLYGON, CellSoup, FormatError, checked
 from supple.mesh.io.libraries.positions_file import Facts, written_series
 from supple.mesh.io.libraries.usd import rows_of
 from supple.mesh.io.polygons import triangles_of
@@ -99,7 +99,7 @@ def _cells(prim: Any, code: Any, points: NDArray[np.float64]) -> tuple[int, NDAr
         return 3, np.zeros((0, 3), dtype=np.int64)
     if (sizes < 0).any() or sizes.sum() != len(flat):
         raise FormatError(f"{prim.GetPath()}: the numbers of corners of its faces contradict its faces")
-    return 3, triangles_of(CellSoup.of_blocks(points, [(POLYGON, sizes, flat)]))
+    return 3, triangles_of(checked(CellSoup.of_blocks(points, [(POLYGON, sizes, flat)])))
 
 
 def _indices(prim: Any) -> list[Any]:

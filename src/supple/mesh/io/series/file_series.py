@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.mesh.io.cells import CellSoup, FormatError, MeshFile
-from supple.mesh.io.mesh_files import SURFACE_READERS, TET_READERS, located
+from supple.mesh.io.cells import CellSoup, FormatError
+from supple.mesh.io.mesh_files import located, read_contents
 from supple.mesh.io.series.series import Cells, OtherCells, Series
 from supple.mesh.io.tets_and_triangles import cells_of
-from supple.mesh.io.text import file_contents
 
-READERS = TET_READERS | SURFACE_READERS
 MAX_FRAMES = 1_000_000
 
 
@@ -76,11 +74,7 @@ class FileSeries(Series):
 
 def soup_of(path: Path) -> CellSoup:
     """The points and cells of a file, as its reader for the extension finds them."""
-    try:
-        found = READERS[path.suffix.lower()](file_contents(path))
-    except FormatError as error:
-        raise located(path, error) from None
-    soup = found.soup if isinstance(found, MeshFile) else found
+    soup = read_contents(path).soup
     if len(soup.points) == 0:
         raise MeshError(f"{path}: it has no points")
     return soup

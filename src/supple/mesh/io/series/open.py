@@ -18,9 +18,9 @@ from supple.errors import MeshError
 from supple.mesh.io.cells import FormatError
 from supple.mesh.io.in_child import arrays_in_child
 from supple.mesh.io.libraries.usd import INSTALL, USD_SUFFIXES
-from supple.mesh.io.mesh_files import located
+from supple.mesh.io.mesh_files import READERS, located
 from supple.mesh.io.series.arrays import is_array_folder, read_folder, read_npz
-from supple.mesh.io.series.file_series import MAX_FRAMES, READERS, FileSeries
+from supple.mesh.io.series.file_series import MAX_FRAMES, FileSeries
 from supple.mesh.io.series.series import ArraySeries, Cells, Series
 from supple.mesh.io.text import file_contents
 

@@ -228,8 +228,7 @@ class Works(FrameCheck):
         # An implicit step takes m (v' - v) v', which differs from the change of kinetic energy by the second term.
         change = at.velocities[rows] - last.velocities[rows]
         left_open = 0.5 * abs(after - before) + 0.5 * float(m @ np.einsum("ij,ij->i", change, change))
-        if self._implicit:  # XPBD counts no viscous forces on pins
-            left_open += self._of_viscous_forces(last, at, moved, after - before)
+        left_open += self._of_viscous_forces(last, at, moved, after - before)
         for name, (on_vertices, left) in by_name.items():
             if name != "contact" or self._open["contact"] is None:
                 work -= float(on_vertices[rows].sum())

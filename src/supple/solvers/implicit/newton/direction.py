@@ -44,9 +44,8 @@ class Tools:
 
     def freed(self, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
         """A gradient (n, 3) by the free vertices: zero where pinned or welded."""
-        out = gradient.copy()
-        if self.linear_solver.reduction is not None:
-            self.linear_solver.reduction.reduce(out)
+        reduction = self.linear_solver.reduction
+        out = gradient.copy() if reduction is None else reduction.welding.reduced(gradient)
         out[self.pinned] = 0.0
         return out
 

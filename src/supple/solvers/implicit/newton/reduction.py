@@ -80,12 +80,6 @@ class Reduction:
         of_vertices = _expanded(stands_for, weights, welding.vertices, welding.vertices, np.arange(s), s)
         return cls(welding, welded, stands_for, weights, near, of_elements, of_vertices)
 
-    def reduce(self, gradient: NDArray[np.float64]) -> None:
-        """Replace a gradient (n, 3), in place, by that of the free vertices; zero for welded ones."""
-        shares = self.welding.weights[:, :, None] * gradient[self.welding.vertices][:, None, :]
-        gradient[self.welding.vertices] = 0.0
-        np.add.at(gradient, self.welding.control, shares)
-
     def couplings(self, hessian: HessianBlocks) -> list[Couplings]:
         """What the Hessian adds beyond the blocks of elements between vertices that are not welded."""
         blocks = hessian.elements[self.elements].reshape(-1, 4, 3, 4, 3).transpose(0, 1, 3, 2, 4)

@@ -1,4 +1,4 @@
-"""Rigid bodies in a step: the nearest rigid places, and how far from rigid bodies are."""
+"""Rigid bodies in a step: the nearest rigid places, how far from rigid bodies are, and forces on welded vertices."""
 
 from __future__ import annotations
 
@@ -22,3 +22,15 @@ def orthogonality_errors(system: System, x: NDArray[np.float64]) -> dict[str, fl
         part.name: orthogonality_error(system.rest_positions[part.vertices], x[part.vertices])
         for part in system.rigid_bodies
     }
+
+
+def weld_forces(system: System, gradient: NDArray[np.float64]) -> dict[str, NDArray]:
+    """The forces (3,) of rigid bodies on the vertices that are welded to them, by name of the weld [N].
+
+    Parameters
+    ----------
+    gradient : (n, 3) of the whole objective at the end of a step [N]
+    """
+    welding, welds = system.welding, system.scene.welds
+    shares = gradient[welding.vertices]
+    return {str(weld.name): shares[welding.weld == k].sum(axis=0) for k, weld in enumerate(welds)}

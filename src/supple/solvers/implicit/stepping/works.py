@@ -102,7 +102,7 @@ def works_of_step(
             gradient = np.zeros_like(x)
             term.add_gradient(x, gradient)
             add_works(works, {term.work: -plan.place * inner(gradient, moved)})
-    left = plan.place * np.einsum("ij,ij->i", outcome.end.gradient, moved)
+    left = plan.place * np.einsum("ij,ij->i", system.welding.reduced(outcome.end.gradient), moved)
     held = system.pinned_vertices
     pins = float(left[held].sum())
     flowed = dissipated_energy(system.laws, before.internal) - dissipated_energy(system.laws, internal)

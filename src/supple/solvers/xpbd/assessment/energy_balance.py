@@ -1,8 +1,7 @@
 """Energy without a source in a frame: what the bodies gained, less the work that was done on them.
 
 Kinetic, elastic and potential energy, and that of stitches, of all vertices; `Works` has the works of loads, actuators,
-motors and pins. Contact does work where obstacles move: what it adds is theirs, as far as it exceeds what it takes. The
-work of joints that hold to what is moved is not known: such scenes are not judged.
+motors and pins. Contact does work where obstacles move: what it adds is theirs, as far as it exceeds what it takes.
 
 The energy that violated hard constraints can release is an upper bound: it counts where it falls, not where it rises.
 
@@ -41,22 +40,13 @@ class EnergyBalance:
     Attributes
     ----------
     elastic : energy of the bodies
-    is_judged : whether the work of everything that moves is known
     """
 
     def __init__(self, system: System, edge_length: float) -> None:
         self.system = system
         self._masses = system.masses
         self.elastic = ElasticEnergy(system)
-        held = np.zeros(len(system.masses), dtype=np.bool_)
-        for pin in system.pins:
-            if pin.motion is not None:
-                held[pin.vertices] = True
-        driven = {part.name for part in system.rigid_bodies if held[part.vertices].any()}
-        moving = {str(obstacle.name) for obstacle in system.obstacles if obstacle.motion is not None}
-        joined = {name for joint in system.scene.joints for name in (joint.first, joint.second)}
-        self._obstacles_move = bool(moving)
-        self.is_judged = not joined & (moving | driven)
+        self._obstacles_move = any(obstacle.motion is not None for obstacle in system.obstacles)
         fall = LEAST_FALL * edge_length * math.hypot(*system.gravity)
         self._least = LEAST_STRAIN**2 * _stiffness(system) + fall * float(self._masses.sum())
         self._begun = np.zeros(len(system.bodies))
@@ -75,7 +65,7 @@ class EnergyBalance:
         work += max(0.0, works["contact"] + works["friction"]) if self._obstacles_move else 0.0
         ended, total = self._measure(moment)
         given_out = max(self._hard - self._in_hard_constraints(moment), 0.0)
-        gain = total - self._total - work - given_out if self.is_judged else 0.0
+        gain = total - self._total - work - given_out
         scale = max(float(self._begun.sum()), float(ended.sum()), work, given_out, self._least)
         return gain, scale, int((ended - self._begun).argmax())
 

@@ -23,6 +23,7 @@ from supple.model.actuator_readings import actuator_fields
 from supple.model.energy_balance import works_of_actuators
 from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.cables import CableLength, limits, turn_at
+from supple.model.loads.actuators.laws import GivenValue
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.assessment.moment import Substep
@@ -75,13 +76,10 @@ class ActuatorProjection:
         """Those of the frame so far, by name [J]."""
         return works_of_actuators(self.system, self._works())
 
-    def acting(self, at: Substep) -> Floats:
-        """(n, 3) the forces of the substep on all vertices, at their places at its end [N]."""
-        out = np.zeros_like(at.velocities)
+    def add_forces(self, at: Substep, out: Floats) -> None:
+        """Add the forces of the substep on all vertices to `out` (n, 3) [N]."""
         for each in self._all:
-            rows = each.coordinate.vertices
-            out[rows] += np.einsum("p,pij->ij", each.forces, each.coordinate.part_gradients(at.world(rows)))
-        return out
+            out[each.coordinate.vertices] += np.einsum("p,pij->ij", each.forces, each.gradients)
 
     def _works(self) -> list[Floats]:
         return [each.works for each in self._all]
@@ -93,6 +91,7 @@ class _Projected:
     Attributes
     ----------
     begun : parts where the substep began; forces : of the substep; impulses, works : of the frame
+    gradients : (p, v, 3) of the parts along which the forces of the substep act
     """
 
     def __init__(self, actuator: Actuator) -> None:
@@ -100,7 +99,7 @@ class _Projected:
         p, v = self.coordinate.count, len(self.coordinate.vertices)
         self.begun, self.forces, self.impulses, self.works, self._parts = np.zeros((5, p))
         self._own, self._total, self._moved = np.zeros((3, v, 3))
-        self._gradients = np.zeros((p, v, 3))
+        self.gradients = np.zeros((p, v, 3))
 
     def begin_frame(self, at: Substep) -> None:
         self._place(at)
@@ -112,16 +111,16 @@ class _Projected:
         rows, h2 = self.coordinate.vertices, at.h**2
         self._place(at)
         if places is not None:
-            self.coordinate.differentiate(places, np.empty_like(self._parts), self._gradients)
-        mobility, s = _mobility(at.points, rows, h2, self._parts, self._gradients, self._total, self._moved)
+            self.coordinate.differentiate(places, np.empty_like(self._parts), self.gradients)
+        mobility, s = _mobility(at.points, rows, h2, self._parts, self.gradients, self._total, self._moved)
         self.forces[:] = 0.0
-        if mobility <= 0.0:
+        if mobility <= 0.0 and isinstance(self.actuator.law, GivenValue):  # no force is enough
             return
         force = self.actuator.law.reached(at.time, s, mobility)
         self.forces[:] = force
         self._moved *= force
         if self.actuator.friction > 0.0 and isinstance(self.coordinate, CableLength):
-            spans = (*self.coordinate.spans(self._own), self.begun, self._gradients)
+            spans = (*self.coordinate.spans(self._own), self.begun, self.gradients)
             _stop_slips(at.points, rows, h2, spans, self.actuator.friction, self._total, self._moved, self.forces)
         _move(at.points, rows, self._moved)
 
@@ -133,7 +132,7 @@ class _Projected:
     def _place(self, at: Substep) -> None:
         """Set what depends on the positions."""
         _gather(at.points, at.origins, self.coordinate.vertices, self._own)
-        self.coordinate.differentiate(self._own, self._parts, self._gradients)
+        self.coordinate.differentiate(self._own, self._parts, self.gradients)
 
 
 @njit(cache=True)

@@ -118,6 +118,7 @@ class Damping:
         touched = np.unique(np.concatenate([vertices.ravel() for vertices, *_ in self._elements])).astype(np.int64)
         movable = inverse_masses[touched] > 0.0
         rows, self._held = touched[movable], touched[~movable]
+        self._rows = np.concatenate([rows, self._held])
         self._groups = vertex_groups(rows, self._placed, system.joined_components, system.components)
         self._masses = np.zeros(len(inverse_masses))
         self._masses[:n] = system.masses if system.effective_masses is None else system.effective_masses
@@ -204,8 +205,11 @@ class Damping:
 
     @property
     def acting(self) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
-        """The damped vertices (k,) and the present viscous forces on them (k, 3) [N]."""
-        return self._groups.rows, self._forces
+        """The damped vertices and anchors (k,), and the viscous forces on them (k, 3) [N].
+
+        Those that are held come last; their forces are those of the velocities that the cycle began with.
+        """
+        return self._rows, np.concatenate([self._forces, -self._viscous[self._held, :3]])
 
     def memory(self, state_velocities: NDArray[np.float64]) -> ViscousMemory:
         """Of a state with these velocities (n, 3), in the scene's numbering."""

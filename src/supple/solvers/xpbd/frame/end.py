@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.model.pin_reactions import pin_labels
 from supple.model.state import State, Status, StepReport
+from supple.model.system import System
 from supple.solvers.xpbd.assessment.findings import HELD_TOLERANCE, Findings
 from supple.solvers.xpbd.assessment.softening import enough
 from supple.solvers.xpbd.assessment.surfaces import Overlap, crossings
@@ -16,6 +21,8 @@ from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.sleep import SleepMemory
 from supple.solvers.xpbd.substeps import FALL, Substeps
 from supple.solvers.xpbd.workspace import XPBDWorkspace
+
+Forces = Mapping[str, NDArray[np.float64]]
 
 # From this number of substeps, the remedy is another solver or a rigid body.
 IMPRACTICAL = 5000
@@ -46,7 +53,7 @@ def end_frame(
     to_world(ws.points, ws.origins, ws.world)
     ws.world[ws.system.pinned_vertices] = ws.system.pin_targets(time)
     held_back = ws.contact.counts.cut
-    ws.works.end_frame(ws.velocities, ws.actuators.works())
+    ws.works.end_frame(ws.velocities, ws.actuators.works(), dt)
     held, works = held_back / used.count, ws.works.by_name
     softening = ws.assessment.softening
     delivered = ws.delivered.end(ws.points, h)
@@ -101,12 +108,16 @@ def end_frame(
         asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
         contact_forces=pushes,
         friction_forces=friction,
-        weld_forces=ws.welded.forces(ws.rigid, ws.velocities, dt, sleep.asleep),
+        weld_forces=ws.welded.forces(ws.rigid, ws.velocities, ws.works.held.impulses(len(v)), dt),
         **ws.actuators.fields(h * used.count),
         **ws.joints.fields(ws.world, time),
+        reaction_forces=ws.works.held.reactions,
         work=works,
         energy_residual=ws.works.residual,
     )
+    details = replace(details, **_at_rest(ws.system, details, sleep, before.at_rest))
+    if rest.asleep.any():
+        memory = replace(memory, at_rest=_at_rest(ws.system, details, rest))
     places = ws.contact.places()
     message = findings.message(time, _remedy(findings, used.count, shares, accuracy, setting))
     report = StepReport(
@@ -117,6 +128,35 @@ def end_frame(
         contacts=lambda: forces.contact_points(places, old_points),
     )
     return State(time, x, v, memory=memory, hinge_angles=ws.joints.hinge_angles()), report, problem
+
+
+def _at_rest(
+    system: System, details: XPBDDetails, sleep: SleepMemory, known: Mapping[str, Forces] | None = None
+) -> dict[str, Forces]:
+    """The forces of joints, welds and pins of a frame, by the name of their field: of bodies at rest those `known`.
+
+    Without these, only those of bodies at rest.
+    """
+    if not sleep.asleep.any():
+        return {}
+    bodies = {part.name for part, rests in zip(system.bodies, sleep.asleep, strict=True) if rests}
+    joints = [str(joint.name) for joint in system.scene.joints if joint.first in bodies]
+    welds = [str(weld.name) for weld in system.scene.welds if weld.body in bodies]
+    pins = [label for label, pin in zip(pin_labels(system), system.pins, strict=True) if pin.pin.body in bodies]
+    found = {}
+    for field, names in {
+        "joint_forces": joints,
+        "joint_torques": joints,
+        "weld_forces": welds,
+        "reaction_forces": pins,
+    }.items():
+        now = getattr(details, field)
+        names = [name for name in names if name in now]
+        if known is None:
+            found[field] = {name: now[name] for name in names}
+        else:
+            found[field] = {**now, **{name: known[field][name] for name in names if name in known.get(field, {})}}
+    return found
 
 
 def _remedy(findings: Findings, used: int, shares: Mapping[str, float], accuracy: float, setting: str) -> str:

@@ -37,7 +37,6 @@ def substep(
     if len(targets):
         hold(x, ws.system.pinned_vertices, targets, ws.origins)
     ws.rigid.follow(x, v)
-    ws.works.begin_substep(ws.extended)
     ws.anchors.place(ws.extended, ws.origins, end)
     at = ws.substep(end, h)
     ws.loads.add_forces(at)  # 3
@@ -60,10 +59,10 @@ def substep(
     contact.keep(rows)
     contact.admit(rows, low)  # 8: (C7)
     if len(ws.joints):
-        add_works(ws.works.by_name, {"joints": ws.joints.end_substep(x, ws.origins, end, h)})
+        add_works(ws.works.by_name, {"joints": ws.joints.end_substep(x, x_n, ws.origins, end, h)})
     ws.actuators.end_substep(at)
     forces = [*ws.loads.acting] if damping is None else [*ws.loads.acting, ("damping", *damping.acting)]
-    ws.works.end_substep(at, forces, contact, ws.extended, ws.actuators.acting)
+    ws.works.end_substep(at, forces, contact, ws.extended, (ws.actuators.add_forces, ws.joints.add_forces))
 
 
 def push(ws: XPBDWorkspace, damping: Damping | None, h: float) -> None:

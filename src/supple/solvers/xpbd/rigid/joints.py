@@ -30,6 +30,7 @@ from supple.model.joints.laws import Laws, laws_of, wrapped
 from supple.model.state import State
 from supple.model.system import System
 from supple.numerics.cross_rows import cross_rows
+from supple.solvers.xpbd.assessment.moment import Substep
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joint_rows import JointRows
 from supple.solvers.xpbd.sweeps.ordering import Layout
@@ -66,6 +67,10 @@ class JointProjection:
         self._g = np.zeros(len(g.functions))
         self._total = np.zeros((len(g.joints), 6))
         self._motors = np.zeros(len(g.joints))
+        moving = {obstacle.name for obstacle in system.obstacles if obstacle.motion is not None}
+        self._driven = np.array([joint.second in moving for joint in g.joints], dtype=np.bool_)
+        # The gradients of the rows by control points, and the forces of the substep on these.
+        self._gradients, self._on_corners = np.zeros((0, 8, 3)), np.zeros((len(g.joints), 8, 3))
         self._substeps = 0
         # The laws of the substep, their multipliers, values at its beginning, and impulses so far.
         self._laws, self._multipliers = Laws.of([])
@@ -93,6 +98,7 @@ class JointProjection:
         begun = self._functions(previous + origins, end - h)
         self._laws, self._multipliers = laws_of(self.geometry, np.ones(len(self)), begun, (end - h, end), moving=True)
         self._begun, self._impulses = begun[self._laws.function], np.zeros(len(self._laws.k))
+        self._on_corners[:] = 0.0
         self._substeps += 1
 
     def rows(
@@ -117,8 +123,15 @@ class JointProjection:
         self._impulses += impulses[first:]
         self._note(rows, impulses / h**2, first, x)
 
-    def end_substep(self, points: Floats, origins: Floats, end: float, h: float) -> float:
-        """Follow the angles of hinges over all turns; returns the work of the laws in the substep of h [J]."""
+    def add_forces(self, at: Substep, out: Floats) -> None:
+        """Add the forces of the substep on control points to `out` (n, 3) [N]."""
+        np.add.at(out, self.geometry.corners, self._on_corners)
+
+    def end_substep(self, points: Floats, previous: Floats, origins: Floats, end: float, h: float) -> float:
+        """Follow the angles of hinges over all turns; returns the work on the bodies in the substep of h [J].
+
+        Conditions between bodies do none: what one side gives, the other takes.
+        """
         if not len(self):
             return 0.0
         self._g = self._functions(points[:, :3] + origins, end)
@@ -127,7 +140,11 @@ class JointProjection:
         rows = laws.function[motors]
         ways = np.column_stack([laws.start[motors] - self._g[rows], laws.start[motors] - self._begun[motors]])
         np.add.at(self._lacking, self.geometry.arguments[0].joint[rows], ways / self.geometry.units[rows, None])
-        return float(self._impulses @ (self._g[self._laws.function] - self._begun)) / h**2
+        of_laws = self._impulses * (self._g[laws.function] - self._begun) / h**2
+        corners = self.geometry.corners[self._driven]
+        moved = points[corners, :3] - previous[corners]
+        driven = float(np.einsum("jci,jci->", self._on_corners[self._driven], moved))
+        return driven + float(of_laws[~self._driven[self.geometry.arguments[0].joint[laws.function]]].sum())
 
     def hinge_angles(self) -> dict[str, float]:
         """As of `State`."""
@@ -222,6 +239,7 @@ class JointProjection:
             high.append(-h * h * np.where(given, multipliers, laws.low))
             sizes.append(g.units[laws.function])
         G, j = np.concatenate(gradients), np.concatenate(joint)
+        self._gradients = G
         forces = np.stack([G[:, :4].sum(axis=1), G[:, 4:].sum(axis=1)], axis=1)
         turns = cross_rows(arms[j], G)
         moments = np.stack([turns[:, :4].sum(axis=1), turns[:, 4:].sum(axis=1)], axis=1)
@@ -251,6 +269,7 @@ class JointProjection:
         arms = places - x[g.corners[:, :4]].mean(axis=1)
         actions[:, 3:] -= cross_rows(arms, actions[:, :3])
         self._total += actions
+        np.add.at(self._on_corners, joint, forces[:, None, None] * self._gradients)
         np.add.at(self._motors, joint[first_law:][laws.is_motor], forces[first_law:][laws.is_motor])
 
 

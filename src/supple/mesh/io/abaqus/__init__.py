@@ -1,0 +1,1 @@
+"""Abaqus's input files (.inp)."""
