@@ -26,7 +26,13 @@ supply(
 
 def __getattr__(name: str) -> Any:
     # `sp.Box` is short for `sp.obstacles.Box`. It is not listed, because a box can also be a body: `sp.shapes.box`.
-    return getattr(_listed("obstacles"), name) if name in _OBSTACLES else _listed(name)
+    if name in _OBSTACLES:
+        return getattr(_listed("obstacles"), name)
+    if name in __all__ or name.startswith("__"):
+        return _listed(name)
+    from .kinds.suggestion import suggestion
+
+    raise AttributeError(f"supple has no name {name!r}; {suggestion(name, [*__all__, *_OBSTACLES])}", name=name)
 
 
 def __dir__() -> list[str]:

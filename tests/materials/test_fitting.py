@@ -86,8 +86,11 @@ def test_treloars_rubber(tmp_path, capsys):
 def test_wrong_tests_are_one_clear_line(tmp_path):
     path = tmp_path / "test.csv"
     for text, message in (
-        ("force,length\n1,2\n", "test.csv: has the columns force, length; name two of them stretch and stress"),
-        ("stretch,stress\n1.1,abc\n", "test.csv: a row has no number in the columns stretch and stress"),
+        (
+            "force,length\n1,2\n",
+            "test.csv: has the columns force, length; name two of them stretch and stress, or extension and load",
+        ),
+        ("stretch,stress\n1.1,abc\n", "test.csv:2: has no number in the column stress"),
         ("stretch,stress\n-1.1,2\n", "test.csv: row 1 of the data is not a stretch above 0"),
         ("strain,stress\n0.1,1e5\n0.2,2e5\n", "2 data with a stretch other than 1 for 2 parameters"),
     ):
@@ -103,3 +106,55 @@ def test_wrong_tests_are_one_clear_line(tmp_path):
     falling = np.column_stack([STRETCH, -mooney_stress(2e5, 3e4, STRETCH, "uniaxial")])
     with pytest.raises(SceneError, match="has the shear modulus -460000 Pa at rest"):
         sp.fit_material(sp.MooneyRivlin, falling)
+
+
+MACHINES = {
+    "english": "Specimen,A7\nRate (mm/min),50\n\nTime (s),Extension (mm),Load (N)\n{rows}",
+    "a line of units": 'Time,Extension,Load\n"(s)","(mm)","(N)"\n{rows}',
+    "semicolons and decimal commas": "Probe;7\nZeit;Travel [mm];Standard force [N]\n{rows}",
+    "kilonewtons": "time [s]\tdisplacement [mm]\tforce [kN]\n{rows}",
+    "strain in per cent and MPa": "Time (s),Tensile strain (%),Tensile stress (MPa)\n{rows}",
+}
+
+
+@pytest.mark.parametrize("kind", MACHINES)
+def test_files_of_machines_are_read_as_they_are(tmp_path, capsys, kind):
+    area, length = 12e-6, 0.025
+    stress = mooney_stress(2e5, 3e4, STRETCH, "uniaxial")
+    travel, load = (STRETCH - 1.0) * length * 1e3, stress * area
+    if kind == "kilonewtons":
+        load = load * 1e-3
+    if kind.startswith("strain"):
+        travel, load = 100.0 * (STRETCH - 1.0), stress * 1e-6
+    separator = {"semi": ";", "kilo": "\t"}.get(kind[:4], ",")
+    lines = [separator.join(f"{x:.12g}" for x in row) for row in zip(range(24), travel, load, strict=True)]
+    text = MACHINES[kind].format(rows="\n".join(lines))
+    path = tmp_path / "test.csv"
+    path.write_text(text.replace(".", ",") if separator == ";" else text, encoding="latin-1")
+    fit = sp.fit_material(sp.MooneyRivlin, path, area=area, length=length)
+    np.testing.assert_allclose(fit.values, [2e5, 3e4], rtol=1e-8)
+    assert main(["fit", "mooney_rivlin", "--uniaxial", str(path), "--area", "12e-6", "--length", "0.025"]) == 0
+    assert "material:" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "options"),
+    [
+        ("Extension (mm),Load (N)\n1,2\n", "travel of a machine; give the length of the specimen", {"area": 1e-6}),
+        ("Extension (mm),Load (N)\n1,2\n", "load of a machine; give the area of the specimen", {"length": 1.0}),
+        ("Extension,Load (N)\n1,2\n", "the column travel has no unit; give one of m, cm, mm", {}),
+        ("stretch,stress [bar]\n1,2\n", "the column stress has the unit 'bar'; give one of pa, kpa", {}),
+        ("stretch,stress\n1,2\n", "area is -1; give a finite number above zero", {"area": -1.0}),
+    ],
+)
+def test_what_a_machine_s_file_lacks_is_said(tmp_path, text, words, options):
+    path = tmp_path / "test.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match=words):
+        sp.fit_material(sp.MooneyRivlin, path, **options)
+
+
+def test_the_unit_that_a_column_names_is_used_unless_another_one_is_given():
+    own = sp.fit_material(sp.Yeoh, TRELOAR["uniaxial"])
+    given = sp.fit_material(sp.Yeoh, TRELOAR["uniaxial"], stress_unit=98066.5)
+    np.testing.assert_array_equal(own.values, given.values)

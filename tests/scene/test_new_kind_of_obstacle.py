@@ -17,11 +17,12 @@ from supple.app.viewer.from_snapshot import MomentBuilder
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.kinds.forms import POSITIVE
+from supple.numerics.geometry.convex_hull import convex_hull
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.layers.surfaces import ObstacleView
 from supple.results.view.surfaces import obstacle_surfaces
 from supple.scene.obstacles.obstacle import Obstacle
-from supple.scene.obstacles.polyhedra import hull, round_ball
+from supple.scene.obstacles.polyhedra import round_ball
 from supple.scene.registry import KINDS, register
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.01)
@@ -53,7 +54,7 @@ class RoundedCube(Obstacle):
         ball = self.rounding * round_ball(inscribed=False)[0]
         h = self.half - self.rounding
         corners = [[x, y, z] for x in (-h, h) for y in (-h, h) for z in (-h, h)]
-        return hull(np.concatenate([ball + corner for corner in np.array(corners)]))
+        return convex_hull(np.concatenate([ball + corner for corner in np.array(corners)]))
 
 
 @pytest.fixture(autouse=True)

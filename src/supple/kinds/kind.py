@@ -15,11 +15,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
-from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, get_args, get_origin
 
 import numpy as np
 
 from supple.errors import SceneError, SuppleError
+from supple.kinds.described import Described, written_types
 from supple.kinds.forms import Form, Name
 
 _HEADING = re.compile(r"^(Parameters|Attributes|Raises|Returns|Yields)\n-+\n", flags=re.M)
@@ -62,7 +63,7 @@ class Declared:
 @cache
 def declared(kind: type) -> Mapping[str, Declared]:
     """The declared fields of a class by name, in their order."""
-    hints, texts, found = get_type_hints(kind, include_extras=True), descriptions(kind), {}
+    hints, texts, found = written_types(kind), descriptions(kind), {}
     for field in fields(kind):
         hint = hints[field.name]
         forms = [one for one in get_args(hint) if isinstance(one, Form)] if get_origin(hint) is Annotated else []
@@ -75,7 +76,7 @@ def declared(kind: type) -> Mapping[str, Declared]:
     return found
 
 
-class Kind:
+class Kind(metaclass=Described):
     """The base class of kinds.
 
     Attributes

@@ -14,6 +14,7 @@ from supple.errors import SceneError
 from supple.materials.by_law import ByLaw
 from supple.materials.fit_curves import MODES, Curve, nominal_stresses, read_curve
 from supple.materials.fit_families import Family, family_of
+from supple.materials.fit_files import Units
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.runtime.figures import paper_figure
 
@@ -106,7 +107,9 @@ def fit_material(
     pure_shear: Source | Sequence[Source] | None = None,
     terms: int = 2,
     bulk: float | None = None,
-    stress_unit: float = 1.0,
+    stress_unit: float | None = None,
+    area: float | None = None,
+    length: float | None = None,
     confidence: float = 0.95,
 ) -> MaterialFit:
     """Fit the parameters of an incompressible rubber to its tests.
@@ -117,11 +120,13 @@ def fit_material(
     Parameters
     ----------
     kind : `MooneyRivlin`, `Yeoh` or `Ogden`.
-    uniaxial, equibiaxial, pure_shear : a CSV file with columns stretch and stress (force per area at rest), an array
-        (k, 2), or a list of several.
+    uniaxial, equibiaxial, pure_shear : a CSV file with columns stretch (or strain, or extension) and stress (force per
+        area at rest; or load), an array (k, 2), or a list of several.
     terms : of `Ogden`, 1 to 3.
     bulk : bulk modulus of the result [Pa]; None: 500 times its shear modulus. Tests of shape do not determine it.
-    stress_unit : what the unit of stress in the tests is [Pa]: 1e6 for MPa.
+    stress_unit : what the unit of stress in the tests is [Pa]: 1e6 for MPa. None: the unit that the column of a file
+        names, or Pa.
+    area, length : of the specimen at rest [m^2], [m], for files of testing machines with columns of load and extension.
     confidence : of the intervals [-], above 0 and below 1.
 
     Raises
@@ -133,7 +138,8 @@ def fit_material(
     if not 0.0 < confidence < 1.0:
         raise SceneError(f"fit_material: confidence is {confidence!r}; give a number above 0 and below 1")
     given = {"uniaxial": uniaxial, "equibiaxial": equibiaxial, "pure_shear": pure_shear}
-    curves = tuple(read_curve(one, mode, stress_unit) for mode in MODES for one in _several(given[mode]))
+    units = Units(stress_unit, area, length)
+    curves = tuple(read_curve(one, mode, units) for mode in MODES for one in _several(given[mode]))
     count = sum(int(np.count_nonzero(curve.stretch != 1.0)) for curve in curves)
     if count <= len(family.names):
         raise SceneError(

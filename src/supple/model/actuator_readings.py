@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.kinds.suggestion import Named
 from supple.model.state import SolverDetails
 from supple.model.system import System
 
@@ -46,12 +47,13 @@ class CableReading:
 def cavity_readings(details: SolverDetails) -> dict[str, CavityReading]:
     """By name, those of a solver's details."""
     each = details.cavity_pressure
-    return {name: CavityReading(each[name], details.cavity_volume[name], details.cavity_work[name]) for name in each}
+    found = {n: CavityReading(each[n], details.cavity_volume[n], details.cavity_work[n]) for n in each}
+    return Named("cavity", found)
 
 
 def cable_readings(details: SolverDetails) -> dict[str, CableReading]:
     """By name, those of a solver's details."""
-    found = {}
+    found: dict[str, CableReading] = Named("cable", {})
     for name, length in details.cable_length.items():
         tensions = [value for key, value in details.cable_tension.items() if key.rpartition(".")[0] == name]
         found[name] = CableReading(tuple(tensions), length, details.cable_work[name])

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.suggestion import Named
 from supple.materials.elastic import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
@@ -204,10 +205,9 @@ class System:
 
     def split(self, values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Positions or velocities of the points, of vectors (n, 3) of the vertices: one array per body, by name."""
-        if not self.rigid_bodies:
-            return {part.name: values[part.vertices] for part in self.bodies}
-        points = self.points.positions(values)
-        return {part.name: points[part.points] if part.rigid else values[part.vertices] for part in self.bodies}
+        points = self.points.positions(values) if self.rigid_bodies else values
+        of_bodies = {part.name: points[part.points] if part.rigid else values[part.vertices] for part in self.bodies}
+        return Named("body", of_bodies)
 
 
 def build_system(scene: Scene, start: State | None = None) -> System:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from supple.errors import OutputError
+from supple.kinds.suggestion import suggestion
 from supple.results.export.table import report_columns
 from supple.results.recording.reader import Recording
 from supple.runtime.figures import legend_below, paper_figure
-from supple.scene.suggestion import suggestion
 
 # The unit of a column by the last of the words of its name, without x, y and z, that is here.
 _UNITS = {

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.kinds.suggestion import Named
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.model.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
 from supple.model.diagnostics import Diagnostics, measure
@@ -110,7 +111,8 @@ class Frame(FrameReadings):
         """Of the rigid bodies, by name."""
         x, v, rest = self.state.positions, self.state.velocities, self.system.rest_positions
         rows = {part.name: part.vertices for part in self.system.rigid_bodies}
-        return {name: pose_of(rest[part], x[part], v[part]) for name, part in rows.items()}
+        poses = {name: pose_of(rest[part], x[part], v[part]) for name, part in rows.items()}
+        return Named("rigid body", poses)
 
     @cached_property
     def contacts(self) -> ContactPoints | None:

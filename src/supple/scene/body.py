@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal, Self
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import check_name, finite_vector, float_array, non_negative
+from supple.kinds.described import Described
 from supple.materials.material import Material
 from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.quadratic import node_volumes
@@ -22,7 +22,7 @@ from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.rotation import rotation_matrix
 
 
-class PlacedBody(ABC):
+class PlacedBody(metaclass=Described):
     """What every body of a scene has: vertices that move, and points on them that touch, are drawn and measured.
 
     Attributes

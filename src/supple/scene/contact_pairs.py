@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from supple.errors import SceneError
 from supple.kinds.forms import NON_NEGATIVE, Flag, Form
 from supple.kinds.kind import Kind
+from supple.kinds.suggestion import suggestion
 from supple.scene.body import PlacedBody
 from supple.scene.joints.joint import Joint
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.suggestion import suggestion
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import finite_vector
+from supple.kinds.described import Described
+from supple.kinds.suggestion import suggestion
 from supple.runtime.displayed import Showable, short_list
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
@@ -36,7 +38,6 @@ from supple.scene.selection import InBox
 from supple.scene.sensors import Sensor, SurfaceSensor
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
-from supple.scene.suggestion import suggestion
 
 Named = TypeVar("Named", Obstacle, Joint, Weld)
 
@@ -58,7 +59,7 @@ _PARTS = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Scene(Showable):
+class Scene(Showable, metaclass=Described):
     """Bodies, obstacles, pins, loads and stitches under gravity.
 
     Parameters
@@ -261,6 +262,23 @@ class Scene(Showable):
         """The motors of hinges and sliders, by name of the joint."""
         driven = (joint for joint in self.joints if isinstance(joint, AxisJoint))
         return {str(joint.name): joint.motor for joint in driven if joint.motor is not None}
+
+    def with_added(self, **parts: Sequence[Any]) -> Scene:
+        """The same scene with further bodies, obstacles, pins, or other parts.
+
+        Parameters
+        ----------
+        parts : lists of what is added, by the names of the arguments of `Scene`: `bodies=[cup], stitches=[seam]`.
+
+        Raises
+        ------
+        SceneError : where the scene has no such parts, or they contradict each other.
+        """
+        known = [key for key, _ in _PARTS]
+        for key in parts:
+            if key not in known:
+                raise SceneError(f"scene: parts {key!r} do not exist; {suggestion(key, known)}")
+        return replace(self, **{key: (*getattr(self, key), *added) for key, added in parts.items()})
 
     def with_own_inputs(self) -> Scene:
         """The same scene with copies of its inputs, or itself where it has none."""

@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.forms import Counts, Direction, Name, Vector
 from supple.kinds.kind import Kind
+from supple.kinds.suggestion import suggestion
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TRIANGLES, Region, body_of, surface_region
 from supple.scene.loads.points import Point, PointForm, point_corners
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.selection import OnVertices, Selection, Vertices
-from supple.scene.suggestion import suggestion
 
 MOST_CELLS = 1_000_000
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from supple.app.scene_file.document import json_schema
 from supple.errors import SceneError
-from supple.scene.suggestion import suggestion
+from supple.kinds.suggestion import suggestion
 
 _UNIT = re.compile(r"\[([^\[\]\d,][^\[\],]*)\]")
 

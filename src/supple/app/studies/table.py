@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from supple.app.studies.cases import Case, CaseResult
 from supple.errors import StudyError
+from supple.kinds.suggestion import suggestion
 from supple.runtime.replacing import whole_file
-from supple.scene.suggestion import suggestion
 
 
 @dataclass(frozen=True, eq=False)

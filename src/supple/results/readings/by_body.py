@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.scene.suggestion import suggestion
+from supple.kinds.suggestion import suggestion
 
 
 class BodyRows(Protocol):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.scene.suggestion import suggestion
+from supple.kinds.suggestion import suggestion
 
 # A recorded field has single precision: it is for pictures and tables, and positions have all digits.
 NUMBER_BYTES = 4

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.suggestion import Named
 from supple.model.pin_reactions import pin_labels
 from supple.model.state import ContactPoints, SolverDetails, State
 from supple.model.system import System
@@ -43,7 +44,7 @@ class JointReading:
 
 def joint_readings(details: SolverDetails) -> Mapping[str, JointReading]:
     """By name of the joint; empty where the solver has none."""
-    return {
+    found = {
         name: JointReading(
             force,
             details.joint_torques[name],
@@ -53,6 +54,7 @@ def joint_readings(details: SolverDetails) -> Mapping[str, JointReading]:
         )
         for name, force in details.joint_forces.items()
     }
+    return Named("joint", found)
 
 
 def contact_forces(contacts: ContactPoints | None, count: int) -> NDArray[np.float64]:

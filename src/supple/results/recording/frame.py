@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
+from supple.kinds.suggestion import Named
 from supple.materials.elastic_tets.active import ActiveTets
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.laws.internal import NEVER_FLOWED
@@ -59,12 +60,12 @@ class RecordedFrame(TetReadings):
     @cached_property
     def positions(self) -> dict[str, NDArray[np.float64]]:
         """By body name, (n, 3) [m]; of a rigid body, of its surface's vertices."""
-        return {body.name: body.points(self.state.positions) for body in self.recording.bodies}
+        return Named("body", {body.name: body.points(self.state.positions) for body in self.recording.bodies})
 
     @cached_property
     def velocities(self) -> dict[str, NDArray[np.float64]]:
         """By body name, (n, 3) [m/s]."""
-        return {body.name: body.points(self.state.velocities) for body in self.recording.bodies}
+        return Named("body", {body.name: body.points(self.state.velocities) for body in self.recording.bodies})
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
@@ -97,7 +98,7 @@ class RecordedFrame(TetReadings):
         """Of the rigid bodies, by name."""
         values = self.recording.rest_positions, self.state.positions, self.state.velocities
         rigid = [body for body in self.recording.bodies if body.rigid]
-        return {body.name: pose_of(*(rows[body.vertices] for rows in values)) for body in rigid}
+        return Named("rigid body", {body.name: pose_of(*(rows[body.vertices] for rows in values)) for body in rigid})
 
     @cached_property
     def obstacle_poses(self) -> NDArray[np.float64]:

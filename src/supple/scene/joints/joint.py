@@ -23,11 +23,11 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.forms import Flag, Name, Vector
 from supple.kinds.kind import Kind
+from supple.kinds.suggestion import suggestion
 from supple.scene.body import PlacedBody
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.suggestion import suggestion
 
 FREE = (-np.inf, np.inf)
 FORMS = ("angle", "product", "cosine", "twist")

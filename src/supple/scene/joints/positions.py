@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import number
+from supple.kinds.suggestion import suggestion
 from supple.scene.body import PlacedBody
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.joint import Joint
 from supple.scene.rotation import rotation_matrix
-from supple.scene.suggestion import suggestion
 
 # In the graph of what is connected, what does not move: the world, obstacles, and what pins hold.
 _WORLD = None

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.kinds.forms import POSITIVE, Name
+from supple.kinds.suggestion import suggestion
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.body import PlacedBody
 from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.selection import OnVertices, Selection, Vertices
-from supple.scene.suggestion import suggestion
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.forms import Form
 from supple.kinds.kind import Kind
+from supple.kinds.suggestion import suggestion
 from supple.scene.body import PlacedBody
 from supple.scene.selection import InBox, distinct_numbers
-from supple.scene.suggestion import suggestion
 
 
 class Load(Kind, ABC):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.kinds.suggestion import suggestion
 from supple.mesh.topology import graph_components
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
@@ -23,7 +24,6 @@ from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side, side_of
 from supple.scene.stitches.stitch import Stitch
-from supple.scene.suggestion import suggestion
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,9 @@ def fit(
     uniaxial: list[Path] | None = None,
     equibiaxial: list[Path] | None = None,
     pure_shear: list[Path] | None = None,
-    unit: Literal["Pa", "kPa", "MPa", "psi", "kg/cm2"] = "Pa",
+    unit: Literal["Pa", "kPa", "MPa", "psi", "kg/cm2"] | None = None,
+    area: float | None = None,
+    length: float | None = None,
     terms: int = 2,
     bulk: float | None = None,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
@@ -29,13 +31,17 @@ def fit(
     kind
         Which energy.
     uniaxial
-        CSV file with columns stretch and stress (nominal); may be given several times.
+        CSV file with columns stretch, strain or extension, and nominal stress or load; may be given several times.
     equibiaxial
         Likewise, of equibiaxial tension.
     pure_shear
         Likewise, of pure shear.
     unit
-        Of the stresses.
+        Of the stresses; without it, the unit that the column names, or Pa.
+    area
+        Of the specimen's section at rest [m^2], for the load of a testing machine.
+    length
+        Of the specimen at rest [m], for the extension of a testing machine.
     terms
         Of Ogden's energy, 1 to 3.
     bulk
@@ -57,7 +63,9 @@ def fit(
         pure_shear=pure_shear,
         terms=terms,
         bulk=bulk,
-        stress_unit=_UNITS[unit],
+        stress_unit=None if unit is None else _UNITS[unit],
+        area=area,
+        length=length,
     )
     print(found)
     print(f"material: {scene_file_line(found.material)}")
