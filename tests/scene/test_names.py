@@ -45,7 +45,7 @@ def test_an_unknown_body_of_a_frame_or_recording_names_the_right_one(tmp_path):
             one.poses["bal"]
         assert one.velocities.get("baer") is None
     with pytest.raises(KeyError, match="joint 'hip' does not exist"):
-        frame.joints["hip"]
+        frame.report.joints["hip"]
 
 
 @pytest.mark.parametrize("name", sorted(name for name in sp.__all__ if inspect.isclass(getattr(sp, name))))

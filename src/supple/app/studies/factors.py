@@ -42,7 +42,7 @@ class Factor(Kind):
     ----------
     values : numbers, texts, lists or mappings, each equally likely
     uniform : a range of numbers, in the unit of the factor, equally likely everywhere
-    loguniform : a range of numbers above zero, in its unit, whose logarithms are equally likely everywhere
+    loguniform : such a range above zero; the logarithms are equally likely everywhere, in the unit of the factor
     count : levels of a range in a grid, with both ends
     paths : what the factor sets in the scene file; without them, its name is the path
 
