@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError, SolverError, SuppleWarning
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.materials.laws.internal import checked
+from supple.model.crushed import too_soft
 from supple.model.state import Problems, State, StepReport
 from supple.model.system import System, build_system, initial_state
 from supple.results.frame import Frame, completed_report, start_frame, with_applied_values
@@ -126,6 +127,8 @@ def simulate(
     if start is None:
         start = initial_state(scene, initial_positions, initial_velocities)
     first = first_frame(scene, start, solver)
+    for text in filter(None, (too_soft(first.system, part) for part in first.system.bodies)):
+        logger.warning("%s", text)
     workspace = solver.prepare(first.system)
     solver.check(first.system, first.state, workspace)
     details = with_applied_values(solver.initial_details(first.system, workspace), first.system, first.time)

@@ -17,7 +17,7 @@ class Status(StrEnum):
     """How a step ended. It equals its name as text: `report.status == "converged"`.
 
     Where several hold for one step, the report has the first of: inverted, intersecting, energy_gained, held_back,
-    softened.
+    crushed, softened.
 
     Attributes
     ----------
@@ -31,6 +31,8 @@ class Status(StrEnum):
     ENERGY_GAINED : more energy than the scene and what drives it had (also `Implicit` with "newmark")
     TUNNELLED : things passed each other in the shortest substep that is allowed (`Implicit`)
     SOFTENED : a body is softer than its material by more than the tolerance
+    CRUSHED : a tet has less than a twentieth of its volume, and its material does not ask for it: see
+        `supple.model.crushed`
     """
 
     CONVERGED = "converged"
@@ -46,6 +48,7 @@ class Status(StrEnum):
     HELD_BACK = "held_back"
     LINEARIZED = "linearized"
     TUNNELLED = "tunnelled"
+    CRUSHED = "crushed"
 
     @property
     def can_go_on(self) -> bool:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from supple.kinds.suggestion import Named
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.model.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
+from supple.model.crushed import HELD, crushed_message, crushed_tets
 from supple.model.diagnostics import Diagnostics, measure
 from supple.model.energy_balance import completed_works
 from supple.model.state import ContactPoints, SolverDetails, State, Status, StepReport
@@ -145,6 +146,11 @@ def completed_report(
         some get the numerical one.
     """
     measured = measure(system, state)
+    if measured.min_det_F < HELD and step.status in (Status.CONVERGED, Status.LINEARIZED, Status.SOFTENED):
+        tets = crushed_tets(system, state)
+        if len(tets):
+            message = "; ".join(filter(None, (crushed_message(system, state, tets), step.message)))
+            step = replace(step, status=Status.CRUSHED, message=message)
     values = vars(measured) | vars(step)
     del values["contacts"]  # made when they are asked for: `Frame.contacts`
     details = with_applied_values(step.details, system, state.time)

@@ -101,13 +101,12 @@ def volume_ratios(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64])
     return J
 
 
-def smallest_ratio(laws: TetLaws, x: NDArray[np.float64], J: NDArray[np.float64]) -> float:
-    """The smallest of the J (m,) of the tets; in quadratic ones, of J at their nodes and quadrature points."""
-    if laws.quadratic is None:
-        return float(J.min())
-    smallest = J.copy()
-    smallest[laws.quadratic.rows] = laws.quadratic.smallest_ratios(x)
-    return float(smallest.min())
+def least_ratios(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) J = det F of every tet, F (m, 3, 3); of quadratic ones the smallest at their nodes and quadrature points."""
+    J = determinants(F)
+    if laws.quadratic is not None:
+        J[laws.quadratic.rows] = laws.quadratic.smallest_ratios(x)
+    return J
 
 
 def quadratic_energies(

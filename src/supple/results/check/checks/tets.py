@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from supple.materials.registry import ELASTIC_MATERIALS
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.orientation import volume_signs
+from supple.results.check.report import CheckResult
 from supple.results.check.snapshot import Snapshot, edge_vectors
 from supple.results.check.stored_energies import growth_of
 
@@ -17,6 +20,8 @@ NEARLY_INCOMPRESSIBLE = 0.45
 GENEROUS_VOLUME_CHANGE = 0.5
 SMALL_VOLUME_CHANGE = 0.005  # of a part whose material is not known
 _SAME_VOLUME = 1e-9
+# The det F below which a tet is noted.
+NEARLY_FLAT = 0.05
 
 
 class RestShape(FrameCheck):
@@ -64,11 +69,25 @@ class Inversion(FrameCheck):
     good = "smallest det F {worst}"
     bad = "inverted or flat, det F {worst}"
 
+    def begin(self) -> None:
+        self._crushed: list[int] = []
+
     def see(self, at: Snapshot) -> None:
         bad = np.flatnonzero(at.signs <= 0)
         J = np.where(np.isfinite(at.least_J), at.least_J, np.inf)
         row = int(bad[np.argmin(J[bad])]) if len(bad) else int(np.argmin(J))
         self.tally.see(at, float(J[row]), len(bad) > 0, lambda: self.scene.name("tet", row))
+        if J[row] < NEARLY_FLAT:
+            self._crushed.append(at.number)
+
+    def result(self) -> CheckResult:
+        """With a note on frames in which a tet is crushed: its material seldom asks for that."""
+        result = super().result()
+        if not self._crushed:
+            return result
+        frames = "1 frame" if len(self._crushed) == 1 else f"{len(self._crushed)} frames"
+        note = f"; below {NEARLY_FLAT:g} in {frames}, first {self._crushed[0]}: crushed"
+        return replace(result, message=result.message + note)
 
 
 class Volume(FrameCheck):

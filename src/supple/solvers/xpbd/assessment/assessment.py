@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.model.crushed import CRUSHED
 from supple.model.system import System
 from supple.solvers.xpbd.assessment.energy_balance import EnergyBalance
 from supple.solvers.xpbd.assessment.findings import Findings, count_inverted, tangled_bodies
@@ -50,6 +51,7 @@ class Assessment:
         self.balance = EnergyBalance(system, edge_length)
         self.surfaces = SurfaceCheck(system, settings, edge_length)
         self._ledger = Ledger()
+        self._whole = np.zeros(len(system.tets), dtype=np.bool_)
 
     def begin(self, moment: Moment, J: NDArray[np.float64], h: float, ledger: Ledger | None) -> NDArray[np.bool_]:
         """Begin a frame. Returns the tets (m,) of the bodies without an inverted one.
@@ -64,6 +66,7 @@ class Assessment:
         sound = np.ones(len(J), dtype=np.bool_)
         for part in self.system.bodies:
             sound[part.tets] = part.name not in tangled
+        self._whole = sound & (J >= CRUSHED)
         return sound
 
     def end(
@@ -101,6 +104,7 @@ class Assessment:
             held=held,
             gained=excess / (scale + excess) if excess > 0.0 else 0.0,
             gainer=self.system.bodies[gainer].name,
+            crushed=bool((J[self._whole] < CRUSHED).any()),
             softened=[(share, name) for share, name in lacks if share > accuracy],
         )
         return findings, Ledger(tangled, excess, scale)

@@ -27,6 +27,7 @@ class Findings:
     gained : energy without a source, so far, that has not been lost since, over the scene's energy [-]
     gainer : the body whose energy rose most in this frame
     softened : (share, body) for each body that is softer than the accuracy allows
+    crushed : whether a tet has come below J = `CRUSHED` in this frame, see `supple.model.crushed`
     apart : (share of its size, joint) for each joint whose sides are too far apart
     stalled : (share of its way, joint) for each velocity motor that is too far behind without its largest effort
     """
@@ -37,6 +38,7 @@ class Findings:
     gained: float = 0.0
     gainer: str = ""
     softened: list[tuple[float, str]] = field(default_factory=list)
+    crushed: bool = False
     apart: list[tuple[float, str]] = field(default_factory=list)
     stalled: list[tuple[float, str]] = field(default_factory=list)
 

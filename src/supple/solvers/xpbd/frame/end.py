@@ -78,6 +78,8 @@ def end_frame(
         problem = Status.INTERSECTING
     elif problem is None and held > HELD_TOLERANCE:
         problem = Status.INVERTED
+    elif problem is None and findings.crushed:
+        problem = Status.CRUSHED
     elif problem is None and (findings.softened or findings.apart):
         problem = Status.SOFTENED
     forces, old_points = ws.contact.forces, ws.layout.old_points
