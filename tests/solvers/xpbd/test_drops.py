@@ -124,10 +124,16 @@ def test_random_drops(seed):
 
 
 @pytest.mark.parametrize(
-    "seed", [1, 4, 5, 10, 268, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (6, 8, 13, 15))]
+    "seed", [1, 4, 5, 10, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (6, 8, 13, 15))]
 )
 def test_random_piles_converge_and_pass_the_check(seed, tmp_path):
     assert check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 12) == {"converged"}
+
+
+def test_a_blow_that_crushes_is_told(tmp_path):
+    """J of the lowest body in frames 1 to 6: 0.19, 0.06, 0.04, 0.04, 0.08, 0.22; of `Implicit` with a quarter of the
+    step 0.08, 0.03, 0.03, 0.04, 0.06, 0.16."""
+    assert check_recorded(pile(268), tmp_path / "pile.vtkhdf", 12) == {"converged", "crushed"}
 
 
 @pytest.mark.parametrize("seed", [104, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (23, 70, 131))])
