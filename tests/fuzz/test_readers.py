@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import logging
 import os
 import shutil
@@ -14,8 +15,11 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
+import meshio
+import numpy as np
 import pytest
 import trimesh
 from hypothesis import HealthCheck, Phase, given, settings
@@ -60,6 +64,44 @@ RESULT = '{"status": "done", "measures": {"y": 1.5}, "frames": 3, "simulated": t
 SETS = (
     "*NODE, NSET=all\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4, ELSET=e\n9,1,2,3,4\n"
     "*NSET, NSET=b\nall, 2\n*ELSET, ELSET=g, GENERATE\n1, 9, 2\n"
+)
+ASSEMBLY = """\
+*PART, NAME=P
+*SYSTEM
+1, 0, 0, 1, 1, 0
+*NODE, SYSTEM=C
+1, 0, 0, 0
+3, 2, 0, 0
+*NGEN, NSET=low
+1, 3
+*NCOPY, OLD SET=low, CHANGE NUMBER=10, SHIFT, NEW SET=side
+-1, 0, 0
+0, 0, 0, 1, 0, 0, 5
+*NFILL
+low, side, 1, 10
+*NCOPY, OLD SET=low, CHANGE NUMBER=100, SHIFT
+0, 0, 1
+*NCOPY, OLD SET=side, CHANGE NUMBER=100, SHIFT
+0, 0, 1
+*ELEMENT, TYPE=C3D8R
+1, 1, 2, 12, 11, 101, 102, 112, 111
+*ELGEN, ELSET=all
+1, 2, 1, 1
+*END PART
+*ASSEMBLY, NAME=A
+*INSTANCE, NAME=a, PART=P
+*END INSTANCE
+*INSTANCE, NAME=b, PART=P
+9, 0, 0
+0, 0, 0, 0, 0, 1, 30
+*END INSTANCE
+*NSET, NSET=held, INSTANCE=b
+low
+*END ASSEMBLY
+"""
+MEDIT = (
+    "MeshVersionFormatted 2\nDimension 3\nVertices\n5\n0 0 0 1\n1 0 0 1\n1 1 0 1\n0 1 0 1\n0 0 1 1\n"
+    "Pyramids\n1\n1 2 3 4 5 1\nEnd\n"
 )
 GROUPS = """\
 $MeshFormat
@@ -125,6 +167,17 @@ def make_study(folder: Path) -> None:
     (folder / "study.yaml").write_text(STUDY, encoding="utf-8")
 
 
+def bricks(path: Path) -> None:
+    points = np.array(list(itertools.product(range(2), repeat=3)), dtype=np.float64)
+    meshio.write(path, meshio.Mesh(points, [("hexahedron", [[0, 4, 6, 2, 1, 5, 7, 3]])]), binary=False)
+
+
+def make_gltf(folder: Path) -> None:
+    scene = trimesh.Scene(trimesh.Trimesh(CUBE.vertices, CUBE.triangles))
+    for name, content in scene.export(file_type="gltf").items():
+        (folder / name).write_bytes(content)
+
+
 SOLVER = sp.XPBD(substeps=1)
 
 
@@ -172,6 +225,23 @@ READERS = {
     },
     "sets .inp": Reader(text_file("s.inp", SETS), "s.inp", sp.TetMesh.load),
     "sets .msh": Reader(text_file("s.msh", GROUPS), "s.msh", sp.TetMesh.load),
+    "deck with instances": Reader(text_file("a.inp", ASSEMBLY), "a.inp", sp.TetMesh.load),
+    "tets .mesh": Reader(text_file("s.mesh", MEDIT), "s.mesh", sp.TetMesh.load),
+    "bricks .vtk": Reader(lambda folder: bricks(folder / "b.vtk"), "b.vtk", sp.TetMesh.load),
+    "bricks .vtu": Reader(lambda folder: bricks(folder / "b.vtu"), "b.vtu", sp.TetMesh.load),
+    "surface .gltf": Reader(make_gltf, "model.gltf", sp.SurfaceMesh.load),
+    "buffer of .gltf": Reader(
+        make_gltf, "gltf_buffer_0.bin", lambda path: sp.SurfaceMesh.load(path.parent / "model.gltf")
+    ),
+    **{
+        f"surface .{kind}": Reader(
+            lambda folder, kind=kind: trimesh.Trimesh(CUBE.vertices, CUBE.triangles).export(folder / f"s.{kind}"),
+            f"s.{kind}",
+            sp.SurfaceMesh.load,
+        )
+        for kind, package in (("dae", "collada"), ("3mf", "lxml"))
+        if find_spec(package)
+    },
     "surface .glb": Reader(
         lambda folder: trimesh.Trimesh(CUBE.vertices, CUBE.triangles).export(folder / "s.glb"),
         "s.glb",

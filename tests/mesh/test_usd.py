@@ -90,6 +90,89 @@ def test_malformed_files_are_one_line(tmp_path: Path, text: str, message: str) -
     assert "\n" not in str(caught.value)
 
 
+CORNERS = "point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]"
+FACES = "int[] faceVertexCounts = [3, 3, 3, 3]\nint[] faceVertexIndices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]"
+TURNED = "int[] faceVertexCounts = [3, 3, 3, 3]\nint[] faceVertexIndices = [1, 2, 0, 3, 1, 0, 2, 3, 0, 3, 2, 1]"
+LEFT = '\nuniform token orientation = "leftHanded"'
+
+
+def stage(prims: str, up: str = "Y", unit: str = "0.01") -> str:
+    return f'#usda 1.0\n(\nmetersPerUnit = {unit}\nupAxis = "{up}"\n)\n' + prims
+
+
+def mesh(name: str, more: str = FACES, scale: str = "(1, 1, 1)") -> str:
+    order = 'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:scale"]'
+    move = f"double3 xformOp:translate = (0, 0, 100)\nfloat3 xformOp:scale = {scale}\n{order}"
+    return f'def Mesh "{name}" {{\n{CORNERS}\n{more}\n{move}\n}}\n'
+
+
+@pytest.mark.parametrize(
+    "prim", [mesh("a"), mesh("a", TURNED + LEFT), mesh("a", scale="(-1, 1, 1)"), mesh("a", TURNED + LEFT, "(-1, 1, 1)")]
+)
+def test_meshes_that_are_surfaces_are_placed_and_face_outward(tmp_path: Path, prim: str) -> None:
+    (tmp_path / "a.usda").write_text(stage(prim))
+    surface = sp.SurfaceMesh.load(tmp_path / "a.usda")
+    assert surface.volume == pytest.approx(1e-6 / 6)
+    assert surface.bounds[0][2] == pytest.approx(1.0)
+    with pytest.raises(MeshError, match=r"no tets; fill it with them: supple mesh a\.usda"):
+        sp.TetMesh.load(tmp_path / "a.usda")
+
+
+def test_the_axis_that_points_up_becomes_y(tmp_path: Path) -> None:
+    (tmp_path / "a.usda").write_text(stage(mesh("a"), up="Z"))
+    surface = sp.SurfaceMesh.load(tmp_path / "a.usda")
+    low, high = surface.bounds
+    np.testing.assert_allclose([low, high], [[0, 1, -0.01], [0.01, 1.01, 0]], atol=1e-12)
+    assert surface.volume == pytest.approx(1e-6 / 6)
+    assert sp.SurfaceMesh.load(tmp_path / "a.usda", keep_axes=True).bounds[0][2] == pytest.approx(1.0)
+    (tmp_path / "b.usda").write_text(stage(tet(POINTS).partition("\n")[2], up="Z", unit="1"))
+    np.testing.assert_allclose(sp.TetMesh.load(tmp_path / "b.usda").vertices[2:], [[0, 0, -1], [0, 1, 0]])
+
+
+def test_what_is_hidden_or_a_guide_is_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    hidden = mesh("b", FACES + '\ntoken visibility = "invisible"')
+    guide = mesh("c", FACES + '\nuniform token purpose = "guide"')
+    (tmp_path / "a.usda").write_text(stage(mesh("a") + hidden + guide + 'def Sphere "d" {\n}\n'))
+    assert sp.SurfaceMesh.load(tmp_path / "a.usda").components.count == 1
+    assert "its 1 shapes (cubes, spheres and the like) were left out" in caplog.text
+
+
+def test_tets_count_before_surfaces(tmp_path: Path) -> None:
+    (tmp_path / "a.usda").write_text(stage(mesh("b") + tet(POINTS).partition("\n")[2]))
+    assert len(sp.TetMesh.load(tmp_path / "a.usda").tets) == 1
+
+
+@pytest.mark.parametrize("kind", ["references", "payload"])
+def test_other_files_are_not_read(tmp_path: Path, kind: str, caplog: pytest.LogCaptureFixture) -> None:
+    """Wherever they are; the message says how to have them inside."""
+    other = tmp_path / "other.usda"
+    other.write_text('#usda 1.0\n(\ndefaultPrim = "a"\n)\n' + mesh("a"))
+    link = f'def "x" (\n{kind} = @{other}@\n)\n{{\n}}\n'
+    (tmp_path / "a.usda").write_text(stage(link))
+    with pytest.raises(MeshError, match=r"it refers to 1 other files, which are not read; .* usdcat --flatten"):
+        sp.SurfaceMesh.load(tmp_path / "a.usda")
+    (tmp_path / "a.usda").write_text(stage(mesh("a") + link))
+    assert sp.SurfaceMesh.load(tmp_path / "a.usda").components.count == 1
+    assert "it refers to 1 other files" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("faces", "words"),
+    [
+        ("int[] faceVertexCounts = [3, 4]\nint[] faceVertexIndices = [0, 1, 2]", "contradict its faces"),
+        ("int[] faceVertexCounts = [-3]\nint[] faceVertexIndices = [0, 1, 2]", "contradict its faces"),
+        ("int[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 9]", "a cell names a point outside of 0 to 3"),
+        ("float[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]", "is not an array of the type int"),
+        ("int[] faceVertexCounts = [2]\nint[] faceVertexIndices = [0, 1]", "a face needs three at least"),
+    ],
+)
+def test_malformed_surfaces_are_one_line(tmp_path: Path, faces: str, words: str) -> None:
+    (tmp_path / "a.usda").write_text(stage(mesh("a", faces)))
+    with pytest.raises(MeshError, match=words) as caught:
+        sp.SurfaceMesh.load(tmp_path / "a.usda")
+    assert "\n" not in str(caught.value)
+
+
 def test_damaged_binary_files_are_one_line(tmp_path: Path) -> None:
     BOX.save(tmp_path / "box.usdc")
     data = bytearray((tmp_path / "box.usdc").read_bytes())

@@ -74,8 +74,11 @@ class _Deck:
         if any(name.upper() == other.name.upper() for other in self.placed):
             raise FormatError(f"the instance '{shortened([name])}' is given twice", block.place)
         self._scope = Part(name, self.budget)
+        used = self.parts[part.upper()]
+        if any(used is one.parts[0] for one in self.placed):  # the first one is no more than the deck itself
+            self.budget.take(used.size, block.place)
         linear, shift = placement(block)
-        self.placed.append(_Placed(name, (self.parts[part.upper()], self._scope), linear, shift))
+        self.placed.append(_Placed(name, (used, self._scope), linear, shift))
 
     def _of_instances(self, block: Block) -> bool:
         """Whether a set of the assembly has members of instances."""
@@ -108,12 +111,10 @@ def read(data: bytes, path: Path) -> MeshFile:
     instances: dict[str, _Instance] = {}
     for one in placed:
         tags, own_points = _nodes_of(one.parts)
-        deck.budget.take(4 * len(tags) if one in deck.placed[1:] else 0, None)
         nodes = Numbers(tags, "node")
         element_tags = []
         for part in one.parts:
             for (number, width), (own, rows) in part.elements.items():
-                deck.budget.take(rows.size if one in deck.placed[1:] else 0, None)
                 element_tags.append(own)
                 cells.append((number, np.full(len(rows), width), nodes.places(rows).ravel() + nodes_before))
         elements = Numbers(np.concatenate([np.zeros(0, np.int64), *element_tags]), "element")

@@ -109,6 +109,11 @@ class Part:
         return tags[first[order]], points[len(tags) - 1 - last[order]]
 
     @property
+    def size(self) -> int:
+        """How many numbers its nodes and elements are."""
+        return 4 * len(self._tags) + sum(len(tags) + len(flat) for tags, flat in self._elements.values())
+
+    @property
     def repeated(self) -> int:
         """How many nodes are given more than once."""
         return len(self._tags) - len(set(self._tags))

@@ -151,13 +151,10 @@ def _triangles(primitive: Any) -> Any:
 
 def _left_out(document: Any) -> list[str]:
     """What of a document pycollada has not read."""
-    from collections import Counter
-
     notes = []
-    tags = Counter(str(each.tag).rpartition("}")[2] for each in document.xmlnode.iter())
-    for tag in ("tristrips", "trifans", "instance_controller"):
-        if tags[tag]:
-            notes.append(f"its {tags[tag]} <{tag}> were left out; export it with triangles, and without skins")
+    skins = sum(str(each.tag).endswith("}instance_controller") for each in document.xmlnode.iter())
+    if skins:
+        notes.append(f"its {skins} surfaces with skins or morphs were left out; export it without")
     if document.errors:
         first = " ".join(str(document.errors[0]).split())[:100]
         notes.append(f"{len(document.errors)} of its parts cannot be read, the first: {first}")
