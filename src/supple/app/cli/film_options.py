@@ -31,6 +31,10 @@ class PictureOptions:
     color: Annotated[
         str | None, Parameter(help="body (without it), or a field with a legend: J, von_mises or energy.")
     ] = None
+    range: Annotated[
+        tuple[float, float] | None, Parameter(help="Ends of the color scale of a field, as 0 2e4, in its unit.")
+    ] = None
+    connections: Annotated[bool | None, Parameter(help="Stitches and joints as lines: yes without it.")] = None
     shadows: Annotated[bool | None, Parameter(help="Soft shadows: yes without it.")] = None
     dark: Annotated[bool | None, Parameter(negative="", help="A dark background.")] = None
 

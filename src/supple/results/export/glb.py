@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.results.export.recorded_fields import fields_on
 from supple.results.recording.reader import Recording
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
 from supple.results.view.model import Moment
@@ -38,8 +39,13 @@ def write_glb(recording: Recording, output: Path) -> None:
         logger.warning("%s: holds %d of %d frames, evenly spaced", output, len(frames), len(recording))
     model = model_of_recording(recording)
     glb = _Glb([moment_of_frame(model, recording[k]) for k in frames])
-    for surface in surfaces_of(model):
-        glb.add(surface.creased(model))
+    for plain in surfaces_of(model):
+        surface = plain.creased(model)
+        fields = []
+        if isinstance(surface, SoftSurface) and recording.fields:
+            moments = zip(frames, glb.moments, strict=True)
+            fields = [fields_on(surface, recording, recording[k], moment) for k, moment in moments]
+        glb.add(surface, fields)
     with whole_file(output) as fresh:
         fresh.write_bytes(glb.to_bytes())
 
@@ -61,23 +67,29 @@ class _Glb:
         times = np.array([moment.time for moment in moments])
         self.times = self._accessor((times - times[0])[:, None], "SCALAR", bounds=True)
 
-    def add(self, surface: SoftSurface | RigidSurface) -> None:
-        """Add a mesh: of a rigid one, the poses of its node are animated; of a soft one, target k gives frame k."""
+    def add(self, surface: SoftSurface | RigidSurface, fields: list[dict[str, NDArray]]) -> None:
+        """Add a mesh: of a rigid one, the poses of its node are animated; of a soft one, target k gives frame k.
+
+        fields : of a soft one for each frame, by name; they become attributes of vertices such as `_VON_MISES`
+        """
         triangles = surface.triangles
         if isinstance(surface, RigidSurface):
             x, normals = surface.vertices, vertex_normals(surface.vertices, triangles)
             material = self._material(surface, surface.opacity)
-            node = self._mesh_node(surface.name, x, normals, triangles, material, [])
+            node = self._mesh_node(surface.name, x, normals, triangles, material, [], {})
             self._place(node, np.stack([surface.pose(moment) for moment in self.moments]))
             return
         x0 = surface.at(self.moments[0])
         n0 = vertex_normals(x0, triangles)
         targets = []
-        for moment in self.moments[1:]:
+        for k, moment in enumerate(self.moments[1:], 1):
             x = surface.at(moment)
             normals = vertex_normals(x, triangles)
             targets.append({"POSITION": self._vectors(x - x0, bounds=True), "NORMAL": self._vectors(normals - n0)})
-        node = self._mesh_node(surface.name, x0, n0, triangles, self._material(surface, 1.0), targets)
+            if fields:
+                targets[-1] |= self._attributes({name: fields[k][name] - first for name, first in fields[0].items()})
+        own = self._attributes(fields[0]) if fields else {}
+        node = self._mesh_node(surface.name, x0, n0, triangles, self._material(surface, 1.0), targets, own)
         if targets:
             self._animate(node, "weights", self._weights)
 
@@ -99,11 +111,30 @@ class _Glb:
         k = len(self.moments)
         return self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
 
+    def _attributes(self, fields: dict[str, NDArray]) -> dict[str, int]:
+        """Accessors of fields (k, components); a tensor of nine components as three vectors, its rows."""
+        found = {}
+        for name, values in fields.items():
+            key = f"_{name.upper()}"
+            if values.shape[1] == 9:
+                found |= {f"{key}_{row}": self._vectors(values[:, 3 * row : 3 * row + 3]) for row in range(3)}
+            else:
+                kind = "SCALAR" if values.shape[1] == 1 else f"VEC{values.shape[1]}"
+                found[key] = self._accessor(values, kind, target=_VERTICES)
+        return found
+
     def _mesh_node(
-        self, name: str, x: NDArray, normals: NDArray, triangles: NDArray, material: int, targets: list[dict[str, int]]
+        self,
+        name: str,
+        x: NDArray,
+        normals: NDArray,
+        triangles: NDArray,
+        material: int,
+        targets: list[dict[str, int]],
+        fields: dict[str, int],
     ) -> int:
         primitive: dict[str, Any] = {
-            "attributes": {"POSITION": self._vectors(x, bounds=True), "NORMAL": self._vectors(normals)},
+            "attributes": {"POSITION": self._vectors(x, bounds=True), "NORMAL": self._vectors(normals), **fields},
             "indices": self._append(triangles.astype("<u4").reshape(-1, 1), _UNSIGNED, "SCALAR", {}, _INDICES),
             "material": material,
         }

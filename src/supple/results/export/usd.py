@@ -1,4 +1,7 @@
-"""Universal Scene Description: meshes with a time sample for each frame, of their points or of a rigid body's pose."""
+"""Universal Scene Description: meshes with a time sample for each frame, of their points or of a rigid body's pose.
+
+Recorded fields are primvars of the meshes of soft bodies. A material of each mesh is a UsdPreviewSurface.
+"""
 
 # pyright: reportAttributeAccessIssue=false
 # (OpenUSD comes without types.)
@@ -13,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from supple.errors import OutputError
+from supple.results.export.recorded_fields import fields_on
 from supple.results.recording.reader import Recording
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.surfaces import RigidSurface, body_surface, obstacle_surfaces
@@ -45,10 +49,11 @@ def _write(recording: Recording, path: Path) -> None:
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    stage.SetTimeCodesPerSecond(1.0 / recording.dt)
-    stage.SetFramesPerSecond(1.0 / recording.dt)
-    stage.SetStartTimeCode(0)
-    stage.SetEndTimeCode(len(recording) - 1)
+    codes, rate = _time_codes(recording)
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetFramesPerSecond(rate)
+    stage.SetStartTimeCode(codes[0])
+    stage.SetEndTimeCode(codes[-1])
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/recording").GetPrim())
     model = model_of_recording(recording)
     bodies = [body_surface(model, body) for body in model.bodies]
@@ -56,14 +61,64 @@ def _write(recording: Recording, path: Path) -> None:
         folder = UsdGeom.Scope.Define(stage, f"/recording/{group}").GetPath()
         for i, surface in enumerate(drawn):
             mesh = _define(stage, f"{folder}/{_identifier(surface.name, i)}", surface)
+            _set_material(stage, f"/recording/materials/{_identifier(surface.name, i)}_{group}", mesh, surface)
             moments = (moment_of_frame(model, frame) for frame in recording)
             if isinstance(surface, RigidSurface):
                 _set_points(mesh, surface.vertices, None)
-                _set_poses(mesh, [surface.pose(moment) for moment in moments])
+                _set_poses(mesh, [surface.pose(moment) for moment in moments], codes)
             else:
-                for k, moment in enumerate(moments):
-                    _set_points(mesh, surface.at(moment), k)
+                for frame, moment, code in zip(recording, moments, codes, strict=True):
+                    _set_points(mesh, surface.at(moment), code)
+                    _set_fields(mesh, fields_on(surface, recording, frame, moment), code)
     stage.GetRootLayer().Save()
+
+
+def _time_codes(recording: Recording) -> tuple[list[float], float]:
+    """The time code of each frame, from 0, and how many a second has: one for each recorded frame."""
+    times = np.asarray(recording.times) - recording.times[0]
+    step = float(np.median(np.diff(times))) if len(times) > 1 else recording.dt
+    codes = times / step
+    near = np.round(codes)
+    codes = np.where(np.abs(codes - near) < 1e-6 * np.maximum(1.0, near), near, codes)
+    rate = 1.0 / step
+    return codes.tolist(), round(rate) if abs(rate - round(rate)) < 1e-6 * rate else rate
+
+
+def _set_fields(mesh, fields: dict[str, np.ndarray], code: float) -> None:
+    """A primvar for each field: of one number, of a vector, or of the numbers of a tensor row by row."""
+    from pxr import Sdf, UsdGeom, Vt
+
+    for name, values in fields.items():
+        width = values.shape[1]
+        kind = Sdf.ValueTypeNames.Float3Array if width == 3 else Sdf.ValueTypeNames.FloatArray
+        size = -1 if width in (1, 3) else width
+        made = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(name, kind, UsdGeom.Tokens.vertex, size)
+        array = Vt.Vec3fArray if width == 3 else Vt.FloatArray
+        rows = values if width == 3 else values.ravel()
+        made.GetAttr().Set(array.FromNumpy(np.ascontiguousarray(rows, dtype=np.float32)), code)
+
+
+def _set_material(stage, path: str, mesh, surface) -> None:
+    from pxr import Gf, Sdf, UsdShade
+
+    material = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    opacity = surface.opacity
+    for name, value in (
+        ("roughness", surface.look.roughness),
+        ("metallic", surface.look.metallic),
+        ("opacity", opacity),
+    ):
+        shader.CreateInput(name, Sdf.ValueTypeNames.Float).Set(float(value))
+    color = Gf.Vec3f(*_linear(surface.color))
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(color)
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _linear(color: tuple[int, int, int]) -> list[float]:
+    return [float((channel / 255.0) ** 2.2) for channel in color]
 
 
 def _define(stage, path: str, surface):
@@ -75,23 +130,22 @@ def _define(stage, path: str, surface):
     triangles = surface.triangles
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, dtype=np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(triangles.ravel(), dtype=np.int32)))
-    color = np.array(surface.color) / 255.0
-    mesh.CreateDisplayColorAttr([Gf.Vec3f(*(float(c) for c in color**2.2))])
+    mesh.CreateDisplayColorAttr([Gf.Vec3f(*_linear(surface.color))])
     return mesh
 
 
-def _set_poses(mesh, poses) -> None:
+def _set_poses(mesh, poses, codes: list[float]) -> None:
     """The transform: a time sample for each pose (3, 4), or one value where they are the same."""
     from pxr import Gf, Usd
 
     operation = mesh.AddTransformOp()
     moves = any(np.any(pose != poses[0]) for pose in poses)
-    for k, pose in enumerate(poses if moves else poses[:1]):
+    for code, pose in zip(codes, poses if moves else poses[:1], strict=False):
         matrix = np.vstack([pose, [0.0, 0.0, 0.0, 1.0]]).T  # USD multiplies rows from the left
-        operation.Set(Gf.Matrix4d(*matrix.ravel().tolist()), Usd.TimeCode(k) if moves else Usd.TimeCode.Default())
+        operation.Set(Gf.Matrix4d(*matrix.ravel().tolist()), Usd.TimeCode(code) if moves else Usd.TimeCode.Default())
 
 
-def _set_points(mesh, x, time: int | None) -> None:
+def _set_points(mesh, x, time: float | None) -> None:
     from pxr import Usd, Vt
 
     code = Usd.TimeCode.Default() if time is None else Usd.TimeCode(time)

@@ -13,6 +13,7 @@ import numpy as np
 
 from supple.errors import OutputError, SceneError
 from supple.kinds.checks import finite_vector
+from supple.kinds.forms import Limits
 from supple.results.recording.reader import Recording
 from supple.results.view.camera import PRESETS
 from supple.results.view.fields import FIELDS
@@ -42,7 +43,9 @@ class Film:
     eye : (3,) place of the camera [m], with `target` and instead of `view`; None: where it sees what `camera` says
     target : (3,) place that the camera looks at [m], around which "orbit" turns
     surface : of bodies: "skin", or "tets", the surface that is simulated, also where a body has a skin
-    color : "body", or a field of the tets: "J", "von_mises" or "energy"
+    color : "body", or a field of the tets: "J", "von_mises" or "energy"; rigid bodies are grey then
+    range : (low, high) ends of the color scale, in the unit of the field; None: what the film shows, in round numbers
+    connections : whether stitches and joints are drawn, as lines
     shadows : whether bodies and obstacles cast soft shadows
     dark : whether the background is dark
     time : of a picture [s]; None: the end
@@ -61,6 +64,8 @@ class Film:
     target: Place | None = None
     surface: str = "skin"
     color: str = COLOR_BY_BODY
+    range: tuple[float, float] | None = None
+    connections: bool = True
     shadows: bool = True
     dark: bool = False
     time: float | None = None
@@ -81,8 +86,21 @@ class Film:
                 raise OutputError(f"export: {key} is {value!r}; give a number above zero, at most {most:g}")
         if self.time is not None and not isinstance(self.time, (int, float)):
             raise OutputError(f"export: time is {self.time!r}; give seconds")
+        if self.range is not None:
+            self._require_range()
         if self.eye is not None or self.target is not None:
             self._require_places()
+
+    def _require_range(self) -> None:
+        try:
+            low, high = Limits().checked(self.range, "export: range")
+        except SceneError as error:
+            raise OutputError(str(error)) from None
+        if not np.isfinite([low, high]).all():
+            raise OutputError(f"export: range is ({low:g}, {high:g}); give two finite numbers")
+        object.__setattr__(self, "range", (low, high))
+        if self.color == COLOR_BY_BODY:
+            raise OutputError(f"export: range is that of a field; give color too: {', '.join(COLORS)}")
 
     def _require_places(self) -> None:
         if self.eye is None or self.target is None:

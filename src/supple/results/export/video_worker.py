@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,11 @@ from supple.results.export.video import COLORS, Film
 from supple.results.recording.reader import Recording, read_recording
 from supple.results.view.bounds import View, box_corners
 from supple.results.view.camera import direction_of, fitted, upright
-from supple.results.view.fields import Limits, Range, color_map, nodal_values
+from supple.results.view.fields import NOT_KNOWN_COLOR, Limits, Range, color_map, nodal_values
 from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
+from supple.results.view.layers.connections import STITCH_COLOR
+from supple.results.view.layers.joints import JOINT_COLOR, joint_segments, lines_of_joints
 from supple.results.view.look import Color, Look, background, floor_disc, theme
 from supple.results.view.model import Model, Moment
 from supple.results.view.occlusion import occlusion
@@ -55,10 +58,12 @@ class Studio:
         self._shaded = film.shadows
         ends = self._ends(moments)
         self._legend = None if self._field is None or ends is None else legend(self._field, ends, film.size, shown)
-        for flat in surfaces_of(model, skins=film.surface == "skin", dark=film.dark):
+        for number, flat in enumerate(surfaces_of(model, skins=film.surface == "skin", dark=film.dark)):
             if flat.is_floor:
                 continue
             surface = flat.creased(model)
+            if self._field is not None and number < len(model.bodies) and isinstance(surface, RigidSurface):
+                surface = replace(surface, color=NOT_KNOWN_COLOR)  # it has no such values
             mesh = pyvista.PolyData.from_regular_faces(surface.at(moments[0]), surface.triangles)
             look: dict[str, Any] = _phong(surface.look) | {"color": _share(surface.color)}
             if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
@@ -75,6 +80,10 @@ class Studio:
             actor = plotter.add_mesh(mesh, opacity=opacity, culling=hidden, **look)
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
+        self._lines = [
+            (self._add_lines(pyvista, segments(moments[0]), color), segments)
+            for segments, color in (connections(model) if film.connections else [])
+        ]
         self._bodies = len(model.bodies)
         floor = floor_shadow(model, _SHADOW_CELLS)
         self._shadow = floor if film.shadows else None
@@ -100,21 +109,33 @@ class Studio:
         if self._field is None:
             return None
         chosen = [moments[i] for i in evenly(len(moments), _SAMPLED)]
-        return Limits(self._field, Range()).follow(np.concatenate([self._field.values(moment) for moment in chosen]))
+        return Limits(self._field, Range(fixed=self._film.range)).follow(
+            np.concatenate([self._field.values(moment) for moment in chosen])
+        )
 
     def _add_picture(self, pyvista: Any, corners: NDArray[np.float64], image: NDArray[np.uint8]) -> Any:
         mesh = pyvista.PolyData(corners, np.array([4, 0, 1, 2, 3]))
         mesh.active_texture_coordinates = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
         return self._plotter.add_mesh(mesh, texture=_texture(image), lighting=False)
 
+    def _add_lines(self, pyvista: Any, segments: NDArray[np.float64], color: Color) -> Any:
+        ends = np.column_stack([np.full(len(segments), 2), np.arange(2 * len(segments)).reshape(-1, 2)])
+        mesh = pyvista.PolyData(segments.reshape(-1, 3), lines=ends.ravel())
+        width = max(1.0, self._film.size[1] / 240.0)
+        self._plotter.add_mesh(mesh, color=_share(color), line_width=width, lighting=False)
+        return mesh
+
     def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
         """(height, width, 3) of a moment, at a share of the film's length."""
         points = [surface.at(moment) for _, surface in self._meshes]
         nodal = None if self._field is None else nodal_values(moment, self._field.values(moment))
         camera = self._aim(np.concatenate(points[: self._bodies]), share)
-        seen = [*points, camera, np.zeros(0) if nodal is None else nodal]
+        lines = [segments(moment).reshape(-1, 3) for _, segments in self._lines]
+        seen = [*points, *lines, camera, np.zeros(0) if nodal is None else nodal]
         # Where everything rests, the picture stays.
         if self._image is None or not all(map(np.array_equal, seen, self._seen)):
+            for (mesh, _), x in zip(self._lines, lines, strict=True):
+                mesh.points = x.astype(np.float32)
             self._seen, self._image = seen, self._drawn(points, nodal)
         return self._image
 
@@ -161,6 +182,17 @@ class Studio:
         camera.position, camera.focal_point = tuple(center + self._distance * away), tuple(center)
         camera.up, camera.view_angle = tuple(upright(self._view.up, away)), _ANGLE
         return np.array([*center, *away, self._distance])
+
+
+def connections(model: Model) -> list[tuple[Callable[[Moment], NDArray[np.float64]], Color]]:
+    """The lines (k, 2, 3) of stitches and of joints at a moment [m], and their colors."""
+    found: list[tuple[Callable[[Moment], NDArray[np.float64]], Color]] = []
+    if len(model.stitches):
+        found.append((lambda moment: moment.stitch_segments, STITCH_COLOR))
+    if model.joints:
+        lines = lines_of_joints(model)
+        found.append((lambda moment: joint_segments(moment, lines), JOINT_COLOR))
+    return found
 
 
 _Vector = NDArray[np.float64]

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from supple.results.recording.reader import Recording
 from supple.runtime.replacing import whole_file
 
 
 def write_last_vtu(recording: Recording, output: Path) -> None:
-    """Write the last frame: tets, velocities, J and body numbers; rigid bodies as their surfaces."""
+    """Write the last frame: tets, velocities, J, body numbers and recorded fields; rigid bodies as their surfaces."""
     import meshio
 
     frame = recording[-1]
@@ -19,7 +20,7 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
     starts = np.cumsum([0, *map(len, positions)])
     triangles = [np.zeros((0, 3), np.int32)]
     of_point, of_triangle = np.zeros(starts[-1], np.int32), []
-    parts = []
+    parts, tets = [], []
     for i, body in enumerate(recording.bodies):
         of_point[starts[i] : starts[i + 1]] = i
         if body.rigid and body.skin is not None:
@@ -27,19 +28,32 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
             of_triangle += [i] * len(body.skin.triangles)
         else:
             nodes = recording.nodes_of(body) - body.vertices.start + starts[i]
+            tets.append(body.tets)
             kind = "tetra" if nodes.shape[1] == 4 else "tetra10"
             parts.append((kind, nodes, frame.det_F[body.tets], np.full(len(nodes), i, dtype=np.int32)))
     rigid = np.array([frame.det_F[body.tets.start] if body.rigid else 1.0 for body in recording.bodies])
     if of_triangle:
         parts.append(("triangle", np.concatenate(triangles), rigid[of_triangle], np.array(of_triangle, dtype=np.int32)))
+    at_points: dict[str, ArrayLike] = {"velocities": np.concatenate(velocities), "body": of_point}
+    at_cells = {"det_F": [values for _, _, values, _ in parts], "body": [numbers for _, _, _, numbers in parts]}
+    for field in recording.fields:
+        values = frame.field(field.name).values_of_all
+        values = values.reshape(len(values), *([int(np.prod(field.shape))] if field.shape else []))
+        empty = np.full((1, *values.shape[1:]), np.nan)
+        if field.at == "tets":
+            surfaces = [np.repeat(empty, len(of_triangle), axis=0)] if of_triangle else []
+            at_cells[field.name] = [values[rows] for rows in tets] + surfaces
+        else:
+            of_bodies = [
+                np.repeat(empty, len(x), axis=0) if body.rigid else values[body.vertices]
+                for body, x in zip(recording.bodies, positions, strict=True)
+            ]
+            at_points[field.name] = np.concatenate(of_bodies)
     mesh = meshio.Mesh(
         np.concatenate(positions),
         [(kind, cells) for kind, cells, _, _ in parts],
-        point_data={"velocities": np.concatenate(velocities), "body": of_point},
-        cell_data={
-            "det_F": [values for _, _, values, _ in parts],
-            "body": [numbers for _, _, _, numbers in parts],
-        },
+        point_data=at_points,
+        cell_data=at_cells,
     )
     with whole_file(output) as fresh:
         mesh.write(fresh, file_format="vtu")

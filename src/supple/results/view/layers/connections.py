@@ -9,6 +9,7 @@ import numpy as np
 from supple.results.view.layers.layer import Layer, single
 from supple.results.view.model import Moment
 
+STITCH_COLOR = (30, 30, 34)
 _SPRING_COLOR, _PUSHER_COLOR = (20, 150, 70), (120, 90, 200)
 
 
@@ -78,7 +79,7 @@ class StitchView(Layer):
         self.nodes = []
         if len(moment.stitch_segments):
             handle = scene.add_line_segments(
-                "/stitches", single(moment.stitch_segments), (30, 30, 34), thickness=2.5, thickness_units="screen"
+                "/stitches", single(moment.stitch_segments), STITCH_COLOR, thickness=2.5, thickness_units="screen"
             )
             self.nodes = [handle]
 

@@ -12,7 +12,7 @@ from supple.results.recording.actions import RecordedJoint
 from supple.results.view.layers.layer import Layer, single
 from supple.results.view.model import Model, Moment
 
-_COLOR = (225, 120, 20)
+JOINT_COLOR = (225, 120, 20)
 _ARC = 32  # lines of a whole turn
 # Lengths as shares of the longest distance of the first body's control points: axes reach out of the body.
 _AXIS, _LIMIT, _POINT = 0.7, 0.35, 0.08
@@ -27,15 +27,22 @@ class JointView(Layer):
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         joints = moment.model.joints
-        self._lines = [joint_lines(joint, _size(moment.model, joint)) for joint in joints]
+        self._lines = lines_of_joints(moment.model)
         self.nodes = []
         if joints:
             ends = single(joint_segments(moment, self._lines))
-            self.nodes = [scene.add_line_segments("/joints", ends, _COLOR, thickness=3.0, thickness_units="screen")]
+            self.nodes = [
+                scene.add_line_segments("/joints", ends, JOINT_COLOR, thickness=3.0, thickness_units="screen")
+            ]
 
     def update(self, moment: Moment) -> None:
         for handle in self.nodes:
             handle.points = single(joint_segments(moment, self._lines))
+
+
+def lines_of_joints(model: Model) -> list[Sides]:
+    """Of each joint, in the coordinates of its two sides."""
+    return [joint_lines(joint, _size(model, joint)) for joint in model.joints]
 
 
 Sides = tuple[NDArray[np.float64], NDArray[np.float64]]
