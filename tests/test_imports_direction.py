@@ -22,6 +22,7 @@ LAYERS = (
     ("app.scene_file",),
     ("simulate",),
     ("results",),
+    ("solvers.auto",),
     ("solvers.xpbd", "solvers.implicit"),
     ("solvers.solver",),
     ("contact",),

@@ -8,14 +8,14 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.errors import SceneError, SolverError, SuppleWarning
+from supple.errors import SceneError, SolverError, SuppleError, SuppleWarning
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.materials.laws.internal import checked
 from supple.model.crushed import too_soft
@@ -26,6 +26,7 @@ from supple.runtime.displayed import supplied
 from supple.runtime.memory import require_memory
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.scene import Scene
+from supple.solvers.auto import Auto
 from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)
@@ -75,9 +76,9 @@ class NullSink:
 
 def simulate(
     scene: Scene,
-    solver: Solver,
-    dt: float,
-    steps: int,
+    solver: Solver | Auto | None = None,
+    dt: float | None = None,
+    steps: int | None = None,
     *,
     initial_positions: Mapping[str, ArrayLike] | None = None,
     initial_velocities: Mapping[str, ArrayLike] | None = None,
@@ -95,7 +96,8 @@ def simulate(
     Parameters
     ----------
     scene : what to simulate.
-    solver : `XPBD(...)` or `Implicit(...)`.
+    solver : `XPBD(...)` or `Implicit(...)`; without one, or with `Auto(...)`, the one that suits the scene:
+        `frame.solver` is it, and `frame.solver.because` the reason.
     dt : time from frame to frame [s].
     steps : number of frames.
     initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s], as in a frame; the others start as the
@@ -116,35 +118,56 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise SceneError(f"simulate: the scene is a {type(scene).__name__}; give a Scene")
-    if not isinstance(solver, Solver):
+    solver = Auto() if solver is None else solver
+    if not isinstance(solver, Solver | Auto):
         raise SolverError(f"simulate: the solver is {solver!r}; give XPBD(...) or Implicit(...)")
-    check_timing("simulate", dt, steps)
+    dt, steps = check_timing("simulate", dt, steps)
     if start is not None and (initial_positions is not None or initial_velocities is not None):
         raise SceneError("simulate: give `start`, or initial positions and velocities, not both")
+    if start is None:
+        start = initial_state(scene, initial_positions, initial_velocities)
+    if isinstance(solver, Solver):
+        first, workspace = _prepared(scene, start, solver)
+    else:
+        first, workspace = _first_able(scene, start, solver.choices(first_frame(scene, start).system, dt))
+    shown = [supplied("progress")()] if progress else []
+    return _steps(first, dt, steps, workspace, control, [*sinks, *shown], strict)
+
+
+def _prepared(scene: Scene, start: StartFrame | State, solver: Solver) -> tuple[Frame, Any]:
+    """The frame at the start, and the solver's workspace; errors are those of `simulate`."""
     tets = sum(len(body.mesh.tets) for body in scene.bodies)
     what = f"simulate: the scene of {tets} tets"
     require_memory(solver.bytes_needed(scene), what, "make the meshes coarser, or use XPBD")
-    if start is None:
-        start = initial_state(scene, initial_positions, initial_velocities)
     first = first_frame(scene, start, solver)
     for text in filter(None, (too_soft(first.system, part) for part in first.system.bodies)):
         logger.warning("%s", text)
     workspace = solver.prepare(first.system)
     solver.check(first.system, first.state, workspace)
     details = with_applied_values(solver.initial_details(first.system, workspace), first.system, first.time)
-    first = replace(first, report=replace(first.report, details=details))
-    shown = [supplied("progress")()] if progress else []
-    return _steps(first, solver, float(dt), int(steps), workspace, control, [*sinks, *shown], strict)
+    return replace(first, report=replace(first.report, details=details)), workspace
 
 
-def check_timing(caller: str, dt: object, steps: object) -> None:
-    """Raise `SolverError` unless dt is a length of time [s] and steps a number; the text begins with `caller`."""
+def _first_able(scene: Scene, start: StartFrame | State, solvers: Sequence[Solver]) -> tuple[Frame, Any]:
+    """As `_prepared`, of the first solver that accepts the start; where none does, the error is that of the first."""
+    try:
+        return _prepared(scene, start, solvers[0])
+    except SuppleError as error:
+        for other in solvers[1:]:
+            with suppress(SuppleError):
+                return _prepared(scene, start, other.chosen(f"{solvers[0].label} cannot start: {error}"))
+        raise
+
+
+def check_timing(caller: str, dt: Any, steps: Any) -> tuple[float, int]:
+    """A length of time [s] and a number of steps; raises `SolverError` where they are not, whose text begins so."""
     if isinstance(dt, bool) or not isinstance(dt, (int, float, np.number)) or not math.isfinite(dt) or dt <= 0.0:
         raise SolverError(f"{caller}: dt is {dt!r}; it must be finite and above zero [s]")
     if not DT_RANGE[0] <= dt <= DT_RANGE[1]:
         raise SolverError(f"{caller}: dt is {dt!r}; it must be between {DT_RANGE[0]:g} and {DT_RANGE[1]:g} s")
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 0:
         raise SolverError(f"{caller}: steps is {steps!r}; give a whole number of zero or more")
+    return float(dt), int(steps)
 
 
 def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None = None) -> Frame:
@@ -203,7 +226,6 @@ def advance(
 
 def _steps(
     first: Frame,
-    solver: Solver,
     dt: float,
     steps: int,
     workspace: Any,
@@ -211,7 +233,8 @@ def _steps(
     sinks: Sequence[Sink],
     strict: bool,
 ) -> Frames:
-    system, state, frame = first.system, first.state, first
+    system, state, frame, solver = first.system, first.state, first, first.solver
+    assert solver is not None
     inputs = system.scene.inputs
     wanted = dict(state.inputs)
     problems = Problems(first.index + steps)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, Self
 
 from supple.errors import SolverError
 from supple.kinds.kind import Kind
@@ -17,9 +17,15 @@ _BYTES_PER_TET = 2000
 
 
 class Solver(Kind, ABC):
-    """An immutable description of a method and its parameters; what changes is in the State and the workspace."""
+    """An immutable description of a method and its parameters; what changes is in the State and the workspace.
+
+    Attributes
+    ----------
+    because : why `Auto` has chosen it; "" otherwise. Solvers that differ only in this are equal.
+    """
 
     error = SolverError
+    because: str = ""
 
     @property
     def label(self) -> str:
@@ -32,6 +38,27 @@ class Solver(Kind, ABC):
         Solvers with other needs than arrays of the scene's size override this method.
         """
         return _BYTES_PER_TET * sum(len(body.mesh.tets) for body in scene.bodies)
+
+    @property
+    def account(self) -> str:
+        """The solver with its parameters, and why it was chosen."""
+        return f"{self}, chosen: {self.because}" if self.because else str(self)
+
+    def chosen(self, because: str) -> Self:
+        """This solver, which was not chosen by the user, with the reason."""
+        object.__setattr__(self, "because", because)
+        return self
+
+    def refuse(self, system: System) -> None:
+        """Raise where this solver cannot work with something in the scene; `prepare` does this first.
+
+        Solvers that work with everything do not override this method.
+
+        Raises
+        ------
+        SolverError : the text names the thing.
+        """
+        return
 
     @abstractmethod
     def prepare(self, system: System) -> Any:

@@ -17,6 +17,7 @@ from supple.app.scene_file.loader import load_scene
 from supple.app.scene_file.yaml_files import read_yaml
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
+from supple.solvers.auto import Auto
 
 ROOT = Path(__file__).parents[3]
 RUBBER = "{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}"
@@ -138,7 +139,8 @@ def test_parameters_of_both_solvers(load):
 
 def test_defaults(load):
     run = load(f"bodies: [{BODY}]\n")
-    assert (run.dt, run.steps, run.solver.substeps) == (1 / 60, 300, "auto")
+    assert (run.dt, run.steps, run.solver) == (1 / 60, 300, Auto())
+    assert run.chosen_solver == sp.XPBD()
     np.testing.assert_allclose(run.scene.gravity, [0, -9.81, 0])
     assert run.start == {}
 

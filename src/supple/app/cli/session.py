@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from supple.app.cli.arguments import ON_THE_WAY, Checkpoints
 from supple.app.cli.console import ExitCode, print_error
 from supple.app.cli.interrupts import Interrupts
+from supple.app.cli.run_estimate import RunEstimate
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.resume import resume
 from supple.app.runs.run_folder import RunFolder, SceneSource
@@ -20,6 +21,7 @@ from supple.model.state import Status
 from supple.results.frame import Frame
 from supple.scene.scene import Scene
 from supple.simulate import Sink, simulate
+from supple.solvers.auto import Auto
 from supple.solvers.solver import Solver
 
 if TYPE_CHECKING:
@@ -108,7 +110,7 @@ class Outcome:
 
 def run_session(
     scene: Scene,
-    solver: Solver,
+    solver: Solver | Auto,
     dt: float,
     steps: int,
     *,
@@ -141,13 +143,15 @@ def run_session(
     )
     if products.fields and not products.quiet:
         _print_cost(scene, steps, products.fields)
-    every = [folder, *sinks, *([] if products.quiet else [_Announcement()]), *products.progress()]
+    every = [folder, *sinks, *([] if products.quiet else [_Announcement(), RunEstimate()]), *products.progress()]
     with products.waiting():
         frames = simulate(scene, solver, dt, steps, sinks=every, **(start or {}))
     return _driven(frames, products, strict)
 
 
-def resume_session(scene: Scene | None, solver: Solver | None, steps: int | None, *, products: Products) -> Outcome:
+def resume_session(
+    scene: Scene | None, solver: Solver | Auto | None, steps: int | None, *, products: Products
+) -> Outcome:
     """Go on with the run in a folder, and print a summary; see `resume`.
 
     Raises
@@ -202,7 +206,8 @@ class _Announcement:
         tets = sum(len(body.mesh.tets) for body in bodies)
         named = f"{len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}"
         console.print(f"scene      {named}, {tets:,} tets, {steps} frames of {dt:.6g} s")
-        console.print(f"solver     {escape(str(first.solver))}")
+        assert first.solver is not None
+        console.print(f"solver     {escape(first.solver.account)}")
 
     def write(self, frame: Frame) -> None: ...
 

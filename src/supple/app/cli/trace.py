@@ -9,6 +9,7 @@ from pathlib import Path
 from supple.errors import OutputError, SolverError
 from supple.results.frame import Frame
 from supple.runtime.replacing import parent_folder, whole_file
+from supple.solvers.auto import Auto
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.newton.trace import NewtonRow, trace_csv
 from supple.solvers.implicit.solver import Implicit
@@ -48,7 +49,7 @@ class NewtonTrace:
             fresh.write_text(trace_csv(self.frames), encoding="utf-8", newline="\n")
 
 
-def traces(path: Path | None, solver: Solver) -> list[NewtonTrace]:
+def traces(path: Path | None, solver: Solver | Auto) -> list[NewtonTrace]:
     """The sink for `--trace`; none where the option is not given.
 
     Raises

@@ -42,7 +42,7 @@ class CheckpointSink:
             return
         if self._facts is None:
             start = 0, frame.system.start_states[0].time
-            self._facts = facts_of(frame.system, start, self._run.dt, self._run.steps, self._run.solver)
+            self._facts = facts_of(frame.system, start, self._run.dt, self._run.steps, self._run.chosen_solver)
         self._recorder.sync()
         write_checkpoint(self._path, checkpoint_of(frame, self._facts))
         self._written = time.monotonic()
@@ -64,7 +64,7 @@ def simulate_recorded(run: Run, recording: Path, checkpoint: Path, checkpoint_se
     if first is None:
         checkpoint.unlink(missing_ok=True)
         compress, fields = run.output.compress, run.output.fields
-        recorder = Recorder(recording, scene_text=run.text, solver=run.solver, compress=compress, fields=fields)
+        recorder = Recorder(recording, scene_text=run.text, compress=compress, fields=fields)
     else:
         recorder = ContinuedRecorder(recording, compress=run.output.compress)
     positions = (run.initial_positions or None) if first is None else None
@@ -72,7 +72,7 @@ def simulate_recorded(run: Run, recording: Path, checkpoint: Path, checkpoint_se
     sinks = [recorder, CheckpointSink(checkpoint, recorder, run, checkpoint_seconds)]
     index, problem = done, ""
     frames = simulate(
-        run.scene, run.solver, run.dt, run.steps - done, initial_positions=positions, start=first, sinks=sinks
+        run.scene, run.chosen_solver, run.dt, run.steps - done, initial_positions=positions, start=first, sinks=sinks
     )
     for frame in frames:
         index = frame.index
@@ -89,9 +89,9 @@ def _interrupted(run: Run, recording: Path, path: Path) -> Frame | None:
     try:
         checkpoint = read_checkpoint(path)
         facts = checkpoint.run
-        same = (facts.dt, facts.steps, facts.solver) == (run.dt, run.steps, str(run.solver))
+        same = (facts.dt, facts.steps, facts.solver) == (run.dt, run.steps, str(run.chosen_solver))
         changed = differences(checkpoint.versions, versions())
-        frame = frame_of(checkpoint, run.scene, run.solver) if same and not changed else None
+        frame = frame_of(checkpoint, run.scene, run.chosen_solver) if same and not changed else None
     except SuppleError as error:
         logger.warning("%s", error)
         return None

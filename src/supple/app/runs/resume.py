@@ -20,6 +20,7 @@ from supple.results.recording.recorder import Recorder
 from supple.runtime.lock import FolderLock, in_use, is_locked
 from supple.scene.scene import Scene
 from supple.simulate import Control, Frames, Sink, simulate
+from supple.solvers.auto import Auto
 from supple.solvers.solver import Solver
 
 logger = logging.getLogger(__name__)
@@ -58,7 +59,7 @@ class ResumedFolder(FolderSink):
 def resume(
     folder: str | Path,
     scene: Scene | None = None,
-    solver: Solver | None = None,
+    solver: Solver | Auto | None = None,
     *,
     steps: int | None = None,
     control: Control | None = None,
@@ -95,7 +96,9 @@ def resume(
         scene, solver = _of_scene_file(paths, journal)
     if solver is None:
         raise OutputError(f"{paths.folder}: the scene is given without its solver; give both, as they were run")
-    if str(solver) != run.solver:
+    if isinstance(solver, Auto):  # the journal has the choice
+        solver = next((one for one in solver.both() if str(one) == run.solver), solver)
+    if isinstance(solver, Auto) or str(solver) != run.solver:
         raise OutputError(f"{paths.folder}: was run with {run.solver}; give this solver, not {solver}")
     start = _start(paths, checkpoint, scene, solver)
     changed = differences(checkpoint.versions, versions())
@@ -128,7 +131,7 @@ def last_checkpoint(paths: RunPaths) -> Checkpoint:
     raise OutputError(f"{paths.folder}: has no whole checkpoint, so that the run cannot be resumed; run it again")
 
 
-def _of_scene_file(paths: RunPaths, journal: Journal) -> tuple[Scene, Solver]:
+def _of_scene_file(paths: RunPaths, journal: Journal) -> tuple[Scene, Solver | Auto]:
     """Scene and solver of the scene file in the folder."""
     if journal.origin.get("kind") != "scene_file":
         raise OutputError(

@@ -20,6 +20,7 @@ from supple.results.readings.fields import checked_fields
 from supple.results.recording.recorder import Recorder
 from supple.runtime.lock import FolderLock
 from supple.runtime.replacing import output_error, whole_file
+from supple.solvers.auto import Auto
 from supple.solvers.solver import Solver
 
 CHECKPOINT_EVERY, CHECKPOINT_SECONDS = 100, 30.0
@@ -68,12 +69,12 @@ class FolderSink:
 
 
 class RunFolder(FolderSink):
-    """Keeps a run: `simulate(scene, solver, dt, steps, sinks=[RunFolder("out", solver)])`. `resume` goes on with it.
+    """Keeps a run: `simulate(scene, solver, dt, steps, sinks=[RunFolder("out")])`. `resume` goes on with it.
 
     Parameters
     ----------
     folder : is made where it is missing. While the run lasts, no other one can write to it.
-    solver : that of the run
+    solver : that of the run; without one, that of its frames
     checkpoint_every : number of frames from checkpoint to checkpoint; None: only by the clock, and at the start and the
         end, also where the run stops early. The first checkpoint and the latest two are kept.
     checkpoint_seconds : longest time from checkpoint to checkpoint by the clock [s]; None: only by frames
@@ -92,7 +93,7 @@ class RunFolder(FolderSink):
     def __init__(
         self,
         folder: str | Path,
-        solver: Solver,
+        solver: Solver | Auto | None = None,
         *,
         checkpoint_every: int | None = CHECKPOINT_EVERY,
         checkpoint_seconds: float | None = CHECKPOINT_SECONDS,
@@ -128,8 +129,10 @@ class RunFolder(FolderSink):
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Lock the folder and write the start to it."""
+        solver = self._solver if isinstance(self._solver, Solver) else first.solver
+        assert solver is not None
         journal = Journal(
-            run=facts_of(first.system, (first.index, first.time), dt, steps, self._solver),
+            run=facts_of(first.system, (first.index, first.time), dt, steps, solver),
             origin=dict(self._source.origin),
             seed=self._seed,
             checkpoint_every=None if self._every is None else int(self._every),
@@ -140,7 +143,7 @@ class RunFolder(FolderSink):
         recorder = Recorder(
             self.paths.recording,
             scene_text=self._source.text,
-            solver=self._solver,
+            solver=solver.account,
             compress=self._compress,
             fields=self._fields,
         )

@@ -112,7 +112,7 @@ else:
     _LISTS = {
         key: (list[entry_of(kinds)], Field(default=[], max_length=10_000)) for key, kinds in KINDS_OF_LISTS.items()
     }
-    _SOLVER = entry_of(SOLVERS), Field(default_factory=lambda: model_of_kind("xpbd"))
+    _SOLVER = entry_of(SOLVERS), Field(default_factory=lambda: model_of_kind("auto"))
     SceneFileModel = create_model(
         "SceneFileModel",
         __base__=_SceneFileModel,

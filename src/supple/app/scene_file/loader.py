@@ -6,6 +6,7 @@ import logging
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +25,14 @@ from supple.app.scene_file.yaml_files import Key, YamlDocument, read_yaml
 from supple.errors import SceneError
 from supple.mesh.meshing.spelling import spelled_for
 from supple.mesh.sets import MeshSets
+from supple.model.system import build_system, initial_state
 from supple.scene.body import PlacedBody
 from supple.scene.inputs import MotorInput
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.joint import Joint
 from supple.scene.located import LocatedError, at
 from supple.scene.scene import Scene
+from supple.solvers.auto import Auto, solver_for
 from supple.solvers.solver import Solver
 
 _SELECTIONS = ("pins", "forces", "soft_targets", "loads", "welds")
@@ -100,7 +103,7 @@ class Run:
 
     Attributes
     ----------
-    scene, solver : what to simulate, and how
+    scene, solver : what to simulate, and how; `Auto` where the file leaves the choice to the scene
     dt : time from frame to frame [s]; steps : number of frames
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
     output : what to write beside the recording
@@ -109,7 +112,7 @@ class Run:
     """
 
     scene: Scene
-    solver: Solver
+    solver: Solver | Auto
     dt: float
     steps: int
     initial_positions: dict[str, NDArray[np.float64]] = field(default_factory=dict)
@@ -117,6 +120,13 @@ class Run:
     text: str | None = None
     description: SceneFileModel | None = None
     folder: Path = Path()
+
+    @cached_property
+    def chosen_solver(self) -> Solver:
+        """The solver; of `Auto`, the one that suits the scene."""
+        if isinstance(self.solver, Solver):
+            return self.solver
+        return solver_for(self.solver, build_system(self.scene, initial_state(self.scene)), self.dt)
 
     @property
     def start(self) -> dict[str, dict[str, NDArray[np.float64]]]:

@@ -20,6 +20,9 @@ from supple.mesh.meshing.meshers import INSTALL, ftetwild_installed
 from supple.mesh.meshing.sizes import automatic_tets
 from supple.mesh.meshing.units import likely_scale
 from supple.mesh.surface import SurfaceMesh
+from supple.solvers.auto import Counts, suits_xpbd
+from supple.solvers.xpbd.assessment.softening import FACTOR
+from supple.solvers.xpbd.substeps import FEWEST
 
 _HEAD = """\
 # A scene of Supple. Lengths are in metres, masses in kg, times in s, moduli in Pa; y is up.
@@ -61,7 +64,8 @@ obstacles:
 
 gravity: [0, -9.81, 0]
 
-solver: {{kind: xpbd, accuracy: 0.1}}   # fast; a smaller one is stiffer and slower; kind: implicit is exact
+# {choice}
+solver: {{kind: auto, accuracy: 0.1}}   # or xpbd: fast; a smaller accuracy is stiffer and slower; implicit: exact
 dt: 1/60               # from frame to frame
 steps: 120             # frames
 output: {{page: true, plot: true}}
@@ -75,7 +79,9 @@ _SOFTEST, _LARGEST_SAG, _WEIGHT = 5e4, 0.05, 1000.0 * 9.81
 def new_scene(name: str, *, radius: float = 0.1) -> str:
     """The text of a scene with a ball of `radius` [m] above a floor; `name` of the file is for its comments."""
     values = {"body": "ball", "radius": f"{radius:.4g}", "edge": f"{radius / 2.5:.4g}", "height": f"{2 * radius:.4g}"}
-    return _text(name, _SHAPE, youngs=_youngs(2 * radius), x="0", z="0", **values)
+    tets = 4.0 / 3.0 * np.pi * 2.5**3 * 6.0 * np.sqrt(2.0)
+    choice = _choice(4.0 / 3.0 * np.pi * radius**3, int(tets), "ball", _youngs(2 * radius))
+    return _text(name, _SHAPE, youngs=_youngs(2 * radius), x="0", z="0", choice=choice, **values)
 
 
 def new_scene_of(
@@ -85,6 +91,7 @@ def new_scene_of(
     scale: float,
     box: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
+    volume: float,
     tets: int,
     repair: bool = False,
 ) -> str:
@@ -95,6 +102,7 @@ def new_scene_of(
     name : of the scene file, for its comments
     file : of the surface, relative to the scene file; body : name of the body
     scale : factor of coordinates; box : lowest and highest coordinates (3,), (3,) of the surface after scaling [m]
+    volume : that it encloses, after scaling [m^3]
     tets : the number to fill it with; repair : whether to repair the surface first
     """
     low, high = box
@@ -109,6 +117,7 @@ def new_scene_of(
         "z": f"{-middle[2] + 0.0:.4g}",
         "radius": f"{size / 2:.4g}",
         "youngs": _youngs(size),
+        "choice": _choice(volume, tets, body, _youngs(size)),
     }
     return _text(name, _MESH, body=json.dumps(body), **values)
 
@@ -116,6 +125,25 @@ def new_scene_of(
 def _youngs(size: float) -> str:
     """Soft, but stiff enough to stand: Young's modulus [Pa] of a body of a size [m]."""
     return f"{max(_SOFTEST, _WEIGHT * size / _LARGEST_SAG):.0e}".replace("e+0", "e").replace("e+", "e")
+
+
+_ACCURACY, _DT, _POISSON, _DENSITY = 0.1, 1 / 60, 0.4, 1000.0  # of the text above
+_THINNEST = 1e-3  # least volume of a part, over the cube of its size: a surface that is not closed has any volume
+# Of the stiffest frequency of a tet in a mesh, squared, over (lam + mu / 2) / (density edge^2), where the edge is that
+# of a regular tet of the mean volume: 2.4 to 3.2 in meshes of balls, boxes and bears.
+_STIFFEST = 3.0
+
+
+def _choice(volume: float, tets: int, body: str, youngs: str) -> str:
+    """Which solver will suit the body, and why."""
+    mu = float(youngs) / (2.0 * (1.0 + _POISSON))
+    lam = 2.0 * mu * _POISSON / (1.0 - 2.0 * _POISSON)
+    edge = (6.0 * np.sqrt(2.0) * volume / tets) ** (1.0 / 3.0)
+    rate = FACTOR * _STIFFEST * (lam + 0.5 * mu) / (_DENSITY * edge**2)
+    substeps = int(np.ceil(_DT * np.sqrt(rate * (1.0 - _ACCURACY) / _ACCURACY)))
+    counts = Counts(max(substeps, FEWEST), body if substeps > FEWEST else "", tets)
+    kind = "xpbd" if suits_xpbd(counts) else "implicit"
+    return f"About {counts.tets:,} tets, and {counts}: auto is {kind} then (`supple info`)."
 
 
 def _text(name: str, entry: str, **values: str) -> str:
@@ -158,7 +186,16 @@ def scene_of_surface(surface: Path, file: str, name: str, scale: float | None = 
     low, high = (used * corner for corner in loaded.bounds)
     body = re.sub(r"[^A-Za-z0-9_-]+", "_", surface.stem)[:50] or "body"
     report = loaded.check()
-    text = new_scene_of(name, file, body, used, (low, high), tets=DEFAULT_TETS, repair=not report.ok)
+    text = new_scene_of(
+        name,
+        file,
+        body,
+        used,
+        (low, high),
+        volume=max(abs(loaded.volume) * used**3, _THINNEST * float((high - low).max()) ** 3),
+        tets=DEFAULT_TETS,
+        repair=not report.ok,
+    )
     size = " x ".join(f"{value:.3g}" for value in high - low)
     unit = f", taken to be in millimetres (scale: {used:g})" if scale is None and used != 1.0 else ""
     line = f"{surface}: {size} m{unit}, {len(loaded.triangles):,} triangles, about {DEFAULT_TETS:,} tets"

@@ -100,7 +100,7 @@ def _earlier(folder: Path) -> CaseResult | None:
 
 def _simulated(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
     run = job.load(folder)
-    needed = _PROGRAM + run.solver.bytes_needed(run.scene)
+    needed = _PROGRAM + run.chosen_solver.bytes_needed(run.scene)
     if measuring.memory is not None and needed > measuring.memory:
         return CaseResult("deferred", bytes_needed=needed)
     frames, problem = simulate_recorded(run, folder / RECORDING, folder / CHECKPOINT, measuring.checkpoint_seconds)

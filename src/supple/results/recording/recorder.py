@@ -134,7 +134,7 @@ class Recorder:
         system = first.system
         self._details = RecordedDetails.like(first.report.details)
         # The limits of `check_recording` depend on the solver.
-        solver = str(first.solver) if self._solver is None and first.solver is not None else self._solver
+        solver = first.solver.account if self._solver is None and first.solver is not None else self._solver
         scene = recorded_scene(first, (dt, steps), solver, self._scene_text, self._fields)
         layout = self._layout(system)
         if self._fields:

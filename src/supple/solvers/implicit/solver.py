@@ -28,7 +28,7 @@ from supple.solvers.implicit.contact.points import forces_on_owners
 from supple.solvers.implicit.contact.settings import IPCContact, smallest_diagonal
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.energies.damping import quadratic_viscosity_of, viscosity_of
-from supple.solvers.implicit.energies.elasticity import elasticity_of
+from supple.solvers.implicit.energies.elasticity import elasticity_of, refuse_materials
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.regularization import regularization_of
 from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
@@ -115,6 +115,17 @@ class Implicit(Solver):
             needed += int(_BYTES_OF_FACTOR * sum(len(body.mesh.vertices) ** (4.0 / 3.0) for body in scene.bodies))
         return needed
 
+    def refuse(self, system: System) -> None:
+        """Raise for materials of XPBD, and for what the integrator refuses.
+
+        Raises
+        ------
+        SolverError : the text names the body or joint.
+        """
+        if refusal := integrator_of(self.integrator).refusal(system):
+            raise SolverError(refusal)
+        refuse_materials(system)
+
     def prepare(self, system: System) -> Workspace:
         """Compute the patterns, groups and memory for a system.
 
@@ -124,8 +135,7 @@ class Implicit(Solver):
             with the static integrator, and what an integrator refuses.
         """
         method, system = integrator_of(self.integrator), with_stitched_points(system)
-        if refusal := method.refusal(system):
-            raise SolverError(refusal)
+        self.refuse(system)
         elasticity = elasticity_of(system)
         contact = None
         if self.contact is not None:

@@ -27,7 +27,7 @@ from supple.solvers.xpbd.assessment.softening import enough
 from supple.solvers.xpbd.assessment.works import Works
 from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
-from supple.solvers.xpbd.constraints.registry import build_constraint_sets
+from supple.solvers.xpbd.constraints.registry import build_constraint_sets, refuse_materials
 from supple.solvers.xpbd.constraints.stitches import StitchAnchors, stitch_constraints
 from supple.solvers.xpbd.contact.contact import Contact
 from supple.solvers.xpbd.contact.settings import XPBDContact
@@ -133,6 +133,16 @@ class XPBD(Solver):
                 " (set NUMBA_NUM_THREADS before it starts for more)"
             )
 
+    def refuse(self, system: System) -> None:
+        """Raise where a body touches with its skin, has quadratic tets, or a material without constraints of XPBD.
+
+        Raises
+        ------
+        SolverError : the text names the body.
+        """
+        refuse_unsupported(system)
+        refuse_materials(system)
+
     def prepare(self, system: System) -> XPBDWorkspace:
         """Number the vertices, sort the constraints into chunks, and compute their constants.
 
@@ -141,7 +151,7 @@ class XPBD(Solver):
         SolverError : where a body touches with its skin, has quadratic tets, or its material has no XPBD constraints;
             the text names it.
         """
-        refuse_unsupported(system)
+        self.refuse(system)
         welded = WeldedMasses(system)
         system = welded.system
         layout = make_layout(system)

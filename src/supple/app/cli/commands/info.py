@@ -169,9 +169,9 @@ def _scene(file: Path, timed: bool, confine: bool) -> None:
         ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
         ("loads", ", ".join(load.label for load in scene.loads) or "none"),
         ("sensors", ", ".join(sensor.label for sensor in scene.sensors) or "none"),
-        ("solver", str(run.solver)),
+        ("solver", run.chosen_solver.account),
         ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
-        ("memory", f"about {run.solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
+        ("memory", f"about {run.chosen_solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
         ("intersections", _start_problem(system, start)),
         ("each frame", _frame_time(run) if timed else "--time simulates the first ones, and says how long one takes"),
     ]
@@ -225,7 +225,7 @@ def _frame_time(run: Run) -> str:
     from supple.simulate import simulate
 
     start: dict[str, Any] = {**run.start}
-    reports = [frame.report for frame in simulate(run.scene, run.solver, run.dt, 4, **start)]
+    reports = [frame.report for frame in simulate(run.scene, run.chosen_solver, run.dt, 4, **start)]
     seconds = min(report.wall_seconds for report in reports[1:] or reports)
     whole = seconds * run.steps
     return f"{1e3 * seconds:.3g} ms at the start; {run.steps} steps take about {whole:.3g} s if all are like these"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -69,7 +70,9 @@ def view(
 
     with reading():
         run = load_run(found, confine=confine)
-    used = run.solver if solver is None else solver_of_kind(solver)
+    if solver is not None:
+        run = replace(run, solver=solver_of_kind(solver))
+    used = run.chosen_solver
     live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions, not full, solver is not None)
     serve_page(live, port, open_)
 

@@ -16,6 +16,7 @@ from supple.materials.j2_plastic import J2Plastic
 from supple.materials.material import Material
 from supple.materials.registry import UNRELAXED
 from supple.materials.viscoelastic import Viscoelastic
+from supple.solvers.auto import Auto
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.solver import XPBD
@@ -38,10 +39,10 @@ def scene_file_line(material: ByLaw) -> str:
     return f"{{kind: {material.kind}, {', '.join(texts)}}}"
 
 
-SOLVERS: tuple[type[Solver], ...] = (XPBD, Implicit)
+SOLVERS: tuple[type[Solver | Auto], ...] = (XPBD, Implicit, Auto)
 
 
-def solver_of_kind(kind: str) -> Solver:
+def solver_of_kind(kind: str) -> Solver | Auto:
     """The solver of that kind, with its default parameters.
 
     Raises

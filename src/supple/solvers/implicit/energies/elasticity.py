@@ -183,19 +183,24 @@ class Elasticity(JointlyEvaluated):
 _NO_HESSIANS = np.zeros((0, 12, 12))
 
 
-def elasticity_of(system: System) -> Elasticity:
-    """The elastic energy of a system.
-
-    Raises
-    ------
-    SolverError : where a body's material has no elastic energy; the text names the body.
-    """
+def refuse_materials(system: System) -> None:
+    """Raise `SolverError` where a body's material has no elastic energy; the text names the body."""
     for part in system.bodies:
         if not isinstance(part.body.material, Hyperelastic):
             raise SolverError(
                 f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
                 "give it an elastic one such as StableNeoHookean"
             )
+
+
+def elasticity_of(system: System) -> Elasticity:
+    """The elastic energy of a system.
+
+    Raises
+    ------
+    SolverError : where a body's material has none; the text names the body.
+    """
+    refuse_materials(system)
     elements = TetElements.of_system(system)
     material, quadratic = system.laws.material, None
     own = np.ones(len(system.tets), dtype=bool)

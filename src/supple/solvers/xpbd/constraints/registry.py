@@ -59,6 +59,14 @@ CONSTRAINT_SETS = (
 )
 
 
+def refuse_materials(system: System) -> None:
+    """Raise `SolverError` where the material of a soft body has no constraints; the text names the body."""
+    for part in system.bodies:
+        material = part.body.material
+        if not part.rigid and not any(entry.takes(material) for entry in CONSTRAINT_SETS):
+            raise SolverError(f"XPBD: {_why_not(part.name, material)}, or simulate with Implicit")
+
+
 def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]:
     """The constraint sets of all soft bodies: one of each kind, for all bodies that need it.
 
@@ -71,11 +79,8 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
     ------
     SolverError : where a body's material has no constraints; the text names the body.
     """
+    refuse_materials(system)
     soft = [part for part in system.bodies if not part.rigid]
-    for part in soft:
-        material = part.body.material
-        if not any(entry.takes(material) for entry in CONSTRAINT_SETS):
-            raise SolverError(f"XPBD: {_why_not(part.name, material)}, or simulate with Implicit")
     sets = []
     for entry in CONSTRAINT_SETS:
         parts = [part for part in soft if entry.takes(part.body.material)]
