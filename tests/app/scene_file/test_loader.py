@@ -310,7 +310,7 @@ def _family(name):
             return {"stitches": "stitch"}.get(family, family[:-1])
     if name.endswith("ShapeModel") or name == "GummyBearSurfaceModel":
         return "shape"
-    if name in ("XPBDModel", "ImplicitModel"):
+    if name in ("XPBDModel", "ImplicitModel", "AutoModel"):
         return "solver"
     return "motor" if name.endswith("MotorModel") else "material"
 
