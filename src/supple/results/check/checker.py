@@ -18,7 +18,7 @@ from supple.results.check.checks.plain_values import CONSTANTS, Converged, Finit
 from supple.results.check.checks.records import Records
 from supple.results.check.checks.series import Cells, Gaps, Scale
 from supple.results.check.checks.tets import Inversion, RestShape, Rigidity, Volume
-from supple.results.check.checks.tunnelling import Tunnelling
+from supple.results.check.checks.tunnelling import GoingOn, Tunnelling
 from supple.results.check.checks.works import Works
 from supple.results.check.frame_check import UNKNOWN, FrameCheck, skipped
 from supple.results.check.report import CheckReport, CheckResult, Verdict
@@ -39,6 +39,7 @@ CHECKS: tuple[type[FrameCheck], ...] = (
     Inversion,
     Intersection,
     Tunnelling,
+    GoingOn,
     Obstacles,
     Containment,
     Distance,

@@ -14,7 +14,6 @@ from supple.results.recording.frame import RecordedFrame
 UNKNOWN = {
     "recording": "only recordings of Supple contain what it needs",
     "files": "all frames of a recording have the same cells",
-    "paths": "steps of a solver are not straight, and contact bends them: it judges series of other programs only",
     "tets": "the files have no tets",
     "times": "the time from frame to frame is not known; give --dt or --fps",
     "masses": "masses are not known; it needs tets and --density, or an array of masses",

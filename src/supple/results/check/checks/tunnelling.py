@@ -19,14 +19,25 @@ _PIECES = 8
 # When a path has its kink, as shares of the time between the frames.
 _KINKS = (0.25, 0.5, 0.75)
 
+# What goes on with more of its velocity along the normal of a meeting was not touched. Fast soft balls that meet at 30
+# degrees to the normal keep up to half. Those that meet at more than 45 degrees keep most of it, and are not judged.
+_GOES_ON, _FRONTAL = 0.8, 0.7
+# Of the time between two frames, to find the moment of a meeting.
+_HALVINGS = 12
+
 Floats = NDArray[np.float64]
 
 
-def passing_between(before: Snapshot, x1: Floats, x0: Floats | None = None) -> tuple[int, NDArray[np.int64]]:
-    """How many pairs of triangles pass from a frame's points, or x0 instead, to x1, and the first (k, 2) of them."""
+def passing_between(
+    before: Snapshot, x1: Floats, x0: Floats | None = None, allowed: NDArray[np.bool_] | None = None
+) -> tuple[int, NDArray[np.int64]]:
+    """How many pairs of triangles pass from a frame's points, or x0 instead, to x1, and the first (k, 2) of them.
+
+    allowed : (p, p) of which owners, instead of all that must stay apart
+    """
     surfaces = before.scene.surfaces
     out = np.zeros((_MOST_PAIRS, 2), dtype=np.int64)
-    shared = surfaces.triangles, surfaces.owners, surfaces.allowed, surfaces.ignored
+    shared = surfaces.triangles, surfaces.owners, surfaces.allowed if allowed is None else allowed, surfaces.ignored
     count = passing_pairs(before.points if x0 is None else x0, x1, *shared, *before.tree[2:4], out)
     return count, out[: min(count, _MOST_PAIRS)]
 
@@ -132,3 +143,91 @@ class Tunnelling(FrameCheck):
         if self._cut is not None:
             self.good = f"{self.good}; straight paths cross before frame {self._cut}, others do not"
         return super().result()
+
+
+class GoingOn(FrameCheck):
+    """Things that are through each other on the straight way between two frames of a recording, and go on.
+
+    Contact bends paths within a frame, so straight ones alone show nothing. But where things meet, it takes their
+    approach, and the velocities of both frames are recorded: it fails where two things that go on with their velocity
+    would meet front to front, and in the next frame still have most of their approach along the normal of that
+    meeting. Only things are looked at that move farther in the frame than one of them is thick.
+    """
+
+    name = "tunnelling"
+    needs = frozenset({"recording"})
+    unit = "pairs"
+    good = "nothing passes through anything between frames"
+    bad = "things pass through each other between frames and go on: {worst}"
+
+    def begin(self) -> None:
+        if self.settings.every > 1:
+            self.why_not = "what happens between frames is known from one frame to the next only"
+        self._last: Snapshot | None = None
+
+    def see(self, at: Snapshot) -> None:
+        before, self._last = self._last, at
+        if before is None or at.number != before.number + 1:
+            return
+        passed = [pair for pair in self._through(before, at) if self._goes_on(before, at, pair)]
+        names = self.scene.surfaces.names
+        where = f"{names[passed[0][0]]} and {names[passed[0][1]]}, after frame {before.number}" if passed else ""
+        self.tally.see(at, float(len(passed)), bool(passed), where)
+
+    def _through(self, before: Snapshot, at: Snapshot) -> list[tuple[int, int]]:
+        """The owners that pass on the straight way, of those that are fast."""
+        surfaces = self.scene.surfaces
+        p, triangles, owners = len(surfaces.names), surfaces.triangles, surfaces.owners
+        a, b, c = before.points[triangles].transpose(1, 0, 2)
+        areas = 0.5 * np.cross(b - a, c - a)
+        moved = (at.points - before.points)[triangles].mean(axis=1)
+        sizes = np.maximum(np.bincount(owners, minlength=p), 1)
+        means = np.stack([np.bincount(owners, column, p) for column in moved.T], axis=1) / sizes[:, None]
+        spread, apart = np.zeros(p), np.linalg.norm(moved - means[owners], axis=1)
+        np.maximum.at(spread, owners, apart)
+        volumes = np.abs(np.bincount(owners, np.einsum("ij,ij->i", a - a[0], areas) / 3.0, p))
+        thickness = 2.0 * volumes / np.maximum(np.bincount(owners, np.linalg.norm(areas, axis=1), p), 1e-300)
+        thickness[~np.array(surfaces.closed, dtype=bool) | (np.arange(p) >= surfaces.bodies)] = np.inf
+        far = np.linalg.norm(means[:, None] - means, axis=2) + spread[:, None] + spread
+        fast = surfaces.allowed & (far > np.minimum(thickness[:, None], thickness))
+        np.fill_diagonal(fast, False)
+        if not fast.any():
+            return []
+        pairs = owners[passing_between(before, at.points, allowed=fast)[1]]
+        return [(int(one), int(other)) for one, other in np.unique(np.sort(pairs, axis=1), axis=0)]
+
+    def _goes_on(self, before: Snapshot, at: Snapshot, pair: tuple[int, int]) -> bool:
+        surfaces, dt = self.scene.surfaces, at.time - before.time
+        only = np.zeros_like(surfaces.allowed)
+        only[pair] = only[pair[::-1]] = True
+        v0, v1 = (self._velocities(before, at, frame) for frame in (before, at))
+
+        def met(share: float) -> NDArray[np.int64]:
+            return passing_between(before, before.points + share * dt * v0, allowed=only)[1]
+
+        low, high = 0.0, 1.0
+        if not len(met(high)):
+            return False
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if len(met(middle)) else (middle, high)
+        n, closing = np.zeros(3), []
+        first = met(high)
+        first = np.where((surfaces.owners[first[:, 0]] == pair[0])[:, None], first, first[:, ::-1])
+        x = before.points + high * dt * v0
+        for sign, rows in ((1.0, first[:, 1]), (-1.0, first[:, 0])):
+            a, b, c = x[surfaces.triangles[rows]].transpose(1, 0, 2)
+            normals = np.cross(b - a, c - a)
+            n += sign * (normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]).sum(axis=0)
+        n /= max(float(np.linalg.norm(n)), 1e-300)
+        for v in (v0, v1):
+            one, other = (v[surfaces.triangles[first[:, k]]].mean(axis=(0, 1)) for k in (0, 1))
+            closing.append((float((other - one) @ n), float(np.linalg.norm(one - other))))
+        (begin, speed), (end, _) = closing
+        return begin > _FRONTAL * speed and end > _GOES_ON * begin
+
+    def _velocities(self, before: Snapshot, at: Snapshot, frame: Snapshot) -> Floats:
+        """(n, 3) of all points in one of two frames; those of obstacles are what takes them from one to the other."""
+        place, v = self.scene.surfaces.place, (at.points - before.points) / (at.time - before.time)
+        of_bodies = place(np.ones_like(frame.positions), np.zeros_like(frame.poses))[:, :1] == 1.0
+        return np.where(of_bodies, place(frame.velocities, np.zeros_like(frame.poses)), v)
