@@ -10,7 +10,7 @@ from supple.model.loads.growth import GrownTets
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.assessment.moment import Substep
+from supple.solvers.xpbd.moment import Substep
 
 
 class ExternalForces:

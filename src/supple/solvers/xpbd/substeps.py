@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from supple.model.system import System
-from supple.solvers.xpbd.assessment.moment import Moment
 from supple.solvers.xpbd.assessment.softening import MeasuredWork, Softening
+from supple.solvers.xpbd.moment import Moment
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 
 # Fewer substeps damp slow oscillations too much: a mode of frequency w decays at h w^2 / 2.

@@ -18,7 +18,6 @@ from supple.runtime.thread_tuning import ThreadTuner
 from supple.runtime.threads import numba_threads
 from supple.solvers.xpbd.assessment.assessment import Assessment
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
-from supple.solvers.xpbd.assessment.moment import Moment, Substep
 from supple.solvers.xpbd.assessment.works import Works
 from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
@@ -29,6 +28,7 @@ from supple.solvers.xpbd.contact.contact import Contact
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
 from supple.solvers.xpbd.external_forces import ExternalForces
 from supple.solvers.xpbd.memory import XPBDMemory
+from supple.solvers.xpbd.moment import Moment, Substep
 from supple.solvers.xpbd.momentum import MomentumRestore
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection

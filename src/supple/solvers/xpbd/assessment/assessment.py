@@ -12,10 +12,10 @@ from supple.model.crushed import CRUSHED
 from supple.model.system import System
 from supple.solvers.xpbd.assessment.energy_balance import EnergyBalance
 from supple.solvers.xpbd.assessment.findings import Findings, count_inverted, tangled_bodies
-from supple.solvers.xpbd.assessment.moment import Moment
 from supple.solvers.xpbd.assessment.softening import MeasuredWork, Softening
 from supple.solvers.xpbd.assessment.surfaces import Overlap, SurfaceCheck
 from supple.solvers.xpbd.contact.settings import XPBDContact
+from supple.solvers.xpbd.moment import Moment
 
 # Of the energy of the scene: what appears in a frame, and does not count. Old overlaps are removed with as little.
 LEAST_GAIN = 2e-4

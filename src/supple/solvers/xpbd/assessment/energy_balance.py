@@ -21,7 +21,7 @@ from supple.model.energy_balance import NUMERICAL
 from supple.model.system import System
 from supple.scene.stitches.measures import stitch_energy
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
-from supple.solvers.xpbd.assessment.moment import Moment
+from supple.solvers.xpbd.moment import Moment
 
 # Of the shear modulus times the volume: energies below the square of this strain are round-off.
 LEAST_STRAIN = 1e-6

@@ -11,8 +11,8 @@ from supple.model.energy_balance import add_works, no_works
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.assessment.held_forces import HeldForces
-from supple.solvers.xpbd.assessment.moment import Substep
 from supple.solvers.xpbd.contact.contact import Contact
+from supple.solvers.xpbd.moment import Substep
 
 Floats = NDArray[np.float64]
 Forces = tuple[str, NDArray[np.integer] | slice, Floats]

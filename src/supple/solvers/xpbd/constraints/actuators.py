@@ -26,7 +26,7 @@ from supple.model.loads.actuators.cables import CableLength, limits, turn_at
 from supple.model.loads.actuators.laws import GivenValue
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
-from supple.solvers.xpbd.assessment.moment import Substep
+from supple.solvers.xpbd.moment import Substep
 
 Floats = NDArray[np.float64]
 

@@ -30,7 +30,7 @@ from supple.model.joints.laws import Laws, laws_of, wrapped
 from supple.model.state import State
 from supple.model.system import System
 from supple.numerics.cross_rows import cross_rows
-from supple.solvers.xpbd.assessment.moment import Substep
+from supple.solvers.xpbd.moment import Substep
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joint_rows import JointRows
 from supple.solvers.xpbd.sweeps.ordering import Layout
