@@ -93,6 +93,21 @@ def test_a_scene_file_keeps_axes_where_it_says_so(tmp_path, more, height):
     assert np.ptp(points[:, 1]) == pytest.approx(height)
 
 
+ROBOT = """<robot name="r"><link name="l"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><mesh filename="a.dae" scale="10 10 10"/></geometry></collision></link></robot>"""
+
+
+def test_a_robot_ignores_which_axis_points_up(tmp_path):
+    """As RViz, Gazebo and MoveIt do: its links are in the coordinates of the file."""
+    pytest.importorskip("collada")
+    (tmp_path / "a.dae").write_text(dae("Z"))
+    (tmp_path / "r.urdf").write_text(ROBOT)
+    body = sp.load_scene(tmp_path / "r.urdf").bodies[0]
+    points = body.surface.vertices - body.surface.vertices.min(axis=0)
+    np.testing.assert_allclose(points.max(axis=0), [0.2, 0.1, 0.3], atol=1e-6)
+
+
 def test_what_of_collada_is_left_out_is_said(tmp_path, caplog):
     pytest.importorskip("collada")
     strip = f'<tristrips count="1">{INPUT}<p>0 1 2 3</p></tristrips>'

@@ -137,6 +137,18 @@ def test_what_is_hidden_or_a_guide_is_left_out(tmp_path: Path, caplog: pytest.Lo
     assert "its 1 shapes (cubes, spheres and the like) were left out" in caplog.text
 
 
+def test_instances_in_the_file_are_placed(tmp_path: Path) -> None:
+    place = 'double3 xformOp:translate = ({}, 0, 0)\nuniform token[] xformOpOrder = ["xformOp:translate"]\n'
+    both = "".join(
+        f'def Xform "{name}" (\ninstanceable = true\nreferences = </proto>\n)\n{{\n{place.format(x)}}}\n'
+        for name, x in (("one", 0), ("two", 5))
+    )
+    (tmp_path / "a.usda").write_text(stage(f'class "proto" {{\n{mesh("m")}}}\n' + both, unit="1"))
+    surface = sp.SurfaceMesh.load(tmp_path / "a.usda")
+    assert surface.components.count == 2
+    assert surface.bounds[1][0] == pytest.approx(6.0)
+
+
 def test_tets_count_before_surfaces(tmp_path: Path) -> None:
     (tmp_path / "a.usda").write_text(stage(mesh("b") + tet(POINTS).partition("\n")[2]))
     assert len(sp.TetMesh.load(tmp_path / "a.usda").tets) == 1

@@ -71,13 +71,8 @@ def tets_of(soup: CellSoup) -> Tets:
         if (np.diff(soup.offsets)[cells] != width).any():
             raise FormatError(f"its quadratic tetrahedra do not have {width} points each")
         return Tets(soup.points, soup.connectivity[soup.offsets[cells][:, None] + np.arange(width)], cells, [])
-    notes = [
-        f"of {int((soup.types == number).sum()):,} {KINDS[number].plural}, only the corners are used"
-        for number in kinds
-        if KINDS[number].linear != number
-    ]
     linear = cut_to_corners(soup, solid)
-    points, rows, owners, counts, middles = soup.points, [], [], {}, 0
+    points, rows, owners, tet_count, middles = soup.points, [], [], 0, 0
     for number in np.unique(linear.types):
         own = np.flatnonzero(linear.types == number)
         corners = linear.connectivity[linear.offsets[own][:, None] + np.arange(KINDS[number].corners)]
@@ -90,20 +85,29 @@ def tets_of(soup: CellSoup) -> Tets:
         tets, cell, points, new = _split(corners, int(number), points, cells[own])
         rows.append(tets)
         owners.append(cells[own][cell])
-        name = KINDS[int(linear.types[own[0]])]
-        counts[name.name if len(own) == 1 else name.plural] = len(own), len(tets)
-        middles += new
-    if counts:
-        split = " and ".join(f"{count:,} {name}" for name, (count, _) in counts.items())
-        new = "1 new vertex in the middle of a warped one" if middles == 1 else f"{middles:,} new ones in warped cells"
-        middle = f", with {new}" if middles else ""
-        one = sum(count for count, _ in counts.values()) == 1
-        notes.append(
-            f"{split} {'was' if one else 'were'} split into {sum(n for _, n in counts.values()):,} tets{middle}"
-        )
+        tet_count, middles = tet_count + len(tets), middles + new
     cell = np.concatenate(owners)
     order = np.argsort(cell, kind="stable")
-    return Tets(points, np.concatenate(rows)[order], cell[order], notes)
+    return Tets(points, np.concatenate(rows)[order], cell[order], _said(soup.types[solid], tet_count, middles))
+
+
+def _said(types: NDArray[np.uint8], tet_count: int, middles: int) -> list[str]:
+    """What became of solids of these types: how many were split into how many tets, and which were cut to corners."""
+    numbers, counts = np.unique(types, return_counts=True)
+    of = {KINDS[int(number)]: int(count) for number, count in zip(numbers, counts, strict=True)}
+    split = {kind: count for kind, count in of.items() if kind.linear != TETRA}
+    notes = []
+    if split:
+        names = " and ".join(f"{count:,} {kind.name if count == 1 else kind.plural}" for kind, count in split.items())
+        by = " by their corners" if any(kind.name != KINDS[kind.linear].name for kind in split) else ""
+        new = "1 new vertex in the middle of a warped one" if middles == 1 else f"{middles:,} new ones in warped cells"
+        middle = f", with {new}" if middles else ""
+        were = "was" if sum(split.values()) == 1 else "were"
+        notes.append(f"{names} {were} split{by} into {tet_count:,} tets{middle}")
+    curved = sum(count for kind, count in of.items() if kind.linear == TETRA and kind.name != KINDS[TETRA].name)
+    if curved:
+        notes.append(f"of {curved:,} {KINDS[QUADRATIC_TETRA].plural}, only the corners are used")
+    return notes
 
 
 def _split(
