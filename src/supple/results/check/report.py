@@ -93,17 +93,19 @@ class CheckReport(Displayed):
 
     @property
     def verdict(self) -> str:
-        """One line: what was checked, and what failed, first the check that failed first."""
+        """One line: what was checked, what was skipped, and what failed, first the check that failed first."""
         checked = "all" if self.frames == self.frames_checked else f"{self.frames_checked} of"
         begin = f"{self.path}: {checked} {self.frames} frames checked"
         begin += f" ({self.unfinished})" if self.unfinished else ""
+        without = ", ".join(result.name for result in self.results if result.verdict is Verdict.SKIPPED)
+        without = f"; skipped: {without}" if without else ""
         if self.ok:
             passed = sum(result.verdict is Verdict.PASS for result in self.results)
-            return f"{begin}, {passed} checks passed"
+            return f"{begin}, {passed} checks passed{without}"
         failed = sorted(self.failures, key=lambda result: result.first_failure or 0)
         first = failed[0]
         at = "" if first.first_failure is None else f", first {first.name} in frame {first.first_failure}"
-        return f"{begin}, FAILED: {', '.join(result.name for result in failed)}{at}"
+        return f"{begin}, FAILED: {', '.join(result.name for result in failed)}{at}{without}"
 
     def __getitem__(self, name: str) -> CheckResult:
         """The result of the check of that name."""

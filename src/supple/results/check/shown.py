@@ -1,10 +1,7 @@
-"""The place of the first failure: the surfaces of its frame, a picture of them, and a report as a page with it."""
+"""The place of the first failure: the surfaces of its frame, and a picture of them."""
 
 from __future__ import annotations
 
-import base64
-import html
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.check.checks.tunnelling import passing_between
-from supple.results.check.report import CheckReport, CheckResult
+from supple.results.check.report import CheckResult
 from supple.results.check.snapshot import Scene
 from supple.results.view.look import body_color
 from supple.runtime.figures import paper_figure
-from supple.runtime.replacing import whole_file
 
 # Of failures in the same frame, the first of these is shown.
 _ORDER = ("inversion", "intersection", "tunnelling", "distance", "containment", "volume")
@@ -29,10 +25,6 @@ _RED = (0.85, 0.1, 0.12)
 # How far around what is at fault the second view reaches, in its sizes; at least this share of everything.
 _AROUND, _LEAST = 1.8, 0.04
 _LIGHT = np.array([0.35, 0.25, 0.9])
-_STYLE = """body{font:16px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:62rem;padding:0 1rem;color:#222}
-table{border-collapse:collapse;width:100%}td,th{text-align:left;padding:.3rem .6rem;border-bottom:1px solid #ddd;
-vertical-align:top}.pass{color:#2a7d36}.fail{color:#b3121d;font-weight:600}.skipped{color:#777}img{max-width:100%}
-h1{font-size:1.3rem}td.n{text-align:right;white-space:nowrap}"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,36 +142,3 @@ def _projected(x: NDArray[np.float64], up: int) -> NDArray[np.float64]:
     ahead = -np.sin(a) * turned[:, 0] + np.cos(a) * turned[:, 1]
     above = np.cos(b) * turned[:, 2] + np.sin(b) * ahead
     return np.column_stack([across, above, np.sin(b) * turned[:, 2] - np.cos(b) * ahead])
-
-
-def write_page(report: CheckReport, output: Path) -> Path:
-    """Write the page.
-
-    Raises
-    ------
-    OutputError : where it cannot be written.
-    """
-    verdict = "pass" if report.ok else "fail"
-    parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content='width=device-width'>",
-        f"<title>supple check: {html.escape(str(report.path))}</title><style>{_STYLE}</style>",
-        f"<h1 class={verdict}>{html.escape(report.verdict)}</h1>",
-    ]
-    if report.place is not None:
-        with tempfile.TemporaryDirectory() as folder:
-            picture = draw(report.place, Path(folder) / "place.png").read_bytes()
-        text = html.escape(report.place.title, quote=True)
-        parts.append(f'<img alt="{text}" src="data:image/png;base64,{base64.b64encode(picture).decode()}">')
-    parts.append("<table><tr><th>check<th>verdict<th>found<th>frame<th>time [s]</tr>")
-    for result in report.results:
-        frame = "" if result.frame is None else str(result.frame)
-        time = "" if result.time is None else f"{result.time:.6g}"
-        parts.append(
-            f"<tr><td>{result.name}<td class={result.verdict}>{result.verdict}<td>{html.escape(result.message)}"
-            f"<td class=n>{frame}<td class=n>{time}</tr>"
-        )
-    parts.append("</table>")
-    parts += [f"<p>{html.escape(note)}.</p>" for note in report.notes]
-    with whole_file(output) as fresh:
-        fresh.write_text("\n".join(parts) + "</html>\n", encoding="utf-8", newline="\n")
-    return output

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
 from supple.materials.laws.internal import NEVER_FLOWED
+from supple.results.check.floors import Floors
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.results.check.geometry.orientation import volume_signs
@@ -52,6 +53,17 @@ class Scene:
         """Longest extent of the largest body at rest [m]."""
         rest = self.recording.rest_positions
         return max(float(np.ptp(body.points(rest), axis=0).max()) for body in self.recording.bodies)
+
+    @cached_property
+    def reach(self) -> float:
+        """The largest coordinate at rest and in the first frame [m]."""
+        found = (self.recording.rest_positions, self.snapshot(0).positions)
+        return max(float(np.abs(x[np.isfinite(x).all(axis=1)]).max(initial=0.0)) for x in found)
+
+    @cached_property
+    def floors(self) -> Floors:
+        """Below which numbers are not judged."""
+        return Floors(self)
 
     @property
     def file_steps(self) -> NDArray[np.int64] | None:

@@ -41,7 +41,6 @@ def check(
     fps: float | None = None,
     free: Flag = False,
     json: Path | None = None,
-    html: Path | None = None,
     picture: Path | None = None,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> ExitCode:
@@ -90,8 +89,6 @@ def check(
         Nothing but gravity acts on the parts of the series: momentum is checked.
     json
         Write the results to this file.
-    html
-        Write the results, with a picture of the place of the first failure, as a page to this file.
     picture
         Draw the place of the first failure to this file (.png, .pdf or .svg).
     quiet
@@ -109,17 +106,13 @@ def check(
     settings = {key: values[key] for key in _SETTINGS if values[key] is not None}
     given = {key: values[key] for key in _GIVEN if values[key]}
     CheckSettings(**settings)
-    for output in (json, html, picture):
+    for output in (json, picture):
         if output is not None:
             for each in (path, *more):
                 refuse_to_replace(each, output)
     report = _report((path, *more), given, settings)
     if json is not None:
         report.save(json)
-    if html is not None:
-        from supple.results.check.shown import write_page
-
-        write_page(report, html)
     if picture is not None and report.place is not None:
         from supple.results.check.shown import draw
 

@@ -9,12 +9,9 @@ from supple.results.check.frame_check import At, FrameCheck
 from supple.results.check.report import CheckResult
 from supple.results.check.settings import CheckSettings
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.check.stored_energies import stiffness_scale
 from supple.results.recording.reader import Recording
 
-# Motion slower than this share of a body's size per step, and energy of the same share, is round-off.
-_FLOOR = 1e-9
-# Energies are recorded and computed here in double precision, each up to round-off of the energies of its elements.
+# Of energies and works, which are recorded and computed here in double precision.
 _CLOSED = 1e-9
 # Momenta by differences of positions that may be in single precision.
 _OF_DIFFERENCES = 1e-3
@@ -58,10 +55,10 @@ class Momentum(FrameCheck):
         if self._start is None:
             self._start = at.time, P
         t, total = at.time - self._start[0], float(m.sum())
-        floor = total * _FLOOR * self.scene.size / recording.dt
         pushed = total * float(np.linalg.norm(g)) * t
-        self._scale = max(self._scale, float(m @ np.linalg.norm(v, axis=1)) + pushed + floor)
-        change = float(np.linalg.norm(P - self._start[1] - total * g * t)) / self._scale
+        self._scale = max(self._scale, float(m @ np.linalg.norm(v, axis=1)) + pushed)
+        change = max(float(np.linalg.norm(P - self._start[1] - total * g * t)) - self.scene.floors.momentum, 0.0)
+        change /= self._scale + total * self.scene.floors.speed
         most = self.settings.max_momentum_change
         if "files" in recording.knows and most == CheckSettings.max_momentum_change:
             most = _OF_DIFFERENCES
@@ -98,10 +95,12 @@ class Spin(FrameCheck):
         r, v = x - m @ x / total, at.velocities - m @ at.velocities / total
         L = m @ np.cross(r, v)
         moving = float(m @ (np.linalg.norm(r, axis=1) * np.linalg.norm(v, axis=1)))
-        self._scale = max(self._scale, moving + total * self.scene.size**2 * _FLOOR / recording.dt)
+        floors, size = self.scene.floors, self.scene.size
+        self._scale = max(self._scale, moving + total * size * floors.speed)
         if self._last is not None:
             old_L, old_v = self._last
-            change = float(np.linalg.norm(L - old_L))
+            speeds = np.linalg.norm(at.velocities, axis=1)
+            change = float(np.linalg.norm(L - old_L)) - size * floors.momentum - floors.roundoff * float(m @ speeds)
             if self._implicit:
                 speeds = np.linalg.norm(v, axis=1) + np.linalg.norm(old_v, axis=1)
                 change -= recording.dt * float(m @ (np.linalg.norm(v - old_v, axis=1) * speeds))
@@ -203,8 +202,9 @@ class Balance(FrameCheck):
         residual = recording.frame_values("details/energy_residual")
         each = np.array([*self._works.values(), residual])
         sums, sizes = np.cumsum(each.sum(axis=0))[rows], np.cumsum(np.abs(each).sum(axis=0))[rows]
-        scale = energy_scale(self.scene, stored, height) + sizes + stiffness_scale(recording)
-        open_ = np.abs(stored + height - stored[0] - height[0] - (sums - sums[0])) / scale
+        scale = energy_scale(self.scene, stored, height) + sizes
+        miss = np.abs(stored + height - stored[0] - height[0] - (sums - sums[0]))
+        open_ = np.maximum(miss - self.scene.floors.sums, 0.0) / scale
         left = np.abs(np.cumsum(residual)[rows]) / scale
         for number, miss, rest in zip(rows, open_, left, strict=True):
             at = recording[int(number)]
@@ -245,6 +245,5 @@ def moved_and_height(at: Snapshot, first: Snapshot) -> tuple[float, float]:
 
 
 def energy_scale(scene: Scene, stored: NDArray[np.float64], height: NDArray[np.float64]) -> float:
-    """The energy in motion [J], never below round-off."""
-    weight = float(scene.recording.masses.sum() * np.linalg.norm(scene.recording.gravity))
-    return float(stored.max() + np.ptp(height)) + _FLOOR * weight * scene.size + 1e-300
+    """The energy in motion [J], never below what is not seen."""
+    return float(stored.max() + np.ptp(height)) + scene.floors.energy

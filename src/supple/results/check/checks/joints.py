@@ -172,10 +172,11 @@ class Welds(FrameCheck):
         recording = self.scene.recording
         for weld in recording.welds:
             control = recording.bodies[weld.rigid].vertices
-            before, now = self._first.positions, at.positions
-            fit = np.column_stack([before[control], np.ones(4)])
-            motion = np.linalg.solve(fit, now[control])
-            there = np.column_stack([before[weld.vertices], np.ones(len(weld.vertices))]) @ motion
+            # About centers: far from the origin, a fit with a translation loses digits.
+            centers = [of.positions[control].mean(axis=0) for of in (self._first, at)]
+            before, now = self._first.positions - centers[0], at.positions - centers[1]
+            motion = np.linalg.lstsq(before[control], now[control], rcond=None)[0]
+            there = before[weld.vertices] @ motion
             size = float(np.linalg.norm(np.ptp(before[control], axis=0)))
             off = np.linalg.norm(now[weld.vertices] - there, axis=1) / size
             worst = int(off.argmax())

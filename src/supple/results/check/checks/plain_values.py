@@ -17,7 +17,6 @@ CONSTANTS = ("rest_positions", "rest_volumes", "masses", "gravity")
 # These series use NaN for "not known".
 _MAY_BE_UNKNOWN = ("min_distance", "largest_stitch_stretch")
 _SAME_TIME = 1e-9
-_MOVING = 1e-9
 
 # How far the displacement of a body in a step may differ from that of its velocities, as a share of its speed times the
 # step. In unchanged recordings it was less than 0.1.
@@ -106,7 +105,7 @@ class Sequence(FrameCheck):
                 self._follow(before, at)
             return
         slowest = min(float(np.abs(frame.velocities).max(initial=0.0)) for frame in (before, at))
-        if slowest * recording.dt > _MOVING * self.scene.size and recording.statuses[at.number].can_go_on:
+        if slowest > self.scene.floors.speed and recording.statuses[at.number].can_go_on:
             self.tally.see(at, slowest, True, f"repeats frame {before.number} although it moves")
 
     def _follow(self, before: Snapshot, at: Snapshot) -> None:
@@ -124,7 +123,7 @@ class Sequence(FrameCheck):
             change = last - first
             along = np.clip((mean - first) @ change / max(float(change @ change), 1e-300), 0.0, 1.0)
             off = float(np.linalg.norm(mean - first - along * change))
-            rounding = _MOVING * self.scene.size / abs(step)
+            rounding = self.scene.floors.speed * recording.dt / abs(step)
             if speeds[1] > 0.0 and off > _LARGEST_DEVIATION * (max(speeds) + fall) + rounding:
                 where = f"{body.name} is {off * abs(step):.3g} m from where its velocities lead"
                 self.tally.see(at, off, True, where)

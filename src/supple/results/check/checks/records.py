@@ -8,7 +8,6 @@ import numpy as np
 
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.snapshot import Snapshot, edge_vectors
-from supple.results.check.stored_energies import stiffness_scale, stitch_scale
 
 # Allowed difference, as a share of the natural size of each quantity; both sides are computed in double precision.
 _SAME = 1e-9
@@ -25,8 +24,6 @@ class Records(FrameCheck):
 
     def begin(self) -> None:
         self._inverse_sizes = np.linalg.norm(self.scene.rest_inverse, axis=(1, 2))
-        self._stiffness_scale = stiffness_scale(self.scene.recording)
-        self._stitch_scale = stitch_scale(self.scene.recording)
 
     def see(self, at: Snapshot) -> None:
         # Another check finds numbers that are not finite.
@@ -53,13 +50,13 @@ class Records(FrameCheck):
         heights = float(m @ np.linalg.norm(x, axis=1)) * float(np.linalg.norm(recording.gravity))
         recorded = recording.series("potential_energy")[k]
         yield abs(recorded - potential) / (heights + _NOTHING), "potential energy"
-        for name, energy, scale in (
-            ("elastic energy", at.elastic_energy, self._stiffness_scale),
-            ("stitch energy", at.stitch_energy, self._stitch_scale),
+        for name, energy in (
+            ("elastic energy", at.elastic_energy),
+            ("stitch energy", at.stitch_energy),
         ):
             if energy is not None:
                 recorded = recording.series(name.replace(" ", "_"))[k]
-                yield abs(recorded - energy) / (abs(energy) + scale + _NOTHING), name
+                yield abs(recorded - energy) / (abs(energy) + self.scene.floors.sums / _SAME), name
         momentum = m @ v
         recorded = recording.series("linear_momentum")[k]
         speeds = np.linalg.norm(v, axis=1)

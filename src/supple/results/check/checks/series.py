@@ -92,11 +92,11 @@ class Gaps(FrameCheck):
 
 
 class Scale(FrameCheck):
-    """The unit of length does not change: sides do not become twice as long, or half as long, from frame to frame."""
+    """The unit of length does not change: not all sides become twice as long, or half as long, from frame to frame."""
 
     name = "scale"
-    good = "largest factor {worst} between the lengths of sides of two frames"
-    bad = "lengths of sides change by a factor of {worst}: is the unit another one?"
+    good = "largest factor {worst} by which every side changes from frame to frame"
+    bad = "every side changes by a factor of {worst} or more: is the unit another one?"
 
     def begin(self) -> None:
         triangles = self.scene.surfaces.triangles
@@ -107,8 +107,9 @@ class Scale(FrameCheck):
     def see(self, at: Snapshot) -> None:
         lengths = np.linalg.norm(at.points[self._sides[:, 0]] - at.points[self._sides[:, 1]], axis=1)
         if self._last is not None:
-            longer = float(np.median(lengths)) / max(float(np.median(self._last)), 1e-300)
-            factor = max(longer, 1.0 / max(longer, 1e-300))
+            known = (self._last > 0.0) & (lengths > 0.0)
+            ratios = lengths[known] / self._last[known] if known.any() else np.ones(1)
+            factor = max(1.0, float(ratios.min()), 1.0 / float(ratios.max()))
             self.tally.see(at, factor, not factor < _LARGEST_FACTOR)
         self._last = lengths
 

@@ -271,7 +271,7 @@ class Works(FrameCheck):
             # Forces of loads are known: their works are compared with themselves. Those of pins and of contact balance
             # all other forces, and are found as well as these.
             energies = energy_scale(self.scene, stored, height)
-            shares = excess / (sizes + (_CLOSED if name in self._loads else 1.0) * energies)
+            shares = excess / (sizes + (_CLOSED if name in self._loads else 1.0) * energies + self.scene.floors.sums)
             for number, share in zip(rows, shares, strict=True):
                 failed = not share <= self.settings.max_energy_gain
                 self.tally.see(recording[int(number)], float(share), failed, f"work of {name}" if failed else "")

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,8 @@ from supple.solvers.implicit.newton.free_motion import FreeMotion
 
 # The energy that the integrator may add, as a share of a piece's elastic, stitch and relative kinetic energy.
 _ALLOWED = 0.01
+# Energies below that of this strain everywhere are round-off.
+_LEAST_STRAIN = 1e-6
 # The largest share of the relative kinetic energy that one step removes.
 _MOST_TAKEN = 0.9
 # The share of a piece's energy, that of its rigid motion included, that may remain without a source after a step.
@@ -125,9 +128,17 @@ class Conservation:
         made = end.memory.made + np.maximum(np.bincount(self.piece, weights=works), 0.0)
         m, v = self.system.masses, end.velocities
         kinetic = 0.5 * np.bincount(self.piece, weights=m * np.einsum("ij,ij->i", v, v))
-        shares = made / np.maximum(self.latest[1] + kinetic, np.finfo(np.float64).tiny)
+        least = _LEAST_STRAIN**2 * self._stiffness + np.finfo(np.float64).tiny
+        shares = made / (self.latest[1] + kinetic + least)
         share, name = max((float(shares[self.piece[part.vertices]].max()), part.name) for part in self.system.bodies)
         return (share, name) if share > _MOST_MADE else None
+
+    @cached_property
+    def _stiffness(self) -> NDArray[np.float64]:
+        """(p,) sum of moduli times volume of each piece [J]."""
+        material, count = self.elasticity.material, int(self.piece.max()) + 1
+        of_tets = (np.abs(material.mu) + np.abs(material.lam)) * self.system.rest_volumes
+        return np.bincount(self.piece[self.system.tets[:, 0]], weights=of_tets, minlength=count).astype(np.float64)
 
     def _stored(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p,) elastic and stitch energy of each piece [J]."""

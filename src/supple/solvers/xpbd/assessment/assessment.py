@@ -29,11 +29,13 @@ class Ledger:
     ----------
     tangled : names of the bodies that began with inverted tets and still have some
     excess : energy without a source that has not been lost since [J]
+    open : sum of the residuals of works [J], see `Report.energy_residual`
     scale : the largest energy so far without the excess of its time, to compare the excess with [J]
     """
 
     tangled: frozenset[str] = frozenset()
     excess: float = 0.0
+    open: float = 0.0
     scale: float = 0.0
 
 
@@ -79,6 +81,7 @@ class Assessment:
         held: float,
         asleep: NDArray[np.bool_],
         works: Mapping[str, float],
+        residual: float,
         measured: MeasuredWork,
     ) -> tuple[Findings, Ledger]:
         """Judge the end of a frame.
@@ -88,7 +91,7 @@ class Assessment:
         overlaps : of surfaces and obstacles; J : (m,) of all tets
         h : length of the substeps [s]; accuracy : how much stiffness a body may lack
         held : the share of the substeps in which the motion of bodies was shortened
-        asleep : (b,) bodies that did not move; works : of the frame, by name [J]
+        asleep : (b,) bodies that did not move; works : of the frame, by name, residual : of these [J]
         measured : of the stresses that substeps of h delivered, with this frame
         """
         before = self._ledger
@@ -97,14 +100,17 @@ class Assessment:
         counts = not 0.0 < gain < LEAST_GAIN * max(before.scale, energy)
         excess = max(0.0, before.excess + (gain if counts else 0.0))
         scale = max(before.scale, energy - max(before.excess, excess))
+        open_ = before.open + residual
+        unsolved = abs(residual) > LEAST_GAIN * scale
         lacks = zip(self.softening.shares(h, measured).tolist(), self.softening.names, strict=True)
         findings = Findings(
             inverted=count_inverted(self.system, J, tangled),
             overlaps=overlaps,
             held=held,
             gained=excess / (scale + excess) if excess > 0.0 else 0.0,
+            open=abs(open_) / (scale + abs(open_)) if unsolved else 0.0,
             gainer=self.system.bodies[gainer].name,
             crushed=bool((J[self._whole] < CRUSHED).any()),
             softened=[(share, name) for share, name in lacks if share > accuracy],
         )
-        return findings, Ledger(tangled, excess, scale)
+        return findings, Ledger(tangled, excess, open_, scale)

@@ -28,6 +28,8 @@ LEAST_STRAIN = 1e-6
 # Of the mean surface edge: energies below that of a fall by this height are not judged. Contact lifts what begins on a
 # floor by its skin.
 LEAST_FALL = 0.05
+# Of the mean surface edge: motion by less in a substep is round-off.
+LEAST_STEP = 1e-9
 # Of the works of pins and anchors in a frame: how much they may be off.
 PIN_TOLERANCE = 0.2
 # Works that take energy, and those that are not those of forces.
@@ -49,6 +51,7 @@ class EnergyBalance:
         self._obstacles_move = any(obstacle.motion is not None for obstacle in system.obstacles)
         fall = LEAST_FALL * edge_length * math.hypot(*system.gravity)
         self._least = LEAST_STRAIN**2 * _stiffness(system) + fall * float(self._masses.sum())
+        self._shortest = LEAST_STEP * edge_length
         self._begun = np.zeros(len(system.bodies))
         self._total = self._hard = self._h = 0.0
 
@@ -66,7 +69,8 @@ class EnergyBalance:
         ended, total = self._measure(moment)
         given_out = max(self._hard - self._in_hard_constraints(moment), 0.0)
         gain = total - self._total - work - given_out
-        scale = max(float(self._begun.sum()), float(ended.sum()), work, given_out, self._least)
+        slow = 0.5 * float(self._masses.sum()) * (self._shortest / self._h) ** 2
+        scale = max(float(self._begun.sum()), float(ended.sum()), work, given_out, self._least + slow)
         return gain, scale, int((ended - self._begun).argmax())
 
     def _in_hard_constraints(self, moment: Moment) -> float:

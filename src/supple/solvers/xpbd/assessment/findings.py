@@ -25,6 +25,7 @@ class Findings:
     overlaps : things that are through each other
     held : the share of the substeps in which the motion of bodies was shortened
     gained : energy without a source, so far, that has not been lost since, over the scene's energy [-]
+    open : what works leave open, so far, over the scene's energy, where this frame has added to it [-]
     gainer : the body whose energy rose most in this frame
     softened : (share, body) for each body that is softer than the accuracy allows
     crushed : whether a tet has come below J = `CRUSHED` in this frame, see `supple.model.crushed`
@@ -36,6 +37,7 @@ class Findings:
     overlaps: list[Overlap] = field(default_factory=list)
     held: float = 0.0
     gained: float = 0.0
+    open: float = 0.0
     gainer: str = ""
     softened: list[tuple[float, str]] = field(default_factory=list)
     crushed: bool = False
@@ -64,6 +66,9 @@ class Findings:
             found.append((Status.ENERGY_GAINED, text))
         if self.held > HELD_TOLERANCE:
             found.append((Status.HELD_BACK, f"bodies were held back in {_percent(self.held)} of the substeps"))
+        if self.open > ENERGY_TOLERANCE:
+            text = f"works leave {_percent(self.open)} of the energy open, as motion was shortened"
+            found.append((Status.HELD_BACK, text))
         for share, name in self.softened:
             found.append((Status.SOFTENED, f"body {name!r} about {_percent(share)} too soft"))
         for what, lacks in (("its size", self.apart), ("the way of its motor", self.stalled)):

@@ -68,6 +68,7 @@ def end_frame(
         held,
         sleep.asleep,
         works,
+        ws.works.residual,
         measured,
     )
     joints = {"apart": ws.joints.apart(ws.world, time, accuracy), "stalled": ws.joints.stalled(accuracy)}
