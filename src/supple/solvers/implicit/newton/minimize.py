@@ -131,14 +131,17 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
     last_length = 0.0
     settled = 0
+    # A tet that a cut step has pressed flat is so stiff that its large forces give a short direction.
+    pressed = False
     for iteration in tools.linear_solver.iterations(problem.max_iterations):
         found = directions.find(here)
         if found is None:
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
-        last = convergence.is_short(found.length)
+        last = convergence.is_short(found.length) and not pressed
         rate = found.length / last_length if last_length > 0.0 else 0.0
         vector = found.vector
-        largest, _, reason, _ = limits.largest_step(here.positions, vector)
+        largest, tet, reason, _ = limits.largest_step(here.positions, vector)
+        pressed = largest < 1.0 and tet >= 0
         end, step, cuts = search(objective, here, vector, found.slope, largest, limits, jumps)
         # True Hessians do not need longer steps, and bodies with inverted tets recover in small ones.
         projected = found.projected is not ProjectedTerms.NONE and limits.guard.complete
