@@ -5,6 +5,7 @@ import pytest
 
 import supple as sp
 from supple.app.cli.run_estimate import RunEstimate, faster_ways
+from supple.app.cli.run_rows import run_rows
 from supple.app.scene_file.loader import load_run
 from supple.app.scene_file.new_scenes import new_scene
 from supple.model.system import build_system, initial_state
@@ -118,6 +119,18 @@ def test_a_scene_file_leaves_the_choice_to_the_scene(tmp_path):
     assert load_run(tmp_path / "ball.yaml").chosen_solver == sp.Implicit()
 
 
+def test_a_run_folder_keeps_the_choice_and_resume_takes_it(tmp_path):
+    stiff = sp.Scene([box(0.05, 2, 1e7)], [FLOOR])
+    list(sp.simulate(stiff, dt=1 / 60, steps=1, sinks=[sp.RunFolder(tmp_path / "out")]))
+    (frame,) = sp.resume(tmp_path / "out", stiff, Auto(), steps=2)
+    assert frame.solver == sp.Implicit()
+    solver = dict(run_rows(tmp_path / "out"))["solver"]
+    assert solver.startswith("Implicit(integrator=")
+    assert ", chosen: XPBD needs " in solver
+    with pytest.raises(sp.OutputError, match="was run with Implicit"):
+        sp.resume(tmp_path / "out", stiff, sp.XPBD(), steps=3)
+
+
 def test_faster_ways_are_cheaper_by_counts():
     soft, stiff = system_of(box(0.3, 4, 1e4)), system_of(box(0.03, 4, 1e6))
     ways = faster_ways(sp.XPBD(), stiff, 1 / 60)
@@ -129,6 +142,7 @@ def test_faster_ways_are_cheaper_by_counts():
     assert faster_ways(sp.XPBD(), soft, 1 / 60) == ["fewer tets"]
 
 
+@pytest.mark.filterwarnings("ignore::supple.errors.SuppleWarning")
 def test_a_long_run_says_what_it_will_take_and_again_when_frames_get_slower(monkeypatch):
     class Said(list):
         def print(self, text, **options):

@@ -15,6 +15,7 @@ contact, joints and several bodies: notes/measured_trials.md has the table.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
@@ -137,6 +138,24 @@ def suits_xpbd(counts: Counts) -> bool:
     from supple.solvers.xpbd.solver import XPBD
 
     return counts.substeps <= XPBD.max_substeps and counts.xpbd <= counts.implicit
+
+
+def cost_of_frame(solver: Solver, system: System, dt: float) -> float:
+    """What a frame of dt [s] costs by counts [ms]; infinite where the solver cannot simulate the system."""
+    from supple.solvers.implicit.solver import Implicit
+    from supple.solvers.xpbd.solver import XPBD
+
+    try:
+        solver.refuse(system)
+    except SolverError:
+        return math.inf
+    counts = Counts.of(system, dt, solver.accuracy if isinstance(solver, XPBD) else XPBD.accuracy)
+    if isinstance(solver, XPBD):
+        given = solver.substeps
+        return (counts if given == "auto" else counts._replace(substeps=given)).xpbd
+    if isinstance(solver, Implicit) and solver.max_iterations <= 3:
+        return counts.linearized(solver.max_iterations)
+    return counts.implicit
 
 
 def solver_for(solver: Solver | Auto, system: System, dt: float) -> Solver:

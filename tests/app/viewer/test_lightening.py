@@ -32,65 +32,68 @@ def slow() -> LiveScene:
 
 
 def test_bodies_of_a_slow_scene_get_fewer_tets_and_keep_their_surface(slow):
-    source, line = lighter(slow, 0.0)
+    source, line = lighter(slow)
     before, after = slow.source.scene.bodies[0], source.scene.bodies[0]
     assert len(after.mesh.tets) < 0.8 * len(before.mesh.tets)
     np.testing.assert_allclose(after.skin.volume, before.mesh.surface.volume, rtol=1e-12)
     assert after.mesh is source.scene.bodies[1].mesh  # equal bodies share their mesh
     assert f"{2 * len(after.mesh.tets):,} tets instead of {2 * len(before.mesh.tets):,}" in line
-    assert linearized(slow, 20.0) is None  # bodies that touch each other
+    assert linearized(slow) is None  # bodies that touch each other
 
 
 def test_a_scene_that_keeps_up_with_time_stays_as_it_is(slow):
     slow.source, source = replace(slow.source, dt=10.0), slow.source
     try:
-        assert lighter(slow, 0.0) is None
-        assert lighter(slow, 20.0)[1].startswith("simulates ")
+        assert lighter(slow) is None
     finally:
         slow.source = source
 
 
 def test_bodies_that_something_refers_to_keep_their_meshes():
-    source, _ = lighter(stepped(pins=[sp.Pin("ball 0", vertices=[0])]), 0.0)
+    source, _ = lighter(stepped(pins=[sp.Pin("ball 0", vertices=[0])]))
     pinned, free = source.scene.bodies
     assert pinned.skin is None
     assert len(free.mesh.tets) < len(pinned.mesh.tets)
 
 
-def alone(solver, edge=0.05) -> LiveScene:
+def alone(solver, edge=0.05, dt=1 / 60) -> LiveScene:
     scene = sp.Scene([sp.Body("ball", sp.shapes.sphere(0.1, edge), replace(JELLY, youngs=1e8))])
-    live = LiveScene(LiveSource("ball", scene, solver, 1e-3, real_time=True))
+    live = LiveScene(LiveSource("ball", scene, solver, dt, real_time=True))
     live.step()
     return live
 
 
 def test_a_slow_body_alone_is_simulated_with_two_linearizations_or_one():
     live = alone(sp.XPBD(substeps=101))
-    source, line = linearized(live, 20.0)
+    source, line = linearized(live)
     assert source.solver.max_iterations == 2
     assert source.scene is live.source.scene
     assert line == "solves each step by 2 linearizations of Implicit (status linearized)"
     live.source = replace(live.source, solver_given=True)
-    assert linearized(live, 20.0) is None
-    slow = alone(sp.Implicit(max_iterations=2, tolerance=1e-2))
-    source, line = linearized(slow, 20.0)
+    assert linearized(live) is None
+    slow = alone(sp.Implicit(max_iterations=2, tolerance=1e-2), dt=1e-3)
+    source, line = linearized(slow)
     assert source.solver == sp.Implicit(max_iterations=1, tolerance=1e-2)
     assert "by 1 linearization of" in line
-    assert linearized(slow, 0.0) is None
-    assert linearized(alone(sp.Implicit(max_iterations=1)), 20.0) is None
-    assert linearized(alone(sp.Implicit(integrator="newmark")), 20.0) is None
+    assert linearized(alone(sp.Implicit(max_iterations=2))) is None
+    assert linearized(alone(sp.Implicit(max_iterations=1), dt=1e-3)) is None
+    assert linearized(alone(sp.Implicit(integrator="newmark"), dt=1e-3)) is None
 
 
-def test_the_page_takes_what_is_fastest_and_says_so(monkeypatch):
-    live, seconds = alone(sp.XPBD(substeps=101), 0.03), {sp.XPBD: 3.0, sp.Implicit: 2.0}
-    tets = len(live.system.tets)
-    monkeypatch.setattr(LiveScene, "warm_up", lambda self, steps=1: seconds[type(self.setup.solver)])
+def test_the_page_takes_what_is_faster_by_counts_and_says_so():
+    live = alone(sp.XPBD(substeps=101), 0.03)
     chosen, line = _in_time(live)
-    assert chosen.setup.solver.max_iterations == 2  # one linearization took as long
-    assert line.startswith("to keep up with real time, the page solves each step by 2 linearizations of Implicit")
-    assert len(chosen.system.tets) == tets  # fewer took as long
-    seconds[sp.Implicit] = 4.0
-    assert _in_time(live) == (live, "")
+    assert chosen.setup.solver.max_iterations == 1
+    assert line.startswith("to keep up with real time, the page solves each step by 1 linearization of Implicit")
+    assert len(chosen.system.tets) == len(live.system.tets)
+    full = alone(sp.XPBD(substeps=101), 0.03)
+    full.source = replace(full.source, real_time=False)
+    assert _in_time(full) == (full, "")
+    kept = alone(sp.XPBD(substeps=10), 0.03)
+    assert _in_time(kept) == (kept, "")
+    both, line = _in_time(alone(sp.XPBD(substeps=101), 0.03, dt=2e-3))
+    assert len(both.system.tets) < len(live.system.tets)
+    assert "1 linearization of Implicit (status linearized) and simulates " in line
 
 
 def test_frames_are_repeated_with_at_most_twice_the_usual_substeps(monkeypatch):

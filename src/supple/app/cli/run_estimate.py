@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 from supple.model.system import System
 from supple.results.frame import Frame
-from supple.solvers.auto import Counts
+from supple.solvers.auto import cost_of_frame
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.solver import XPBD
@@ -56,36 +57,20 @@ class RunEstimate:
 
 def faster_ways(solver: Solver, system: System, dt: float) -> list[str]:
     """What would make frames of dt [s] faster, by counts; the fastest first, and fewer tets last."""
-    ways: list[tuple[float, str]] = []
+    others: list[tuple[Solver, str]] = []
     if isinstance(solver, XPBD):
-        counts = Counts.of(system, dt, solver.accuracy)
-        now = (counts if solver.substeps == "auto" else counts._replace(substeps=solver.substeps)).xpbd
-        ways.append((_cost(Implicit(), counts, system), "solver: {kind: implicit}"))
+        others.append((Implicit(), "solver: {kind: implicit}"))
         if solver.substeps == "auto" and solver.accuracy < _ROUGH:
-            rough = Counts.of(system, dt, _ROUGH)
-            ways.append((rough.xpbd, f"solver: {{kind: xpbd, accuracy: {_ROUGH}}}, which is softer"))
+            rough = f"solver: {{kind: xpbd, accuracy: {_ROUGH}}}, which is softer"
+            others.append((XPBD(accuracy=_ROUGH), rough))
     elif isinstance(solver, Implicit):
-        counts = Counts.of(system, dt, XPBD.accuracy)
-        now = counts.implicit if solver.max_iterations > 3 else counts.linearized(solver.max_iterations)
-        ways.append((_cost(XPBD(), counts, system), "solver: {kind: xpbd}"))
+        others.append((XPBD(), "solver: {kind: xpbd}"))
         if solver.integrator not in ("static", "newmark"):
-            ways.append((counts.linearized(1), "solver: {kind: implicit, max_iterations: 1}, one linearization a step"))
-    else:
-        return []
-    return [text for cost, text in sorted(ways) if cost < _GAIN * now] + ["fewer tets"]
-
-
-def _cost(solver: Solver, counts: Counts, system: System) -> float:
-    """Of the other solver; infinite where it refuses the system."""
-    from supple.errors import SolverError
-
-    try:
-        solver.refuse(system)
-    except SolverError:
-        return float("inf")
-    if isinstance(solver, XPBD):
-        return counts.xpbd if counts.substeps <= solver.max_substeps else float("inf")
-    return counts.implicit
+            one = "solver: {kind: implicit, max_iterations: 1}, one linearization a step"
+            others.append((replace(solver, max_iterations=1), one))
+    now = cost_of_frame(solver, system, dt)
+    ways = sorted((cost_of_frame(other, system, dt), text) for other, text in others)
+    return [text for cost, text in ways if cost < _GAIN * now] + ["fewer tets"]
 
 
 def _in_words(seconds: float) -> str:

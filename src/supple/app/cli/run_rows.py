@@ -28,7 +28,7 @@ def run_rows(folder: Path) -> list[tuple[str, str]]:
     rows = [
         ("kind", "run folder"),
         ("scene", _scene(journal)),
-        ("solver", run.solver),
+        ("solver", ", chosen: ".join(filter(None, [run.solver, journal.origin.get("solver_chosen")]))),
         ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
         ("seed", "none was given" if journal.seed is None else str(journal.seed)),
         ("recording", _recording(paths)),

@@ -133,7 +133,7 @@ class RunFolder(FolderSink):
         assert solver is not None
         journal = Journal(
             run=facts_of(first.system, (first.index, first.time), dt, steps, solver),
-            origin=dict(self._source.origin),
+            origin={**self._source.origin, **({"solver_chosen": solver.because} if solver.because else {})},
             seed=self._seed,
             checkpoint_every=None if self._every is None else int(self._every),
             checkpoint_seconds=None if self._seconds is None else float(self._seconds),

@@ -62,19 +62,16 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
     loop.run()
 
 
-_STEPS = 3  # of which the fastest counts: the first ones allocate memory
-
-
 def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
-    """The live scene, or where it is slower than real time one that is faster; and what was chosen."""
+    """The live scene, or where it is slower than real time, by counts, one that is faster; and what was chosen."""
     from supple.app.viewer.engine.scene.lightening import lighter, linearized
     from supple.app.viewer.engine.scene.live_scene import LiveScene
 
     if not live.source.real_time:
         return live, ""
-    seconds, chosen = live.warm_up(_STEPS), {}
-    for choice in (linearized, linearized, lighter):
-        found = choice(live, seconds)
+    chosen = []
+    for choice in (linearized, lighter):
+        found = choice(live)
         if found is None:
             continue
         try:
@@ -82,12 +79,10 @@ def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
             other.warm_up()
         except SuppleError:  # its surfaces are others, and may intersect at the start; or the solver lacks something
             continue
-        taken = other.warm_up(_STEPS)
-        if other.report.status.can_go_on and taken < seconds:
-            live, seconds = other, taken
-            chosen[choice] = found[1]
-    does = " and ".join(chosen.values())
-    line = f"to keep up with real time, the page {does}; supple view --full keeps the scene as it is"
+        if other.report.status.can_go_on:
+            live = other
+            chosen.append(found[1])
+    line = f"to keep up with real time, the page {' and '.join(chosen)}; supple view --full keeps the scene as it is"
     return live, line if chosen else ""
 
 

@@ -1,32 +1,24 @@
-"""What a frame takes on one core: for choices that keep a page as fast as real time."""
+"""What a frame takes on one core, by counts: for choices that keep a page as fast as real time."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from supple.model.system import System
+from supple.solvers.auto import cost_of_frame
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.solver import XPBD
 
-# At all and for each body, and in each substep for each tet, of one body and of many that touch each other [s].
-# Measured on an AMD EPYC; see notes/measured_trials.md.
-_FRAME, _BODY, _TET_ALONE, _TET_IN_PILE = 1e-3, 5e-4, 1.3e-7, 3e-7
-_SHARE = 0.9  # of the time of a frame that the solver may take
+# Of the time of a frame, what the solver may take by counts, and for each body [ms]: pulls and blows cost up to twice
+# as much as a frame in which nothing happens.
+_SHARE, _BODY = 0.5, 0.5
+_TET_IN_PILE = 3e-7  # a substep for each tet of many bodies that touch each other [s]
 
 
-def taken(system: System, substeps: int, measured: float) -> float:
-    """The time of a frame without what each body costs [s]: as measured, or what substeps will take in a pile."""
-    each = substeps * len(system.tets) * (_TET_ALONE if len(system.bodies) == 1 else _TET_IN_PILE)
-    return max(each, measured - _fixed(system))
-
-
-def allowed(system: System, dt: float) -> float:
-    """The time, without what each body costs, that a frame of `dt` [s] may take [s]."""
-    return max(_SHARE * dt - _fixed(system), 0.1 * dt)
-
-
-def _fixed(system: System) -> float:
-    return _FRAME + _BODY * len(system.bodies)
+def slowness(system: System, solver: Solver, dt: float) -> float:
+    """The cost of a frame of `dt` [s] as a share of what keeps up with real time."""
+    allowed = max(1e3 * _SHARE * dt - _BODY * len(system.bodies), 1e2 * dt)
+    return cost_of_frame(solver, system, dt) / allowed
 
 
 def without_long_repetitions(solver: Solver, system: System, dt: float, usual: int) -> Solver:

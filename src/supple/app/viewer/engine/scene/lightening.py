@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from supple.app.viewer.engine.scene.costs import allowed, taken
+from supple.app.viewer.engine.scene.costs import slowness
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.scene.solvers import SOLVERS, kind_of
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -23,45 +23,39 @@ _FEWEST = 60  # tets of a body: fewer do not bend
 _LEAST_GAIN = 0.8  # what is not faster, or lighter, than this is not worth another method or shape
 
 
-def linearized(live: LiveScene, measured: float) -> tuple[LiveSource, str] | None:
+def linearized(live: LiveScene) -> tuple[LiveSource, str] | None:
     """The source with two linearizations of the implicit step, or one, where it is too slow, and what the page says.
 
     For one body whose solver nobody has chosen for the page; with many bodies XPBD is faster. Two are nearer to the
     whole method, above all where a body collapses; one takes two thirds of their time where it is pulled.
-
-    Parameters
-    ----------
-    live : after a step; measured : what that took [s]
     """
-    source = live.source
-    if len(source.scene.bodies) > 1 or source.solver_given or _slowness(live, measured) <= 1.0:
+    source, now = live.source, _slowness(live)
+    if len(source.scene.bodies) > 1 or source.solver_given or now <= 1.0:
         return None
     solver = source.solver if kind_of(source.solver) == "implicit" else SOLVERS["implicit"]()
     if not isinstance(solver, Implicit) or solver.integrator in ("static", "newmark"):
         return None
-    fewer = 2 if solver.max_iterations > 3 else solver.max_iterations - 1
-    if fewer == 0:
-        return None
-    line = f"solves each step by {fewer} linearization{'s' * (fewer > 1)} of Implicit (status linearized)"
-    return replace(source, solver=replace(solver, max_iterations=fewer)), line
+    for fewer in range(min(2, solver.max_iterations - 1), 0, -1):
+        faster = replace(solver, max_iterations=fewer)
+        then = slowness(live.system, faster, source.dt)
+        if then <= 1.0 or (fewer == 1 and then < _LEAST_GAIN * now):
+            line = f"solves each step by {fewer} linearization{'s' * (fewer > 1)} of Implicit (status linearized)"
+            return replace(source, solver=faster), line
+    return None
 
 
-def lighter(live: LiveScene, measured: float) -> tuple[LiveSource, str] | None:
+def lighter(live: LiveScene) -> tuple[LiveSource, str] | None:
     """The source with fewer tets where it is too slow, and what the page does then; None where no mesh is lighter.
 
     Bodies that something refers to, such as a pin or a stitch, keep their meshes, and so do bodies with several
     materials, with quadratic tets or with a deformed start. Skins stay; a body without one is drawn with its surface.
-
-    Parameters
-    ----------
-    live : after a step; measured : what that took [s]
     """
     source, scene, tets = live.source, live.source.scene, len(live.system.tets)
-    slowness = _slowness(live, measured)
-    if slowness <= 1.0:
+    too_slow = _slowness(live)
+    if too_slow <= 1.0:
         return None
     # The substeps of XPBD fall with the length of edges: with the third root of the number of tets.
-    share = slowness ** (-0.75 if kind_of(source.solver) == "xpbd" else -1.0)
+    share = too_slow ** (-0.75 if kind_of(source.solver) == "xpbd" else -1.0)
     made: dict[int, TetMesh | None] = {}
     changed = []
     for body in scene.bodies:
@@ -80,10 +74,8 @@ def lighter(live: LiveScene, measured: float) -> tuple[LiveSource, str] | None:
     return replace(source, scene=replace(scene, bodies=changed)), line
 
 
-def _slowness(live: LiveScene, measured: float) -> float:
-    """The time of a frame as a share of what keeps up with real time."""
-    substeps = live.report.iterations if kind_of(live.source.solver) == "xpbd" else 0
-    return taken(live.system, substeps, measured) / allowed(live.system, live.source.dt)
+def _slowness(live: LiveScene) -> float:
+    return slowness(live.system, live.source.solver, live.source.dt)
 
 
 def _is_free(body: Body, source: LiveSource) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -180,14 +179,10 @@ class LiveScene:
         self.workspace = self.setup.solver.prepare(self.system)
         self._start = None  # its workspace shares arrays with the one that was left in the middle of a step
 
-    def warm_up(self, steps: int = 1) -> float:
-        """Pull for a step or more and discard them, so that compiled kernels are loaded before a person waits for them.
+    def warm_up(self) -> None:
+        """Pull for a step and discard it, so that compiled kernels are loaded before a person waits for them.
 
         Not far: contacts of a surface that is torn through others take many seconds.
-
-        Returns
-        -------
-        the time of the fastest step; of a process that shares its core, only its own part [s]
         """
         setup, state = self.setup, self.state
         for body in self.system.bodies[:1]:
@@ -195,19 +190,11 @@ class LiveScene:
             target = x[0] + 0.1 * (x.mean(axis=0) - x[0])
             command = Grab(0, body.name, (0,), (1.0,), (target[0], target[1], target[2]))
             self.grab({0: make_spring(command, setup.scene, body, self.system.masses, state.positions)})
-        seconds = []
-        for _ in range(steps):
-            began, own = time.perf_counter(), time.process_time()
-            goes_on = self.step().status.can_go_on
-            seconds.append(min(time.perf_counter() - began, time.process_time() - own))
-            if not goes_on:
-                break
-        if goes_on and self._start is not None:
+        if self.step().status.can_go_on and self._start is not None:
             self._return(self._start)
         else:
             self.adopt(setup, state)
         self.frame = 0
-        return min(seconds)
 
     def step(self) -> StepReport:
         """Simulate one frame. Where this fails, the state does not change, and the report contains the reason."""
