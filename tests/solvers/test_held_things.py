@@ -148,3 +148,32 @@ def test_a_pin_that_pushes_a_bar_fast_does_its_work(speed, solver, tmp_path):
     if solver == "implicit":
         assert speed > 5.0 or len(good) == len(frames)
         assert failed <= {"status"}
+
+
+RISING = sp.Keyframes([0, 0.2, 0.5], displacements=[(0, 0, 0), (0, 0.1, 0), (0.05, 0.25, 0)], angles=[0, 0, 0.2])
+LIFTED = {
+    "stands": {"bodies": [block("load", 0.1011, 1.0)]},
+    "fixed": {"bodies": [block("load", 0.2, 1.0)], "joints": [sp.FixedJoint("load", "lift")]},
+    "ball": {"bodies": [block("load", -0.2, 1.0)], "joints": [sp.BallJoint("load", "lift", point=(0, -0.1, 0))]},
+    "stitch": {
+        "bodies": [soft("load", 0.105)],
+        "stitches": [sp.SoftVertexTriangleStitch("load", "lift", max_distance=0.006, youngs=1e6, poisson=0.3)],
+    },
+}
+NAMES = {"stands": "contact", "fixed": "joints", "ball": "joints", "stitch": "anchors"}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("name", LIFTED)
+def test_an_obstacle_that_rises_does_the_work_on_what_it_holds(name, solver, tmp_path):
+    lift = sp.obstacles.TriangleObstacle(
+        name="lift", surface=sp.shapes.box_surface((0.4, 0.1, 0.4), (4, 1, 4)), motion=RISING, friction=0.5
+    )
+    scene = sp.Scene(obstacles=[lift], **LIFTED[name])
+    path = tmp_path / "lift.vtkhdf"
+    frames = list(sp.simulate(scene, SOLVERS[solver], 1 / 60, 30, sinks=[sp.Recorder(path)]))
+    works = {key: sum(frame.report.work[key] for frame in frames) for key in frames[0].report.work}
+    given = works[NAMES[name]] + works["friction"]
+    assert given > mass_of(scene) * G * 0.24
+    assert abs(works["numerical"]) < 0.07 * given
+    assert sp.check_recording(path).ok

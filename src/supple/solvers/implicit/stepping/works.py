@@ -93,7 +93,8 @@ def works_of_step(
     """
     system, x, n = ws.system, outcome.end.positions, ws.bodies_end
     moved = x - before.positions
-    moved[n:] = 0.0  # obstacles
+    of_obstacles = moved[n:].copy()
+    moved[n:] = 0.0
     works = works_of_loads(system, before, moved, middle, time)
     end = State(time, x, before.velocities, internal=internal)
     add_works(works, work_of_growth(system, before, end))
@@ -102,6 +103,11 @@ def works_of_step(
             gradient = np.zeros_like(x)
             term.add_gradient(x, gradient)
             add_works(works, {term.work: -plan.place * inner(gradient, moved)})
+    if ws.stitches is not None and of_obstacles.any():
+        gradient = np.zeros_like(x)
+        acted = before.positions + plan.place * (x - before.positions)
+        ws.stitches.at(middle).add_gradient(acted, gradient)
+        add_works(works, {"anchors": inner(gradient[n:], of_obstacles)})
     left = plan.place * np.einsum("ij,ij->i", system.welding.reduced(outcome.end.gradient), moved)
     held = system.pinned_vertices
     pins = float(left[held].sum())
