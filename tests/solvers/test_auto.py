@@ -8,6 +8,7 @@ from supple.app.cli.run_estimate import RunEstimate, faster_ways
 from supple.app.cli.run_rows import run_rows
 from supple.app.scene_file.loader import load_run
 from supple.app.scene_file.new_scenes import new_scene
+from supple.app.studies.sources import FunctionSource
 from supple.model.system import build_system, initial_state
 from supple.results import progress
 from supple.solvers.auto import Auto, Counts
@@ -115,8 +116,10 @@ def test_a_scene_file_leaves_the_choice_to_the_scene(tmp_path):
     run = load_run(tmp_path / "ball.yaml")
     assert run.solver == Auto(accuracy=0.1)
     assert run.chosen_solver == sp.XPBD(accuracy=0.1)
-    (tmp_path / "ball.yaml").write_text(text.replace("accuracy: 0.1", "accuracy: 1e-4").replace("5e+04", "1e7"))
+    (tmp_path / "ball.yaml").write_text(text.replace("youngs: 5e4", "youngs: 1e9"))
     assert load_run(tmp_path / "ball.yaml").chosen_solver == sp.Implicit()
+    job = FunctionSource(lambda: load_run(tmp_path / "ball.yaml").scene, None, 1 / 60, 3).job({})
+    assert job.load(tmp_path).chosen_solver == sp.Implicit()
 
 
 def test_a_run_folder_keeps_the_choice_and_resume_takes_it(tmp_path):

@@ -21,6 +21,7 @@ from supple.app.scene_file.yaml_files import YamlDocument, read_yaml, yaml_text
 from supple.errors import StudyError
 from supple.runtime.replacing import whole_file
 from supple.scene.scene import Scene
+from supple.solvers.auto import Auto
 from supple.solvers.solver import Solver
 
 
@@ -147,7 +148,7 @@ class FunctionJob(Job):
 
     make: Callable[..., Any]
     values: Mapping[str, Any]
-    solver: Solver | None
+    solver: Solver | Auto | None
     dt: float
     steps: int
 
@@ -158,15 +159,13 @@ class FunctionJob(Job):
         name = getattr(self.make, "__name__", "the function")
         if not isinstance(made, Scene):
             raise StudyError(f"{name} returned a {type(made).__name__}; return a Scene, or a Run with its own solver")
-        if self.solver is None:
-            raise StudyError(f"{name} returned a Scene, and the study has no solver; give solver=sp.XPBD() to sweep")
-        return Run(made, self.solver, self.dt, self.steps)
+        return Run(made, self.solver or Auto(), self.dt, self.steps)
 
 
 class FunctionSource(Source):
     """A function of the factors. `solver`, `dt` [s] and `steps` are for functions that return a `Scene`."""
 
-    def __init__(self, make: Callable[..., Any], solver: Solver | None, dt: float, steps: int) -> None:
+    def __init__(self, make: Callable[..., Any], solver: Solver | Auto | None, dt: float, steps: int) -> None:
         self.make, self.solver, self.dt, self.steps = make, solver, dt, steps
 
     def job(self, values: Mapping[str, Any]) -> FunctionJob:

@@ -14,6 +14,7 @@ from supple.app.studies.sources import FileSource, FunctionSource, Source
 from supple.app.studies.study import CHECKPOINT_SECONDS, Study, StudyProgress, ignore_progress
 from supple.app.studies.table import StudyTable
 from supple.scene.scene import Scene
+from supple.solvers.auto import Auto
 from supple.solvers.solver import Solver
 
 
@@ -24,7 +25,7 @@ def sweep(
     measure: Measure,
     design: Design | None = None,
     folder: str | Path = "study",
-    solver: Solver | None = None,
+    solver: Solver | Auto | None = None,
     dt: float = 1.0 / 60.0,
     steps: int = 300,
     units: Mapping[str, str] | None = None,
@@ -47,7 +48,8 @@ def sweep(
     measure : takes a `Recording`, and returns a number, or numbers by name.
     design : `sp.studies.Grid()` (the default) or `sp.studies.LatinHypercube(...)`.
     folder : for the table, and for a folder per case. On a cluster all machines must have it under the same path.
-    solver, dt, steps : for a function that returns a `Scene`; dt in [s].
+    solver, dt, steps : for a function that returns a `Scene`; dt in [s]. Without a solver, each case has the
+        one that suits it.
     units : of factors and measures, by name. Those of a scene file's values are known.
     workers : number of processes on this machine; None: one per core.
     scheduler : address of a scheduler of dask.distributed, such as "tcp://node1:8786", instead of `workers`.

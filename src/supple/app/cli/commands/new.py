@@ -54,4 +54,5 @@ def new(
         print(chosen)
     with whole_file(scene) as fresh:
         fresh.write_text(text, encoding="utf-8")
+    print(next(line[2:] for line in text.splitlines() if line.startswith("# About")))
     print(f"wrote {scene}; try: supple view {scene}")
