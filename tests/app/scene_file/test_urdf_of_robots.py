@@ -291,6 +291,11 @@ def test_meshes_of_packages_and_models_are_found_above(tmp_path, caplog):
         ('upper="1"', 'upper="-2"', "3: joint 'j': its limits are -1 and -2"),
         ('child link="b"', 'child link="c"', "3: joint 'j': link 'c' does not exist"),
         ('size=".1 .1 .1"', 'size="${s} .1 .1"', "2: link 'a': size of its <box> is '${s} .1 .1', a macro; expand it"),
+        (
+            'xyz="0 0 .5"',
+            'xyz="$(optenv AT 0 0 0)"',
+            "3: joint 'j': xyz of its <origin> is '$(optenv AT 0 0 0)', a macro;",
+        ),
         ("<inertial>", "<xacro:box/><inertial>", "2: <xacro:box> is a macro; expand it first: xacro robot.urdf.xacro"),
         ("<robot", "<!DOCTYPE x SYSTEM 'http://localhost:1'><robot", "1: it has a document type declaration"),
     ],

@@ -77,7 +77,7 @@ class Element:
         text = self.text(key)
         what = f"{key} of its <{self.tag}> is {printable(text)!r}"
         values = tuple(_floats(text))
-        if "${" in text:
+        if "${" in text or "$(" in text:
             raise self.problem(f"{what}, a macro; {EXPAND}")
         if len(values) != count or not np.isfinite(values).all():
             raise self.problem(f"{what}; give {'one finite number' if count == 1 else f'{count} finite numbers'}")
