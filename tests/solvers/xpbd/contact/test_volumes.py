@@ -7,6 +7,7 @@ import pytest
 
 import supple as sp
 from supple.model.system import build_system, initial_state
+from supple.solvers.xpbd.contact.islands import Islands
 from supple.solvers.xpbd.contact.tets import ONSET, Tets, measure, project_low
 from supple.solvers.xpbd.solver import XPBD
 
@@ -18,11 +19,13 @@ MATERIALS = pytest.mark.parametrize("material", [JELLY, CLASSIC], ids=["neo-hook
 
 
 def tets_at(system, points):
-    """The tets of a system in a substep that begins at these points, and room for bounds."""
+    """The tets of a system in a substep that begins at these points, its island, and room for bounds."""
     tets = Tets.of(system, len(points))
     measure(points, tets, False, 1.0)
     tets.J[:] = tets.now
-    return tets, np.zeros(len(tets.J))
+    islands = Islands.of(np.zeros(len(points), np.int32), np.zeros(0, np.int32))
+    islands.active[:] = True
+    return tets, islands, np.zeros(len(tets.J))
 
 
 def points_of(system, x):
@@ -33,7 +36,7 @@ def test_projections_end_a_compression_at_the_bound_and_take_kinetic_energy():
     """A cube is compressed to a tenth in one substep: afterwards no tet is below its bound, and it moves slower."""
     system = build_system(sp.Scene([sp.Body("cube", CUBE, JELLY)]))
     before = points_of(system, system.rest_positions)
-    tets, bounds = tets_at(system, before)
+    tets, islands, bounds = tets_at(system, before)
     x = before.copy()
     x[:, 1] *= 0.1
     x[:, 0] += 0.02
@@ -42,7 +45,7 @@ def test_projections_end_a_compression_at_the_bound_and_take_kinetic_energy():
     for _ in range(200):
         if not measure(x, tets, True, 1.0):
             break
-        project_low(x, tets, bounds)
+        project_low(x, tets, islands, bounds)
     np.testing.assert_allclose(bounds, 0.5)
     assert tets.now.min() > 0.5 - 1e-12
     np.testing.assert_allclose(m @ x[:, :3], momentum, atol=1e-15)
@@ -52,10 +55,10 @@ def test_projections_end_a_compression_at_the_bound_and_take_kinetic_energy():
 def test_a_tet_below_the_onset_may_not_be_compressed_more_and_is_not_pushed_back():
     system = build_system(sp.Scene([sp.Body("cube", CUBE, JELLY)]))
     flat = system.rest_positions * [1.0, 0.1, 1.0]
-    tets, bounds = tets_at(system, points_of(system, flat))
+    tets, islands, bounds = tets_at(system, points_of(system, flat))
     assert ONSET > 0.1
     x = points_of(system, flat)
-    project_low(x, tets, bounds)
+    project_low(x, tets, islands, bounds)
     np.testing.assert_allclose(bounds, 0.1, rtol=1e-9)
     np.testing.assert_allclose(x[:, :3], flat, atol=1e-15)
 

@@ -17,6 +17,7 @@ from supple.solvers.xpbd.contact.admit import Marks
 from supple.solvers.xpbd.contact.counts import RowCounts
 from supple.solvers.xpbd.contact.cuts import Cuts, keep_spin, share_motion
 from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows, loaded_rows
+from supple.solvers.xpbd.contact.islands import keep_active
 from supple.solvers.xpbd.contact.memory import ContactMemory
 from supple.solvers.xpbd.contact.nodes import Nodes
 from supple.solvers.xpbd.contact.row_solver import RESIDUAL, RowSolver
@@ -61,7 +62,7 @@ class Contact:
         self._surface = surface = row_surface(system, rigid, len(inverse_masses) - n, settings, lengths)
         count, poses = surface.count, ObstaclePoses(system.obstacles)
         self.nodes = Nodes(surface, rigid, poses, inverse_masses)
-        self._solver = RowSolver(self.nodes, rigid, system.gravity, self.gap)
+        self._solver = RowSolver(self.nodes, rigid, system.gravity, self.gap, system.joined_components)
         self._shapes = RowShapes(system, poses)
         self._lists = Lists(surface, self._shapes, self.gap)
         self.tets = Tets.of(system, count)
@@ -205,9 +206,21 @@ class Contact:
         if len(self._cuts.shares) < most + len(self.tets.J):
             self._cuts = Cuts.room(most + len(self.tets.J))
 
-    def solve(self, rows: int, most: int | None = None) -> float:
+    def solve(self, rows: int) -> float:
         """Solve the rows; see `RowSolver`."""
-        return self._solver.solve(self._rows, rows, self._h, most)
+        return self._solver.solve(self._rows, rows, self._h)
+
+    def sweep(self, rows: int) -> None:
+        """Sweep once over the rows of active islands; see `RowSolver`."""
+        self._solver.sweep(self._rows, rows, self._h)
+
+    def keep_active(self, low: int, left: float, flat: float, *, first: bool = False) -> bool:
+        """Leave the islands with low tets active, `left` in gaps; see `islands.keep_active`."""
+        return keep_active(self.tets, low, self._solver.islands, left * self.gap, flat, first)
+
+    def project_low(self, bounds: NDArray[np.float64]) -> None:
+        """Project the tets of active islands; see `tets.project_low`."""
+        volumes.project_low(self.nodes.x, self.tets, self._solver.islands, bounds)
 
     def solve_joined(self, rows: int, joints: JointRows, enough: float) -> tuple[NDArray[np.float64], float]:
         """Solve the rows of contacts and of joints; see `RowSolver`."""

@@ -37,6 +37,14 @@ class Nodes:
         self._on_bodies = on_bodies, surface.body[on_bodies]
         self.movers = Movers(self.bodies, adjacency(surface.body[on_bodies], on_bodies, len(rigid)))
 
+    def of_pieces(self, pieces: NDArray[np.int32]) -> NDArray[np.int32]:
+        """(N,) the piece of each node, of pieces (n,) of the vertices; -1 for nodes of obstacles."""
+        found = np.full(len(self.x), -1, dtype=np.int32)
+        found[: len(pieces)] = pieces
+        first, control, _ = self._embedded
+        found[first:] = pieces[control[:, 0]]
+        return found
+
     def begin_frame(self, time: float, origin: NDArray[np.float64]) -> None:
         """Begin a frame at `time` [s] with places about an origin (3,) [m]."""
         self.origin = origin

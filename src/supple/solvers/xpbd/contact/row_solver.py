@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from supple.numerics.cross_rows import cross_rows
 from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.contact.islands import Islands, find_islands
 from supple.solvers.xpbd.contact.levers import hold_bodies
 from supple.solvers.xpbd.contact.nodes import Nodes
 from supple.solvers.xpbd.contact.rows import Rows
@@ -37,18 +38,36 @@ class RowSolver:
     left : what the last sweep over contacts changed, in gaps
     """
 
-    def __init__(self, nodes: Nodes, rigid: RigidBodies, gravity: NDArray[np.float64], gap: float) -> None:
+    def __init__(
+        self,
+        nodes: Nodes,
+        rigid: RigidBodies,
+        gravity: NDArray[np.float64],
+        gap: float,
+        pieces: NDArray[np.int32],
+    ) -> None:
         self._nodes, self._rigid, self._gap = nodes, rigid, gap
         self._gravity = math.hypot(*gravity)
         self.left = 0.0
+        self.islands = Islands.of(nodes.of_pieces(pieces), pieces[rigid.control[:, 0]])
 
-    def solve(self, rows: Rows, count: int, h: float, most: int | None = None) -> float:
-        """Solve the first `count` rows in a substep of h [s] with at most this many sweeps; returns `left`."""
+    def solve(self, rows: Rows, count: int, h: float) -> float:
+        """Solve the first `count` rows in a substep of h [s]; returns `left`."""
+        find_islands(self._nodes.x, rows, count, self.islands)
+        return self._swept(rows, count, h, (MOST_SWEEPS, MOST_RIGID_SWEEPS))
+
+    def sweep(self, rows: Rows, count: int, h: float) -> None:
+        """Sweep once over the rows of active islands, as they were in the solution."""
+        self._swept(rows, count, h, (1, 1))
+
+    def _swept(self, rows: Rows, count: int, h: float, most: tuple[int, int]) -> float:
         if not count:
+            self.islands.residual[:] = 0.0
             return 0.0
-        nodes, most = self._nodes, most or (MOST_RIGID_SWEEPS if len(self._rigid) else MOST_SWEEPS)
+        nodes = self._nodes
         x = self._prepared(rows, count)
-        _, residual = solve(nodes.x, nodes.bodies, nodes.begin, rows, count, self._tolerance(h), most)
+        contacts = nodes.x, nodes.bodies, nodes.begin, rows, count, self.islands
+        _, residual = solve(*contacts, self._tolerances(h), most)
         self._take_over(x, h)
         self.left = residual / self._gap
         return self.left
@@ -64,9 +83,10 @@ class RowSolver:
         nodes, impulses = self._nodes, np.zeros(len(joints.total))
         x = self._prepared(rows, count)
         most, off = max(MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT * len(np.unique(joints.bodies))), 0.0
+        find_islands(nodes.x, rows, count, self.islands)
         if count:
-            contacts = nodes.x, nodes.bodies, nodes.begin, rows, count
-            off, residual = solve_joined(*contacts, joints, impulses, enough, self._tolerance(h), most)
+            contacts = nodes.x, nodes.bodies, nodes.begin, rows, count, self.islands
+            off, residual = solve_joined(*contacts, joints, impulses, enough, self._tolerances(h), most)
             self.left = residual / self._gap
         else:
             solve_joints(joints, impulses, nodes.bodies.twists, most)
@@ -85,10 +105,10 @@ class RowSolver:
             hold_bodies(nodes.x, nodes.bodies, rows, count)
         return nodes.x[: len(nodes.impulses), :3].copy()
 
-    def _tolerance(self, h: float) -> float:
-        """What the last sweep over the rows may change [m]."""
+    def _tolerances(self, h: float) -> tuple[float, float]:
+        """What the last sweep over the rows of islands without and with rigid bodies may change [m]."""
         fall, tolerance = self._gravity * h**2, RESIDUAL * self._gap
-        return min(tolerance, RIGID_RESIDUAL * fall) if len(self._rigid) and fall > 0.0 else tolerance
+        return tolerance, min(tolerance, RIGID_RESIDUAL * fall) if fall > 0.0 else tolerance
 
     def _take_over(self, x: NDArray[np.float64], h: float, of_joints: NDArray[np.float64] | None = None) -> None:
         """Give velocities the changes of places since x (n, 3), and of bodies.
@@ -107,7 +127,7 @@ class RowSolver:
 
 
 @njit(cache=True)
-def solve_joined(points, bodies, begin, rows, count, joints, impulses, enough, tolerance, most):
+def solve_joined(points, bodies, begin, rows, count, islands, joints, impulses, enough, tolerances, most):
     """Sweep over joints and contacts in turn until both change little, at most this many times; see `solve`.
 
     joints : their rows, with impulses (r,) [kg m], in place
@@ -127,7 +147,7 @@ def solve_joined(points, bodies, begin, rows, count, joints, impulses, enough, t
             first = largest
             if first <= enough:
                 break
-        _, residual = solve(points, bodies, begin, rows, count, tolerance, 1)
-        if largest <= _SMALL and residual <= tolerance:
+        _, residual = solve(points, bodies, begin, rows, count, islands, tolerances, (1, 1))
+        if largest <= _SMALL and residual <= tolerances[1]:
             break
     return first, residual

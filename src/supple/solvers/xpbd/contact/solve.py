@@ -14,6 +14,7 @@ import math
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.bodies import push_node, turn_body
+from supple.solvers.xpbd.contact.islands import island_of
 from supple.solvers.xpbd.contact.levers import push_row, softness, vector
 from supple.solvers.xpbd.contact.pairs import SHAPE, facing, is_loaded, weights_of
 from supple.solvers.xpbd.contact.rows import NIL
@@ -61,18 +62,27 @@ def _turn(out, scale, points, bodies, begin, nodes, e, moment):
 
 
 @njit(cache=True)
-def solve(points, bodies, begin, rows, count, tolerance, most):
-    """Sweep over the rows until no sweep changes an n . r by more than the tolerance [m], at most this many times.
+def solve(points, bodies, begin, rows, count, islands, tolerances, most):
+    """Sweep over the rows of each active island until no sweep changes an n . r by more than its tolerance [m].
 
-    Returns the number of sweeps, and the largest change in the last one [m].
+    tolerances, most : of islands without and with rigid bodies; `most` is the largest number of sweeps
+
+    Returns the number of sweeps, and the largest change in the last one of any island [m].
     """
-    sweeps, residual = 0, math.inf
-    while sweeps < most and residual > tolerance:
+    sweeps, some, largest = 0, count > 0, 0.0
+    islands.swept[:] = islands.active
+    islands.residual[:] = 0.0
+    while some:
         sweeps += 1
-        residual = 0.0
+        for p in range(len(islands.swept)):
+            if islands.swept[p]:
+                islands.residual[p] = 0.0
         for e in range(count):
             mass = rows.masses[e]
             if mass == 0.0:
+                continue
+            island = island_of(points, rows, e, islands)
+            if not islands.swept[island]:
                 continue
             n, f = row(rows.normals, e), row(rows.impulses, e)
             r = vector(points, bodies, rows, e)
@@ -80,7 +90,7 @@ def solve(points, bodies, begin, rows, count, tolerance, most):
             push = max(0.0, before + (rows.targets[e] - s) * mass)
             if push == 0.0 and before == 0.0:
                 continue
-            residual = max(residual, abs(push - before) / mass)
+            islands.residual[island] = max(islands.residual[island], abs(push - before) / mass)
             held = (f[0] - before * n[0], f[1] - before * n[1], f[2] - before * n[2])
             slip = (r[0] - s * n[0], r[1] - s * n[1], r[2] - s * n[2])
             if rows.friction[e] > 0.0 and rows.rigid[e]:
@@ -102,7 +112,13 @@ def solve(points, bodies, begin, rows, count, tolerance, most):
                     _turn(points, 1.0, points, bodies, begin, rows.nodes, e, (-d * m[0], -d * m[1], -d * m[2]))
             for j in range(3):
                 rows.impulses[e, j] = new[j]
-    return sweeps, residual
+        some, largest = False, 0.0
+        for p in range(len(islands.swept)):
+            kind = 1 if islands.stiff[p] else 0
+            islands.swept[p] = islands.swept[p] and islands.residual[p] > tolerances[kind] and sweeps < most[kind]
+            some = some or islands.swept[p]
+            largest = max(largest, islands.residual[p])
+    return sweeps, largest
 
 
 @njit(cache=True)

@@ -92,10 +92,11 @@ def measure(points, tets, guard, share):
 
 
 @njit(cache=True)
-def project_low(points, tets, bounds):
-    """Project the tets that have less volume than the guard asks for; bounds : (m,) scratch memory."""
+def project_low(points, tets, islands, bounds):
+    """Project the tets of active islands with less volume than the guard asks for; bounds : (m,) scratch memory."""
     for t in range(len(bounds)):
-        bounds[t] = guarded_J(tets.J[t])
+        active = islands.active[islands.root[islands.piece[tets.nodes[t, 0]]]]
+        bounds[t] = guarded_J(tets.J[t]) if active else -np.inf
     _project(points, tets.nodes, tets.scales, bounds)
 
 

@@ -6,7 +6,7 @@ forces point the wrong way. A projection is a perfectly inelastic collision insi
 
 from __future__ import annotations
 
-from supple.solvers.xpbd.contact.tets import measure, project_low
+from supple.solvers.xpbd.contact.tets import measure
 from supple.solvers.xpbd.integration import update_velocities
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
@@ -26,14 +26,16 @@ def hold_volumes(ws: XPBDWorkspace, rows: int, h: float) -> int:
     """
     contact, tets = ws.contact, ws.contact.tets
     x, x_n = ws.points, ws.previous
-    if not measure(contact.nodes.x, tets, True, 1.0):
+    low = measure(contact.nodes.x, tets, True, 1.0)
+    if not low:
         return 0
+    contact.keep_active(low, LEFT, FLAT, first=True)
     for _ in range(MOST_PROJECTIONS):
-        project_low(x, tets, ws.bounds)
+        contact.project_low(ws.bounds)
         restore(ws, h)
-        left = contact.solve(rows, 1)
+        contact.sweep(rows)
         low = measure(contact.nodes.x, tets, True, ENOUGH)
-        if not low and (left <= LEFT or tets.now.min() > FLAT):
+        if not contact.keep_active(low, LEFT, FLAT):
             return 0
     low = measure(contact.nodes.x, tets, False, KEEP_INSIDE)
     if not low:

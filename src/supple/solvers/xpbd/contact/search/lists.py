@@ -273,7 +273,9 @@ class Lists:
     def _choose_of(self, nodes: NDArray[np.bool_]) -> None:
         tight, room = self.tight, np.empty(len(self.pairs.keys) + 1, dtype=np.int64)
         reach, time = self._gap + 2.0 * NEAR * self._edge, tight.until - tight.age
-        self.near = room[: near_pairs(tight.places, tight.v, self.pairs, time, reach, nodes, room)]
+        near = room[: near_pairs(tight.places, tight.v, self.pairs, time, reach, nodes, room)]
+        # One order for any history of the lists, and whatever else is in the scene; those with shapes last.
+        self.near = near[np.lexsort((self.pairs.keys[near], self.pairs.kinds[near]))]
         self._deviations = self._deviations[0], 0.0
 
     def _time(self, v: NDArray[np.float64], h: float) -> float:
