@@ -6,7 +6,7 @@ import pytest
 import supple as sp
 
 RUBBER = sp.StableNeoHookean(youngs=2e5, poisson=0.3)
-# Contact is chaotic: where one box starts 1e-9 m off, places differ by 8e-9 m after this time, by 1e-3 m after a second.
+# Contact is chaotic: where one box starts 1e-9 m off, places differ by 8e-9 m after this time, after a second by 1 mm.
 FRAMES, TINY = 24, 1e-9
 
 
