@@ -1,5 +1,7 @@
 """Which solver is chosen, by counts alone, and where it is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,6 +98,10 @@ def test_a_part_that_stands_on_the_floor_is_simulated_with_the_solver_that_start
     (frame,) = sp.simulate(sp.Scene([resting], [FLOOR]), dt=1 / 60, steps=1)
     assert frame.solver == sp.XPBD()
     assert frame.solver.because.startswith("Implicit cannot start: body 'part' touches obstacle")
+    lifted = {"part": frame.positions["part"] + [0, 0.1, 0]}
+    higher = replace(frame, state=replace(frame.state, positions=lifted["part"]))
+    (after,) = sp.simulate(higher.system.scene, dt=1 / 60, steps=1, start=higher)
+    assert after.solver == frame.solver  # a run that goes on keeps its solver
     with pytest.raises(sp.SceneError, match="touches"):
         sp.simulate(sp.Scene([resting], [FLOOR]), sp.Implicit(), 1 / 60, 1)
 

@@ -60,6 +60,13 @@ def test_a_scene_file_is_served_with_solver_time_step_and_initial_positions(scen
     assert not open_browser
 
 
+def test_the_solver_that_suits_is_served_and_said(scene, served, capsys):
+    scene.write_text(SCENE.replace("{kind: xpbd, substeps: 3}", "{kind: auto}").replace("1e5", "1e9"))
+    assert main(["view", str(scene), "--no-open"]) == ExitCode.OK
+    assert served[0][0].solver == sp.Implicit()
+    assert capsys.readouterr().out.startswith("solver implicit: XPBD needs ")
+
+
 def test_another_solver_can_be_selected(scene, served):
     assert main(["view", str(scene), "--solver", "implicit"]) == ExitCode.OK
     assert isinstance(served[0][0].solver, sp.Implicit)

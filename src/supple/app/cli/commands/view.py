@@ -73,6 +73,8 @@ def view(
     if solver is not None:
         run = replace(run, solver=solver_of_kind(solver))
     used = run.chosen_solver
+    if used.because:
+        print(f"solver {used.kind}: {used.because}")
     live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions, not full, solver is not None)
     serve_page(live, port, open_)
 
