@@ -149,6 +149,8 @@ def test_faster_ways_are_cheaper_by_counts():
     assert faster_ways(sp.Implicit(), soft, 1 / 60)[0] == "solver: {kind: xpbd}"
     assert faster_ways(sp.Implicit(), stiff, 1 / 60)[0].startswith("solver: {kind: implicit, max_iterations: 1}")
     assert faster_ways(sp.XPBD(), soft, 1 / 60) == ["fewer tets"]
+    hard = system_of(box(0.03, 4, 1e9))  # XPBD takes its largest number of substeps at both accuracies
+    assert faster_ways(sp.XPBD(), hard, 1 / 60) == ["solver: {kind: implicit}", "fewer tets"]
 
 
 @pytest.mark.filterwarnings("ignore::supple.errors.SuppleWarning")

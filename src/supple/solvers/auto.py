@@ -151,8 +151,8 @@ def cost_of_frame(solver: Solver, system: System, dt: float) -> float:
         return math.inf
     counts = Counts.of(system, dt, solver.accuracy if isinstance(solver, XPBD) else XPBD.accuracy)
     if isinstance(solver, XPBD):
-        given = solver.substeps
-        return (counts if given == "auto" else counts._replace(substeps=given)).xpbd
+        used = min(counts.substeps, solver.max_substeps) if solver.substeps == "auto" else solver.substeps
+        return counts._replace(substeps=used).xpbd
     if isinstance(solver, Implicit) and solver.max_iterations <= 3:
         return counts.linearized(solver.max_iterations)
     return counts.implicit
