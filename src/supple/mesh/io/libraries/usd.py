@@ -83,7 +83,7 @@ def _read(stage) -> MeshFile:
             continue
         world = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time))
         x = rows_of(UsdGeom.PointBased(prim).GetPointsAttr(), time, np.float64, 3)
-        kind, sizes, flat = _cells_of(prim, time, np.linalg.det(world[:3, :3]) < 0.0)
+        kind, sizes, flat = cells_of_prim(prim, time, mirrored=bool(np.linalg.det(world[:3, :3]) < 0.0))
         if len(flat) and not (flat.min() >= 0 and flat.max() < len(x)):
             raise FormatError(f"{prim.GetPath()}: a cell names a point outside of 0 to {len(x) - 1}")
         with np.errstate(all="ignore"):  # the mesh refuses what is not finite
@@ -95,7 +95,7 @@ def _read(stage) -> MeshFile:
     return MeshFile(CellSoup.of_blocks(np.concatenate(points), cells), notes=notes, up=up)
 
 
-def _cells_of(prim, time, mirrored: bool) -> tuple[int, NDArray[np.int64], NDArray[np.int64]]:
+def cells_of_prim(prim, time, *, mirrored: bool = False) -> tuple[int, NDArray[np.int64], NDArray[np.int64]]:
     """The type, sizes and points of the tets or polygons of a prim; polygons counter-clockwise seen from outside."""
     from pxr import UsdGeom
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import POLYGON, CellSoup, FormatError, checked
+from supple.mesh.io.cells import CellSoup, FormatError
 from supple.mesh.io.libraries.positions_file import Facts, written_series
-from supple.mesh.io.libraries.usd import rows_of
-from supple.mesh.io.polygons import triangles_of
+from supple.mesh.io.libraries.usd import cells_of_prim, rows_of
+from supple.mesh.io.tets_and_triangles import cells_of
 
 
 def read_series(path: Path, out: Path) -> Facts:
@@ -54,8 +54,12 @@ def _read(stage: Any, out: Path) -> Facts:
     tets, triangles, part, count = [np.zeros((0, 4), np.int64)], [np.zeros((0, 3), np.int64)], [], 0
     for k, prim in enumerate(prims):
         points = rows_of(UsdGeom.PointBased(prim).GetPointsAttr(), first, np.float64, 3)
-        kind, rows = _cells(prim, first, points)
-        (tets if kind == 4 else triangles).append(rows + count)
+        kind, sizes, flat = cells_of_prim(prim, first)
+        if len(sizes):
+            for rows, own in zip(
+                cells_of(CellSoup.of_blocks(points, [(kind, sizes, flat)])), (tets, triangles), strict=True
+            ):
+                own.append(rows + count)
         part.append(np.full(len(points), k))
         count += len(points)
     moving = [_has_other_cells(prim) for prim in prims]
@@ -84,22 +88,6 @@ def _read(stage: Any, out: Path) -> Facts:
         cells["times"] = np.array(times) / rate
     names = [str(prim.GetName()) for prim in prims]
     return written_series(out, max(1, len(times)), points_of, cells, names, [])
-
-
-def _cells(prim: Any, code: Any, points: NDArray[np.float64]) -> tuple[int, NDArray[np.int64]]:
-    """How many corners the cells have, and the cells: tets, or the polygons of a mesh as triangles."""
-    from pxr import UsdGeom
-
-    if prim.IsA(UsdGeom.TetMesh):
-        return 4, rows_of(UsdGeom.TetMesh(prim).GetTetVertexIndicesAttr(), code, np.int64, 4)
-    mesh = UsdGeom.Mesh(prim)
-    sizes = np.asarray(mesh.GetFaceVertexCountsAttr().Get(code) or [], dtype=np.int64).ravel()
-    flat = np.asarray(mesh.GetFaceVertexIndicesAttr().Get(code) or [], dtype=np.int64).ravel()
-    if len(sizes) == 0:
-        return 3, np.zeros((0, 3), dtype=np.int64)
-    if (sizes < 0).any() or sizes.sum() != len(flat):
-        raise FormatError(f"{prim.GetPath()}: the numbers of corners of its faces contradict its faces")
-    return 3, triangles_of(checked(CellSoup.of_blocks(points, [(POLYGON, sizes, flat)])))
 
 
 def _indices(prim: Any) -> list[Any]:
