@@ -195,6 +195,17 @@ def test_the_commands_for_such_a_surface(tmp_path, name, capsys, monkeypatch):
         assert words in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", ["a.msh", "a.vtu", "a.inp"])
+def test_a_mesh_file_is_a_scene_by_itself(tmp_path, name):
+    """Tets as they are; a surface in a format of tets is filled."""
+    path = surface_file(tmp_path, name)
+    assert sp.load_scene(path).bodies[0].mesh.volume == pytest.approx(BALL.volume, rel=0.1)
+    BODY.save(path)
+    body = sp.load_scene(path).bodies[0]
+    assert np.array_equal(body.mesh.tets, BODY.tets)
+    assert body.position[1] > 0.0
+
+
 def test_tets_with_meshing_options_in_a_scene_file_are_refused(tmp_path):
     BODY.save(tmp_path / "a.vtu")
     with pytest.raises(sp.SceneError, match=r"s.yaml:2: .*a.vtu already holds tetrahedra; remove this"):

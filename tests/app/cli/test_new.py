@@ -47,7 +47,7 @@ def test_a_surface_becomes_the_body_in_metres(tmp_path, capsys, factor, scale):
     ("arguments", "message"),
     [
         (["old.yaml"], "old.yaml: exists already; give another name, or --overwrite"),
-        (["ball.stl"], "is a surface, not a scene file; give it as supple new --surface ball.stl"),
+        (["ball.stl"], "is a mesh, not a scene file; give it as supple new --surface ball.stl"),
         (["scene.json"], "a scene file ends in .yaml"),
         (["no/where.yaml"], "does not exist"),
         (["--scale", "2"], "give --surface, too"),

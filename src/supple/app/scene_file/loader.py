@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from supple.app.scene_file.document import KINDS_OF_LISTS, OutputModel, SceneFileModel
 from supple.app.scene_file.entries.bodies import BodyModel
 from supple.app.scene_file.entries.kinds import built
-from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES, ConfinedMeshStore, MeshStore
+from supple.app.scene_file.entries.mesh_sources import MESH_FILES, ConfinedMeshStore, MeshStore
 from supple.app.scene_file.new_scenes import read_surface_scene
 from supple.app.scene_file.urdf.document import read_urdf
 from supple.app.scene_file.validation_errors import scene_error
@@ -174,7 +174,7 @@ def load_run(path: str | Path, *, confine: bool = False) -> Run:
         if pairs := overlaps(_run(path, document, store).scene):
             document = document.with_pairs(pairs)
     else:
-        document = (read_surface_scene if suffix in SURFACE_FILES else read_yaml)(path)
+        document = (read_surface_scene if suffix in MESH_FILES else read_yaml)(path)
     return _run(path, document, store)
 
 
@@ -185,7 +185,7 @@ def _run(path: str | Path, document: YamlDocument, store: MeshStore) -> Run:
             run = _built(model, store)
         return replace(run, text=document.text, description=model, folder=Path(path).parent)
     except LocatedError as error:
-        if Path(path).suffix.lower() in SURFACE_FILES:  # its lines are not those of the document
+        if Path(path).suffix.lower() in MESH_FILES:  # its lines are not those of the document
             raise SceneError(f"{path}: {error}") from None
         raise document.error(_keys_of_message(document.data, error.keys, str(error)), str(error)) from None
 

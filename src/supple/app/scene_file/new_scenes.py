@@ -1,6 +1,6 @@
 """The text of a new scene file, complete, with the most used keys and what they mean.
 
-A surface file becomes a soft body above a floor, with a size, a material and a number of tets chosen for it.
+A mesh file becomes a soft body above a floor, with a size, a material and a number of tets chosen for it.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from supple.app.scene_file.yaml_files import YamlDocument, parse_yaml
 from supple.errors import SceneError
+from supple.mesh.mesh_file import load_mesh
 from supple.mesh.meshing.child_process import DEFAULT_TETS
 from supple.mesh.meshing.meshers import INSTALL, ftetwild_installed
 from supple.mesh.meshing.sizes import automatic_tets
 from supple.mesh.meshing.units import likely_scale
-from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
 from supple.solvers.auto import Counts, suits_xpbd
 from supple.solvers.xpbd.assessment.softening import FACTOR
 from supple.solvers.xpbd.substeps import FEWEST
@@ -41,7 +42,7 @@ _SHAPE = """\
 
 _MESH = """\
   - name: {body}
-    mesh: {{file: {file}, scale: {scale}, tets: {tets}{repair}}}   # scale: 0.001 for a file in millimetres
+    mesh: {{file: {file}, scale: {scale}{meshing}}}   # scale: 0.001 for a file in millimetres
 """
 
 _REST = """\
@@ -93,25 +94,24 @@ def new_scene_of(
     *,
     volume: float,
     tets: int,
-    repair: bool = False,
+    meshing: str,
 ) -> str:
-    """The text of a scene with the surface in `file`, multiplied by `scale`, above the middle of a floor.
+    """The text of a scene with the mesh in `file`, multiplied by `scale`, above the middle of a floor.
 
     Parameters
     ----------
     name : of the scene file, for its comments
-    file : of the surface, relative to the scene file; body : name of the body
-    scale : factor of coordinates; box : lowest and highest coordinates (3,), (3,) of the surface after scaling [m]
+    file : of the mesh, relative to the scene file; body : name of the body
+    scale : factor of coordinates; box : lowest and highest coordinates (3,), (3,) of the mesh after scaling [m]
     volume : that it encloses, after scaling [m^3]
-    tets : the number to fill it with; repair : whether to repair the surface first
+    tets : about how many it has, or is filled with; meshing : further keys of the mesh, each after a comma
     """
     low, high = box
     size, middle = float((high - low).max()), 0.5 * (low + high)
     values = {
         "file": json.dumps(file),
         "scale": f"{scale:g}",
-        "tets": str(tets),
-        "repair": ", repair: true" if repair else "",
+        "meshing": meshing,
         "height": f"{0.1 * size - low[1]:.4g}",
         "x": f"{-middle[0] + 0.0:.4g}",
         "z": f"{-middle[2] + 0.0:.4g}",
@@ -154,7 +154,7 @@ logger = logging.getLogger(__name__)
 
 
 def read_surface_scene(path: str | Path) -> YamlDocument:
-    """The scene of a surface file, as if a scene file beside it described it.
+    """The scene of a file of a surface or of tets, as if a scene file beside it described it.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def read_surface_scene(path: str | Path) -> YamlDocument:
 
 
 def scene_of_surface(surface: Path, file: str, name: str, scale: float | None = None) -> tuple[str, str]:
-    """The text of a scene file with a surface, and one line about what was chosen.
+    """The text of a scene file with the mesh in a file, and one line about what was chosen.
 
     Parameters
     ----------
@@ -179,26 +179,23 @@ def scene_of_surface(surface: Path, file: str, name: str, scale: float | None = 
     ------
     MeshError : where the file cannot be read. SceneError : where the scale is not above 0 and finite.
     """
-    loaded = SurfaceMesh.load(surface)
+    mesh = load_mesh(surface)
+    loaded = mesh.surface if isinstance(mesh, TetMesh) else mesh
     used = likely_scale(loaded.vertices) if scale is None else scale
     if not 0.0 < used < np.inf:
         raise SceneError(f"scale must be a number above 0 and finite, not {used:g}")
     low, high = (used * corner for corner in loaded.bounds)
     body = re.sub(r"[^A-Za-z0-9_-]+", "_", surface.stem)[:50] or "body"
+    tets = len(mesh.tets) if isinstance(mesh, TetMesh) else DEFAULT_TETS
     report = loaded.check()
-    text = new_scene_of(
-        name,
-        file,
-        body,
-        used,
-        (low, high),
-        volume=max(abs(loaded.volume) * used**3, _THINNEST * float((high - low).max()) ** 3),
-        tets=DEFAULT_TETS,
-        repair=not report.ok,
-    )
+    meshing = "" if mesh is not loaded else f", tets: {tets}" + (not report.ok) * ", repair: true"
+    volume = max(abs(mesh.volume) * used**3, _THINNEST * float((high - low).max()) ** 3)
+    text = new_scene_of(name, file, body, used, (low, high), volume=volume, tets=tets, meshing=meshing)
     size = " x ".join(f"{value:.3g}" for value in high - low)
     unit = f", taken to be in millimetres (scale: {used:g})" if scale is None and used != 1.0 else ""
-    line = f"{surface}: {size} m{unit}, {len(loaded.triangles):,} triangles, about {DEFAULT_TETS:,} tets"
+    if mesh is not loaded:
+        return text, f"{surface}: {size} m{unit}, {tets:,} tets"
+    line = f"{surface}: {size} m{unit}, {len(loaded.triangles):,} triangles, about {tets:,} tets"
     if automatic_tets(loaded) is not None:
         line += " (it is reduced for that, and drawn as it is)"
     if not report.ok:

@@ -72,7 +72,7 @@ def demo(
 
     from supple.app.cli.console import shell_console
     from supple.app.demos.registry import DEMOS, find_demo
-    from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES
+    from supple.app.scene_file.entries.mesh_sources import MESH_FILES
 
     console = shell_console()
     if list_ or name is None:
@@ -81,7 +81,7 @@ def demo(
             console.print(f"[bold]{known.name:<{width}}[/]  {escape(known.summary)}")
         return ExitCode.OK
 
-    if Path(name).suffix.lower() in SURFACE_FILES:
+    if Path(name).suffix.lower() in MESH_FILES:
         if live:
             from supple.app.cli.commands.view import view
 

@@ -33,11 +33,11 @@ def new(
         Replace the file where it exists.
     """
     from supple.app.scene_file.new_scenes import new_scene, scene_of_surface
-    from supple.mesh.io.mesh_files import SURFACE_READERS
+    from supple.mesh.io.mesh_files import READERS
     from supple.runtime.replacing import whole_file
 
-    if scene.suffix.lower() in SURFACE_READERS:
-        raise SceneError(f"{scene}: is a surface, not a scene file; give it as supple new --surface {scene}")
+    if scene.suffix.lower() in READERS:
+        raise SceneError(f"{scene}: is a mesh, not a scene file; give it as supple new --surface {scene}")
     if scene.suffix.lower() not in (".yaml", ".yml"):
         raise SceneError(f"{scene}: a scene file ends in .yaml; name it {scene.name}.yaml")
     if scene.exists() and not overwrite:

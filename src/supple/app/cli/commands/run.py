@@ -41,7 +41,7 @@ def run(
     Parameters
     ----------
     scene
-        The scene file (.yaml); `supple schema` describes it. Or a surface, which falls on a floor. Or a robot (.urdf);
+        The scene file (.yaml); `supple schema` describes it. Or a mesh, which falls on a floor. Or a robot (.urdf);
         see docs/learn/robots.md.
     output
         Run folder; it is created where it does not exist, and may not contain an earlier run.

@@ -86,14 +86,14 @@ def find_source(path: Path) -> Path:
     ------
     OutputError : where the file does not exist.
     """
-    from supple.app.scene_file.entries.mesh_sources import SURFACE_FILES
+    from supple.app.scene_file.entries.mesh_sources import MESH_FILES
     from supple.errors import OutputError
 
     path = recording_at(path)
     if not path.exists():
         raise OutputError(f"{path}: the file does not exist")
-    if path.suffix.lower() not in (*SCENE_FILES, *SURFACE_FILES, *RECORDINGS):
-        raise OutputError(f"{path} is neither a scene file (.yaml), nor a surface, nor a recording (.vtkhdf)")
+    if path.suffix.lower() not in (*SCENE_FILES, *MESH_FILES, *RECORDINGS):
+        raise OutputError(f"{path} is neither a scene file (.yaml), nor a mesh, nor a recording (.vtkhdf)")
     return path
 
 

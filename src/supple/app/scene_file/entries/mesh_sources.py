@@ -14,7 +14,8 @@ from supple.app.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel
 from supple.app.scene_file.model import FilePath, Model, Positive, Vector
 from supple.app.scene_file.yaml_files import printable
 from supple.errors import MeshError, SceneError
-from supple.mesh.io.mesh_files import SURFACE_READERS
+from supple.mesh.io.mesh_files import READERS
+from supple.mesh.io.tetgen_family import SUFFIXES
 from supple.mesh.mesh_file import load_mesh
 from supple.mesh.meshing.units import warn_of_millimetres
 from supple.mesh.surface import SurfaceMesh
@@ -25,7 +26,7 @@ from supple.scene.rotation import rotation_matrix
 
 logger = logging.getLogger(__name__)
 
-SURFACE_FILES = tuple(SURFACE_READERS)
+MESH_FILES = (*READERS, *SUFFIXES)
 KEEP_AXES = "true: coordinates of a .dae or USD file whose x or z axis points up are not turned to y"
 MESHING_OPTIONS = (
     "tets",
