@@ -75,6 +75,10 @@ class Flow(ABC):
     ) -> NDArray[np.float64]:
         """(k, 11) the internal variables at the end of a step of h [s] to the trial F_e (k, 3, 3)."""
 
+    def stored_at_yield(self, p: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """(k,) the energy of distortion at which permanent flow begins [J/m^3]; None for flow that recovers."""
+        return None
+
 
 @dataclass(frozen=True, eq=False)
 class LawTets:

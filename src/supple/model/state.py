@@ -29,6 +29,8 @@ class Status(StrEnum):
     INTERSECTING : surfaces are through each other, or vertices deep inside of an obstacle
     HELD_BACK : in too many substeps the motion of bodies was shortened to keep tets positive and surfaces apart
     ENERGY_GAINED : more energy than the scene and what drives it had (also `Implicit` with "newmark")
+    TIME_STEP : a step loses energy that permanent flow would have taken: the shape that is left depends on dt
+        (`Implicit`)
     TUNNELLED : things passed each other in the shortest substep that is allowed (`Implicit`)
     SOFTENED : a body is softer than its material by more than the tolerance
     CRUSHED : a tet has less than a twentieth of its volume, and its material does not ask for it: see
@@ -49,6 +51,7 @@ class Status(StrEnum):
     LINEARIZED = "linearized"
     TUNNELLED = "tunnelled"
     CRUSHED = "crushed"
+    TIME_STEP = "time_step"
 
     @property
     def can_go_on(self) -> bool:

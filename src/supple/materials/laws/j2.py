@@ -113,6 +113,9 @@ class J2Flow(Flow):
         after[:, DISSIPATED] += works
         return after
 
+    def stored_at_yield(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        return p[:, 2] ** 2 / (6.0 * p[:, 1])
+
 
 @njit(cache=True)
 def _increments(p, accumulated, trial, out, works):

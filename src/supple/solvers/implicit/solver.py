@@ -38,7 +38,14 @@ from supple.solvers.implicit.newton.direction import Tools
 from supple.solvers.implicit.newton.free_motion import FreeMotion
 from supple.solvers.implicit.newton.linear_solver import LinearSolver
 from supple.solvers.implicit.newton.trace import NewtonRow
-from supple.solvers.implicit.stepping.integrators import INTEGRATORS, Integrator, Static, integrator_of
+from supple.solvers.implicit.stepping.integrators import (
+    INTEGRATORS,
+    History,
+    Integrator,
+    Static,
+    integrator_of,
+)
+from supple.solvers.implicit.stepping.lost_energy import lost_in_flow
 from supple.solvers.implicit.stepping.rigid_bodies import orthogonality_errors, weld_forces
 from supple.solvers.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.solvers.implicit.stepping.substepping import Substepping
@@ -272,6 +279,14 @@ class Implicit(Solver):
             substepping.advance()
         add_works(energy, works_of_actuators(system, works))
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
+        if system.laws.material.flowing_laws and isinstance(now.memory, History) and last is not None:
+            start = replace(state, positions=state.positions[:n], velocities=state.velocities[:n])
+            so_far = state.memory.lost if isinstance(state.memory, History) else (0.0, 0.0)
+            touching = last.contact.touching(last.state.positions)
+            lost, text = lost_in_flow(system, start, now, energy, residual, touching[touching < n], so_far)
+            now = replace(now, memory=replace(now.memory, lost=lost))
+            if worst is Status.CONVERGED and text is not None:
+                worst, message = Status.TIME_STEP, text
         workspace.checked = now
         details = replace(
             ImplicitDetails.of_rows(rows, substeps),

@@ -150,6 +150,12 @@ class ContactStep:
         text = f"{names} pass each other within the step; take a shorter one"
         return replace(outcome, status=Status.TUNNELLED, message=text)
 
+    def touching(self, x: NDArray[np.float64]) -> NDArray[np.int32]:
+        """The vertices in contact at x (n, 3)."""
+        if self.model is None:
+            return np.zeros(0, dtype=np.int32)
+        return np.unique(self.model.vertices(np.unique(self.model.collisions.at(x).points)))
+
     def measured(
         self, details: ImplicitDetails, x: NDArray[np.float64]
     ) -> tuple[ImplicitDetails, float | None, FindContacts]:

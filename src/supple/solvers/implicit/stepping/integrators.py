@@ -69,11 +69,15 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The state before the last step, and the length of that step [s], for BDF2."""
+    """The state before the last step, and the length of that step [s], for BDF2.
+
+    lost : what steps lost since a flow began, and the work of that flow [J]; see `lost_in_flow`
+    """
 
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
     step: float
+    lost: tuple[float, float] = (0.0, 0.0)
 
 
 class Integrator(ABC):
