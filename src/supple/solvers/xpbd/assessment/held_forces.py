@@ -78,14 +78,11 @@ class HeldForces:
         self._add_elastic_forces(extended, begun, moved, h)
         of_free = self._system.masses, self._free, self._pieces
         _balance(velocities, *of_free, self.outside, self._weight, h, self._momenta, self._from_inside)
-        own = self._pieces[held]
-        sums = np.stack([np.bincount(own, column, len(self._momenta)) for column in self.inside[held].T], axis=1)
-        forces = self.outside[held] + self.inside[held] - self._shares[:, None] * (self._from_inside + sums)[own]
-        self._impulses += h * forces
-        work = -np.einsum("ij,ij->i", forces + self._weight[held], moved)
+        sums = self.outside, self.inside, self._weight
         pinned = len(self.vertices)
-        found = {"pins": float(work[:pinned].sum())} if pinned else {}
-        return found | ({"anchors": float(work[pinned:].sum())} if len(held) > pinned else {})
+        of_held = held, self._pieces, self._shares, moved, pinned
+        works = _end_held(*of_held, *sums, self._from_inside, h, self._impulses)
+        return ({"pins": works[0]} if pinned else {}) | ({"anchors": works[1]} if len(held) > pinned else {})
 
     def end_frame(self, velocities: Floats, dt: float) -> dict[str, float]:
         """End a frame of dt [s] with velocities (n, 3) [m/s]; the works of inertia by name [J]."""
@@ -170,3 +167,22 @@ def _balance(velocities, masses, free, pieces, outside, weight, h, momenta, insi
         if free[i]:
             for j in range(3):
                 inside[pieces[i], j] -= outside[i, j] + weight[i, j]
+
+
+@njit(cache=True)
+def _end_held(held, pieces, shares, moved, pinned, outside, inside, weight, from_inside, h, impulses):
+    """Add the impulses of a substep of h to those of what is held (k, 3), of which the first `pinned` are vertices.
+
+    Returns minus the works of the forces on vertices and on anchors, over the displacements `moved` (k, 3).
+    """
+    works = np.zeros(2)
+    for k in range(len(held)):
+        for j in range(3):
+            from_inside[pieces[held[k]], j] += inside[held[k], j]
+    for k in range(len(held)):
+        i = held[k]
+        for j in range(3):
+            force = outside[i, j] + inside[i, j] - shares[k] * from_inside[pieces[i], j]
+            impulses[k, j] += h * force
+            works[0 if k < pinned else 1] -= (force + weight[i, j]) * moved[k, j]
+    return works[0], works[1]

@@ -31,7 +31,7 @@ class Works:
         self.system = system
         self.by_name, self.residual = no_works(system), 0.0
         self.held = HeldForces(system)
-        self._all = np.arange(len(system.masses))
+        self._all, self._nothing = np.arange(len(system.masses)), np.zeros((len(system.masses), 3))
 
     def begin_frame(self, velocities: Floats) -> None:
         """Begin a frame with velocities (n, 3) [m/s]."""
@@ -56,20 +56,23 @@ class Works:
         """
         held, n, nodes = self.held, len(at.points), contact.nodes
         begun = nodes.begin[: len(extended)]
-        held.outside[:], held.inside[:] = 0.0, 0.0
+        if held.is_needed:
+            held.outside[:], held.inside[:] = 0.0, 0.0
         for name, rows, acting in forces:
             numbers = self._all if isinstance(rows, slice) else rows.astype(np.int64, copy=False)
             add_works(self.by_name, {name: _work(acting, numbers, extended, begun)})
             if held.is_needed:
                 (held.inside if name == "damping" else held.outside)[numbers] += acting
-        on_held = 0.0
+        on_held, of_contact = 0.0, self._nothing
         if len(contact.forces.latest.keys):
             works = contact.forces.works(self.system.points, at.points, at.begun)
             add_works(self.by_name, works)
             self.residual -= sum(works.values())
+            if held.is_needed:
+                of_contact = contact.forces.on_vertices(self.system.points, n)
         if held.is_needed:
-            of_contact = contact.forces.on_vertices(self.system.points, n)
-            on_held = _add_contact(of_contact, nodes.impulses, at, self.system.masses, held.outside)
+            arrays = nodes.impulses, at.points, at.begun, self.system.masses, at.h
+            on_held = _add_contact(of_contact, *arrays, held.outside)
         self.residual += on_held + _work_of_impulses(at.points, self.system.masses, nodes.impulses, at.begun, at.h)
         if held.is_needed:
             for add_forces in more:
@@ -82,17 +85,22 @@ class Works:
         add_works(self.by_name, self.held.end_frame(velocities, dt))
 
 
-def _add_contact(of_contact: Floats, impulses: Floats, at: Substep, masses: Floats, out: Floats) -> float:
+@njit(cache=True)
+def _add_contact(of_contact, impulses, points, begun, masses, h, out):
     """Add the forces of contact to `out`; returns their work on what is held [J].
 
     On vertices that move they are what has changed their velocities; on others, and on welded ones, whose masses their
     bodies have, those (n, 3) of the rows.
     """
-    held = at.points[:, 3] == 0.0
-    moves = ~held & (masses > 0.0)
-    forces = np.where(moves[:, None], masses[:, None] * impulses / at.h, of_contact)
-    out[: len(forces)] += forces
-    return float(np.einsum("ij,ij->", of_contact[held], at.points[held, :3] - at.begun[held]))
+    work = 0.0
+    for i in range(len(masses)):
+        held = points[i, 3] == 0.0
+        for j in range(3):
+            force = of_contact[i, j] if held or masses[i] == 0.0 else masses[i] * impulses[i, j] / h
+            out[i, j] += force
+            if held:
+                work += force * (points[i, j] - begun[i, j])
+    return work
 
 
 @njit(cache=True)
