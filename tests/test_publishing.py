@@ -59,7 +59,7 @@ def links(text):
 
 
 def test_the_readme_begins_with_the_installation():
-    assert README.index("pip install supple") < README.index("\n## ")
+    assert README.index("pip install .") < README.index("\n## ")
 
 
 def test_with_an_address_all_links_of_the_readme_lead_to_it(hook, monkeypatch):
