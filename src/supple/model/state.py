@@ -27,7 +27,8 @@ class Status(StrEnum):
     NOT_FINITE : a position or velocity is lost
     INVERTED : a tet is inside out that was not at the start (`XPBD`, as the following)
     INTERSECTING : surfaces are through each other, or vertices deep inside of an obstacle
-    HELD_BACK : in too many substeps the motion of bodies was shortened to keep tets positive and surfaces apart
+    HELD_BACK : in too many substeps the motion of bodies was shortened to keep tets positive and surfaces apart, or
+        works leave energy open for that
     ENERGY_GAINED : more energy than the scene and what drives it had (also `Implicit` with "newmark")
     TIME_STEP : a step loses energy that permanent flow would have taken: the shape that is left depends on dt
         (`Implicit`)
