@@ -29,7 +29,7 @@ DT, FRAMES = 1 / 60, 30
 SHAPES = ("box", "plate", "ball", "cylinder", "torus", "washer", "gear", "bracket", "cup", "blob", "knot", "bear")
 
 
-def prism(outline: NDArray[np.float64], hole: float | None, height: float, cells: int) -> sp.SurfaceMesh:
+def prism(outline: NDArray[np.floating], hole: float | None, height: float, cells: int) -> sp.SurfaceMesh:
     """A plane figure, seen from its center in all directions, as a plate; with a scaled copy of itself as a hole."""
     n = len(outline)
     rings = [outline * s for s in np.linspace(1.0, hole or 0.0, cells + 1)[: cells + (hole is not None)]]

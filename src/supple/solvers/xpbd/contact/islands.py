@@ -39,8 +39,8 @@ class Islands(NamedTuple):
         count = int(piece.max(initial=-1)) + 1
         has_rigid = np.zeros(count, dtype=np.bool_)
         has_rigid[rigid] = True
-        flags = np.zeros((3, count), dtype=np.bool_)
-        return cls(piece, has_rigid, np.zeros(count, np.int32), *flags, np.zeros(count), np.zeros(count))
+        stiff, active, swept = np.zeros((3, count), dtype=np.bool_)
+        return cls(piece, has_rigid, np.zeros(count, np.int32), stiff, active, swept, np.zeros(count), np.zeros(count))
 
 
 @njit
