@@ -37,9 +37,9 @@ def bar_scene(material: Material = SOFT, pinned=True, mesh=BAR, **extra):
     return sp.Scene([sp.Body("bar", mesh, material)], pins=pins, **extra)
 
 
-def equilibrium(scene, solver=STATIC):
+def equilibrium(scene, solver=STATIC, status="converged"):
     frame = list(sp.simulate(scene, solver, 1.0, 1))[-1]
-    assert frame.report.status == "converged", frame.report.message
+    assert frame.report.status == status, frame.report.message
     return frame
 
 
@@ -225,8 +225,8 @@ def test_tets_stay_positive_everywhere_under_a_crushing_motion():
         pins=[sp.Pin("b", bottom), sp.Pin("b", top, lambda t: t * np.array([0.5, -0.8, 0.2]))],
         gravity=(0, 0, 0),
     )
-    frame = equilibrium(scene)
-    assert 0.0 < frame.report.min_det_F < 0.35
+    frame = equilibrium(scene, status="crushed")  # the barrier holds nodes at the pinned edges
+    assert 0.0 < frame.report.min_det_F < 0.05
     guard = InversionGuard.at(frame.system, frame.state.positions)
     assert guard.complete
     assert guard.allows(frame.state.positions)
