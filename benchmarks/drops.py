@@ -154,7 +154,11 @@ def mesh(kind: str, generator: np.random.Generator) -> sp.TetMesh:
     if kind == "torus":
         return sp.shapes.torus(0.4, generator.uniform(0.1, 0.2), min(edge, 0.1))
     made = surface(kind, generator)
-    return sp.tetrahedralize(made, tets=int(generator.uniform(500, 2500)))
+    count = int(generator.uniform(500, 2500))
+    try:
+        return sp.tetrahedralize(made, tets=count)
+    except sp.MeshingError:  # thin walls lose too much where the surface is reduced
+        return sp.tetrahedralize(made, max_volume=made.volume / count)
 
 
 def drop(seed: int) -> tuple[sp.Scene, str]:
