@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 import supple as sp
 from benchmarks.table import Table
+from supple.errors import MeshingError
 from supple.model.crushed import CRUSHED
 
 DT, FRAMES = 1 / 60, 30
@@ -157,7 +158,7 @@ def mesh(kind: str, generator: np.random.Generator) -> sp.TetMesh:
     count = int(generator.uniform(500, 2500))
     try:
         return sp.tetrahedralize(made, tets=count)
-    except sp.MeshingError:  # thin walls lose too much where the surface is reduced
+    except MeshingError:  # thin walls lose too much where the surface is reduced
         return sp.tetrahedralize(made, max_volume=made.volume / count)
 
 
