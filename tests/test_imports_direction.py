@@ -18,7 +18,6 @@ LAYERS = (
     ("app.viewer",),
     ("app.studies",),
     ("app.runs",),
-    ("app.learning",),
     ("app.scene_file",),
     ("simulate",),
     ("results",),

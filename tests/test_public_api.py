@@ -65,7 +65,7 @@ def test_an_obstacle_has_also_a_short_name_that_is_not_listed():
 
 
 def test_unknown_names_are_attribute_errors():
-    with pytest.raises(AttributeError, match="No supple attribute Bodyy"):
+    with pytest.raises(AttributeError, match="supple has no name 'Bodyy'; did you mean 'Body'"):
         sp.Bodyy  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
 
 

@@ -21,7 +21,6 @@ API = (
     ("recordings", "Recordings, checks and exports", ("results",)),
     ("runs", "Scene files and runs", ("app.scene_file", "app.runs")),
     ("studies", "Studies", ("app.studies",)),
-    ("learning", "Batches", ("app.learning",)),
     ("numerics", "Numerics", ("numerics",)),
     ("errors", "Errors", ("errors",)),
 )

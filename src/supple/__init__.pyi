@@ -1,7 +1,6 @@
 """The public names of Supple and their modules: for type checkers, and for the lazy import of `__init__.py`."""
 
 from .app import studies as studies
-from .app.learning.batch import Batch as Batch
 from .app.runs.resume import resume as resume
 from .app.runs.run_folder import RunFolder as RunFolder
 from .app.scene_file.loader import Run as Run

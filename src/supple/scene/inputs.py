@@ -39,11 +39,11 @@ class Ramp:
 class Input(ABC):
     """A function of time whose values are set while the simulation runs.
 
-    One scene may be simulated by one thread at a time where it has inputs; `Batch` gives each copy inputs of its own.
+    A scene that has inputs may be simulated by one thread at a time.
 
     Parameters
     ----------
-    name : by which `simulate` and `Batch` set it; no two inputs of a scene have the same
+    name : by which `simulate` sets it; no two inputs of a scene have the same
     value : at the start, in the unit of the kind; (3,), or (k, 3) with a row for each vertex
 
     Attributes
