@@ -29,7 +29,7 @@ class Reach(gymnasium.Env):
     action_space = gymnasium.spaces.Box(-1.0, 1.0, (6,))
     observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (15,))
 
-    def __init__(self, episode_steps: int = 50, substeps: int = 10) -> None:
+    def __init__(self, episode_steps: int = 50, substeps: int = 20) -> None:
         self.episode_steps, self.solver = episode_steps, sp.XPBD(substeps=substeps, contact=None)
         mesh = sp.shapes.box((WIDTH, LENGTH, WIDTH), (1, 6, 1))
         y = mesh.vertices[:, 1]
@@ -97,4 +97,4 @@ def main(rounds: int = 5, make: Callable[[], Reach] = Reach, vector=gymnasium.ve
 
 
 if __name__ == "__main__":
-    main(make=partial(Reach, substeps=10), vector=partial(gymnasium.vector.AsyncVectorEnv, context="spawn"))
+    main(vector=partial(gymnasium.vector.AsyncVectorEnv, context="spawn"))

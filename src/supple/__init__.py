@@ -4,6 +4,11 @@ Everything public is here: `import supple as sp`. The names are listed in `__ini
 when the name is first used, so that the import of `supple` is quick.
 """
 
+import copyreg
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 import lazy_loader
@@ -22,6 +27,15 @@ supply(
     plot="supple.results.plots:plot",
     progress="supple.results.progress:ProgressBar",
 )
+
+
+def _by_name(module: ModuleType) -> tuple[Callable[[str], ModuleType], tuple[str]]:
+    return import_module, (module.__name__,)
+
+
+# A function that says `sp.Scene` refers to this module, which is of a class of lazy_loader's. It is sent to other
+# processes by its name, as all other modules are.
+copyreg.pickle(type(sys.modules[__name__]), _by_name)  # pyright: ignore[reportArgumentType]
 
 
 def __getattr__(name: str) -> Any:

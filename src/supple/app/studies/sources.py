@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import copyreg
 import hashlib
-import importlib
 import inspect
 import json
-import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from supple.app.scene_file.loader import Run, load_run, validated
@@ -23,15 +19,6 @@ from supple.runtime.replacing import whole_file
 from supple.scene.scene import Scene
 from supple.solvers.auto import Auto
 from supple.solvers.solver import Solver
-
-
-def _by_name(module: ModuleType) -> tuple[Callable[[str], ModuleType], tuple[str]]:
-    return importlib.import_module, (module.__name__,)
-
-
-# A function that says `sp.Scene` refers to the module `supple`, which is of a class of lazy_loader's. It is sent to
-# workers by its name, as all other modules are.
-copyreg.pickle(type(sys.modules["supple"]), _by_name)  # pyright: ignore[reportArgumentType]
 
 SCENE_FILE = "scene.yaml"
 _BLOCK = 1 << 20

@@ -7,15 +7,10 @@ moduli times volume) and the step dt of the recording.
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from supple.results.check.stored_energies import stiffness_scale, stitch_scale
-
-if TYPE_CHECKING:
-    from supple.results.check.snapshot import Scene
+from supple.results.recording.reader import Recording
 
 # Of L: what bodies move in a step, fall or are strained by, so that it does not count.
 _UNSEEN = 1e-6
@@ -26,36 +21,40 @@ _SUMS = 1e-12
 
 
 class Floors:
-    """The floors of a recording or series."""
+    """The floors of a recording or series.
 
-    def __init__(self, scene: Scene) -> None:
-        recording = scene.recording
-        self._scene, self._mass = scene, float(recording.masses.sum())
+    Parameters
+    ----------
+    size : longest extent of the largest body at rest [m]; reach : largest coordinate [m]
+    """
+
+    def __init__(self, recording: Recording, size: float, reach: float) -> None:
+        self._dt, self._size, self._reach, self._mass = recording.dt, size, reach, float(recording.masses.sum())
         self._weight = self._mass * float(np.linalg.norm(recording.gravity))
         self._stiffness = 1e3 * (stiffness_scale(recording) + stitch_scale(recording))
 
-    @cached_property
+    @property
     def roundoff(self) -> float:
         """Of a position, times the number of substeps [m]."""
-        return _ROUNDOFF * self._scene.reach
+        return _ROUNDOFF * self._reach
 
     @property
     def speed(self) -> float:
         """Velocities that are not seen [m/s]."""
-        return (_UNSEEN * self._scene.size + self.roundoff) / self._scene.recording.dt
+        return (_UNSEEN * self._size + self.roundoff) / self._dt
 
     @property
     def momentum(self) -> float:
         """Round-off of the sum of all momenta [kg m/s]; that of angular momentum is `size` times this."""
-        return self._mass * self.roundoff / self._scene.recording.dt
+        return self._mass * self.roundoff / self._dt
 
     @property
     def energy(self) -> float:
         """Of motion, falls and strains that are not seen [J]."""
-        moved = 0.5 * self._mass * self.speed**2 + self._weight * (_UNSEEN * self._scene.size + self.roundoff)
+        moved = 0.5 * self._mass * self.speed**2 + self._weight * (_UNSEEN * self._size + self.roundoff)
         return moved + self._stiffness * _UNSEEN**2 + self.sums
 
     @property
     def sums(self) -> float:
         """Round-off of the energies of all tets and heights [J]."""
-        return _SUMS * (self._stiffness + self._weight * self._scene.reach)
+        return _SUMS * (self._stiffness + self._weight * self._reach)

@@ -63,7 +63,7 @@ class Scene:
     @cached_property
     def floors(self) -> Floors:
         """Below which numbers are not judged."""
-        return Floors(self)
+        return Floors(self.recording, self.size, self.reach)
 
     @property
     def file_steps(self) -> NDArray[np.int64] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,6 @@ from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact import admit as guarantee
 from supple.solvers.xpbd.contact import tets as volumes
 from supple.solvers.xpbd.contact.admit import Marks
-from supple.solvers.xpbd.contact.counts import RowCounts
 from supple.solvers.xpbd.contact.cuts import Cuts, keep_spin, share_motion
 from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows, loaded_rows
 from supple.solvers.xpbd.contact.islands import keep_active
@@ -38,6 +38,23 @@ from supple.solvers.xpbd.rigid.joint_rows import JointRows
 GAP, SLACK = 0.05, 0.25
 # Of the mean edge: by how much a gap that is too narrow is widened in a frame.
 RECOVERED = 0.05
+
+
+@dataclass
+class RowCounts:
+    """Counts over the substeps of a frame.
+
+    Attributes
+    ----------
+    cut : substeps in which motion was shortened; crushed : those in which that could not help
+    smallest : distance of a contact where a substep began [m]
+    residual : the largest change in the last sweep over the rows of a substep, in gaps
+    """
+
+    cut: int = 0
+    crushed: int = 0
+    smallest: float = math.inf
+    residual: float = 0.0
 
 
 class Contact:
