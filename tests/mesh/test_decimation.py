@@ -9,8 +9,6 @@ import pytest
 
 import supple as sp
 from supple.errors import MeshingError
-from supple.mesh.meshing import tetrahedralize as meshing
-from supple.mesh.meshing.child_process import MesherFailure
 from supple.mesh.meshing.decimation import decimate_surface
 from supple.mesh.meshing.tetrahedralize import tetrahedralize, tetrahedralize_reported
 from supple.mesh.primitives.surfaces import sphere_surface
@@ -47,46 +45,11 @@ def test_tets_of_a_surface_that_is_too_fine(caplog: pytest.LogCaptureFixture) ->
     assert f"decimated the surface: {len(BALL.triangles)} -> 132 triangles, volume" in caplog.text
 
 
-def test_a_number_of_tets_chooses_the_number_of_triangles(caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO):
-        mesh, report = tetrahedralize_reported(BALL, tets=800)
-    assert len(mesh.tets) == pytest.approx(800, rel=0.1)
-    assert report.fine is BALL
-    assert report.reduced
-    assert len(report.filled.triangles) <= 800 // 5
-    assert f"decimated the surface: {len(BALL.triangles)} -> 132 triangles" in caplog.text
-    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
-
-
 def test_triangles_that_shall_stay_give_more_tets_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     mesh, report = tetrahedralize_reported(BALL, tets=800, keep_surface=True)
     assert not report.reduced
-    assert f"{len(mesh.tets)} tets instead of 800: the surface of {len(BALL.triangles)} triangles" in caplog.text
-    assert "reduce them with decimate=133" in caplog.text
-
-
-def test_a_mesher_that_fails_on_a_reduced_surface_gets_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    """TetGen fails on some surfaces of marching cubes at one number of triangles, and not at the next."""
-    fill, tried = meshing.mesh_with_tetgen, []
-
-    def failing(surface, options, limits):
-        tried.append(len(surface.triangles))
-        if len(tried) == 1:
-            raise MesherFailure("failed", "tetgen failed: internal error")
-        return fill(surface, options, limits)
-
-    monkeypatch.setattr(meshing, "mesh_with_tetgen", failing)
-    mesh, report = tetrahedralize_reported(BALL, tets=1500)
-    assert report.mesher == "tetgen"
-    assert tried[0] == 250
-    assert tried[1] == len(report.filled.triangles) == 224
-    assert len(mesh.tets) == pytest.approx(1500, rel=0.1)
-
-
-def test_a_surface_that_cannot_have_so_few_triangles_gets_no_such_number(caplog: pytest.LogCaptureFixture) -> None:
-    tetrahedralize(sp.shapes.box_surface((1.0, 1.0, 1.0), (1, 1, 1)), tets=5)
-    assert "6 tets instead of 5" in caplog.text
-    assert "decimate" not in caplog.text
+    assert f"{len(mesh.tets):,} tets instead of 800: the details of the surface need so many" in caplog.text
+    assert len(mesh.surface.triangles) == len(BALL.triangles)
 
 
 def test_a_surface_that_is_coarse_enough_is_returned() -> None:

@@ -105,7 +105,7 @@ def test_a_lost_component_is_an_error_unless_allowed() -> None:
 
 @needs_meshfix
 def test_components_that_cut_each_other_cannot_be_repaired() -> None:
-    with pytest.raises(MeshingError, match=r"could not fix the surface: .*intersecting.*ftetwild"):
+    with pytest.raises(MeshingError, match=r"could not fix the surface: .*intersecting.*stuffing"):
         repair_surface(both(BALL, BALL.transformed(translation=(0.4, 0.01, 0.02))))
 
 
@@ -145,21 +145,14 @@ BEYOND_REPAIR = {
 
 
 @needs_meshfix
-@pytest.mark.skipif(importlib.util.find_spec("pytetwild") is None, reason="needs pytetwild")
-@pytest.mark.parametrize(
-    ("case", "mesher"),
-    [
-        *((case, "auto") for case in BEYOND_REPAIR),
-        pytest.param("two balls that overlap", "ftetwild", marks=pytest.mark.slow),
-    ],
-)
-def test_what_meshes_without_repair_meshes_with_it(case: str, mesher, caplog: pytest.LogCaptureFixture) -> None:
-    """MeshFix cannot repair these surfaces; fTetWild needs no repair."""
+@pytest.mark.parametrize("case", BEYOND_REPAIR)
+def test_what_meshes_without_repair_meshes_with_it(case: str, caplog: pytest.LogCaptureFixture) -> None:
+    """MeshFix cannot repair these surfaces; stuffing needs no repair."""
     surface, volume = BEYOND_REPAIR[case]
     with caplog.at_level(logging.INFO):
-        mesh, report = tetrahedralize_reported(surface, repair=True, mesher=mesher, envelope=0.02)
+        mesh, report = tetrahedralize_reported(surface, repair=True)
     assert mesh.volume == pytest.approx(volume, rel=0.03)
-    assert report.mesher == "ftetwild"
+    assert report.mesher == "stuffing"
     assert report.repair is None
     assert "meshing the surface without repair" in caplog.text
 
@@ -169,13 +162,6 @@ def test_what_meshes_without_repair_meshes_with_it(case: str, mesher, caplog: py
 def test_a_failed_repair_is_an_error_where_the_options_need_tetgen(demand: dict) -> None:
     with pytest.raises(MeshingError, match=r"repair could not fix the surface: .*intersecting"):
         tetrahedralize(BEYOND_REPAIR["two balls that overlap"][0], repair=True, **demand)
-
-
-@needs_meshfix
-def test_a_failed_repair_is_an_error_without_ftetwild(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("supple.mesh.meshing.tetrahedralize.ftetwild_installed", lambda: False)
-    with pytest.raises(MeshingError, match=r"repair could not fix the surface: .*intersecting"):
-        tetrahedralize(BEYOND_REPAIR["two balls that overlap"][0], repair=True)
 
 
 SOUP = SurfaceMesh(BALL.vertices[BALL.triangles].reshape(-1, 3), np.arange(BALL.triangles.size).reshape(-1, 3))

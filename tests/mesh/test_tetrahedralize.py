@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import signal
 import subprocess
@@ -125,10 +124,6 @@ BROKEN = {
     "overlapping": (joined(SPHERE, moved(SPHERE, 0.4, 0.01, 0)), "intersecting triangle"),
     "aligned": (joined(SPHERE, SPHERE), "duplicate|intersecting|folded|non-manifold"),
     "solid in solid": (joined(SPHERE, SMALL), "1 component of 2 faces the wrong way"),
-    "inconsistent": (
-        SurfaceMesh(SPHERE.vertices, np.vstack([SPHERE.triangles[:5, ::-1], SPHERE.triangles[5:]])),
-        "inconsistent edge",
-    ),
     "duplicate": (SurfaceMesh(SPHERE.vertices, np.vstack([SPHERE.triangles, SPHERE.triangles[:1]])), "non-manifold"),
     "one triangle": (SurfaceMesh(np.eye(3), [[0, 1, 2]]), "open boundary edge"),
 }
@@ -140,26 +135,33 @@ def test_surfaces_with_faults_are_errors_with_place_and_remedy(case: str) -> Non
     with pytest.raises(MeshingError, match=fault) as error:
         fill(surface, mesher="tetgen")
     assert "repair=True" in str(error.value)
-    assert "ftetwild" in str(error.value)
+    assert "stuffing" in str(error.value)
     assert "\n" not in str(error.value)
 
 
-def test_auto_names_the_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tetrahedralize, "ftetwild_installed", lambda: False)
-    with pytest.raises(MeshingError, match=r'pip install "supple\[dirty\]"'):
-        fill(BROKEN["open"][0])
     with pytest.raises(MeshingError, match=r'pip install "supple\[dirty\]"'):
         fill(SPHERE, mesher="ftetwild")
 
 
-def test_auto_uses_ftetwild_for_surfaces_with_faults(caplog: pytest.LogCaptureFixture) -> None:
-    pytest.importorskip("pytetwild")
+def test_triangles_that_disagree_are_turned_first(caplog: pytest.LogCaptureFixture) -> None:
+    mixed = SurfaceMesh(SPHERE.vertices, np.vstack([SPHERE.triangles[:5, ::-1], SPHERE.triangles[5:]]))
+    mesh, report = tetrahedralize_reported(mixed)
+    assert report.mesher == "tetgen"
+    assert mesh.volume == pytest.approx(SPHERE.volume, rel=1e-3)
+    assert "turned 5 triangles to agree with their neighbours" in caplog.text
+
+
+@pytest.mark.parametrize("mesher", ["auto", "ftetwild"])
+def test_surfaces_with_faults_are_filled(mesher, caplog: pytest.LogCaptureFixture) -> None:
+    if mesher == "ftetwild":
+        pytest.importorskip("pytetwild")
     ball = sphere_surface(radius=0.5, edge_length=0.35)
     surface = joined(ball, moved(ball, 0.5, 0.01, 0.02))
-    with caplog.at_level(logging.INFO):
-        mesh, report = tetrahedralize_reported(surface, max_volume=0.02, envelope=0.05)
-    assert report.mesher == "ftetwild"
-    assert "fTetWild" in caplog.text
+    mesh, report = tetrahedralize_reported(surface, max_volume=0.02, envelope=0.05, mesher=mesher)
+    assert report.mesher == ("stuffing" if mesher == "auto" else "ftetwild")
+    assert ("filling it with a lattice, which rounds sharp edges" in caplog.text) == (mesher == "auto")
     assert (mesh.volumes > 0).all()
     assert mesh.volumes.max() <= 0.02
     # A union: more than one ball, less than two.
@@ -170,7 +172,7 @@ def test_auto_uses_ftetwild_for_surfaces_with_faults(caplog: pytest.LogCaptureFi
 def test_options_without_support_in_ftetwild_are_errors(options: dict) -> None:
     if not meshers.ftetwild_installed():
         pytest.skip("needs pytetwild")
-    with pytest.raises(MeshingError, match="fTetWild has no"):
+    with pytest.raises(MeshingError, match="ftetwild has no"):
         fill(SPHERE, mesher="ftetwild", **options)
 
 
@@ -280,21 +282,21 @@ def worker(monkeypatch: pytest.MonkeyPatch, folder: Path, code: str) -> None:
 def test_the_end_of_the_child_is_reported(tmp_path, monkeypatch, code: str, kind: str, text: str) -> None:
     worker(monkeypatch, tmp_path, code)
     with pytest.raises(MesherFailure) as error:
-        fill(SPHERE)
+        fill(SPHERE, mesher="tetgen")
     assert error.value.kind == kind
     assert text in str(error.value)
 
 
-def test_auto_goes_on_with_ftetwild_where_tetgen_crashes(tmp_path, monkeypatch, caplog) -> None:
+def test_auto_goes_on_with_stuffing_where_tetgen_crashes(tmp_path, monkeypatch, caplog) -> None:
     real = Path(mesher_worker.__file__).read_text(encoding="utf-8")
     crash = 'import os, pathlib, sys\nif "tetgen" in pathlib.Path(sys.argv[1], "job.json").read_text(): os.abort()\n'
     future = "from __future__ import annotations\n"
     worker(monkeypatch, tmp_path, future + crash + real.replace(future, ""))
-    mesh, report = tetrahedralize_reported(SPHERE, max_volume=0.05, envelope=0.02)
-    assert report.mesher == "ftetwild"
-    assert mesh.volume == pytest.approx(SPHERE.volume, rel=0.05)
+    mesh, report = tetrahedralize_reported(SPHERE, max_volume=0.05)
+    assert report.mesher == "stuffing"
+    assert mesh.volume == pytest.approx(SPHERE.volume, rel=0.01)
     assert "tetgen crashed" in caplog.text
-    assert "meshing it with fTetWild" in caplog.text
+    assert "filling it with a lattice" in caplog.text
     with pytest.raises(MesherFailure, match="tetgen crashed"):
         fill(SPHERE, keep_surface=True)
 
@@ -302,14 +304,14 @@ def test_auto_goes_on_with_ftetwild_where_tetgen_crashes(tmp_path, monkeypatch, 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_signal_is_named(tmp_path, monkeypatch) -> None:
     worker(monkeypatch, tmp_path, "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
-    with pytest.raises(MesherFailure, match=r"crashed \(SIGSEGV\).*mesher=\"ftetwild\""):
+    with pytest.raises(MesherFailure, match=r"crashed \(SIGSEGV\).*mesher=\"stuffing\""):
         fill(SPHERE, mesher="tetgen")
 
 
 def test_a_python_that_cannot_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/no/such/python")
     with pytest.raises(MesherFailure, match="cannot start Python"):
-        fill(SPHERE)
+        fill(SPHERE, mesher="tetgen")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
@@ -363,8 +365,10 @@ def test_two_threads_can_mesh_at_once() -> None:
     np.testing.assert_array_equal(meshes[0].tets, meshes[1].tets)
 
 
-@pytest.mark.skipif(not meshers.ftetwild_installed(), reason="needs pytetwild")
-def test_a_sheet_encloses_nothing() -> None:
+@pytest.mark.parametrize("mesher", ["auto", "ftetwild"])
+def test_a_sheet_encloses_nothing(mesher) -> None:
+    if mesher == "ftetwild":
+        pytest.importorskip("pytetwild")
     sheet = SurfaceMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    with pytest.raises(MeshingError, match="fTetWild found no volume inside of the surface"):
-        fill(sheet, tets=100, mesher="ftetwild")
+    with pytest.raises(MeshingError, match=r"found no volume inside of the surface|encloses nothing"):
+        fill(sheet, tets=100, mesher=mesher)

@@ -87,6 +87,7 @@ Vector = Annotated[tuple[float, float, float] | None, Parameter(negative="")]
 Seconds = Annotated[float | None, Parameter(converter=seconds)]
 CheckpointEvery = Annotated[Checkpoints, Parameter(converter=checkpoints, n_tokens=1, accepts_keys=False)]
 Confine = Annotated[bool, Parameter(negative="")]
+Yes = Annotated[bool, Parameter(name=["--yes", "-y"], negative="")]
 Overwrite = Annotated[bool, Parameter(negative="")]
 
 

@@ -6,8 +6,8 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 from typing import TextIO
 
@@ -105,6 +105,21 @@ def set_up_log(*, quiet: bool) -> None:
         logging.getLogger(name).setLevel(logging.NOTSET if quiet or given is not None else logging.INFO)
 
 
-def reading() -> AbstractContextManager[object]:
-    """Shows in a terminal that a scene is read, and its meshes are made."""
-    return Console(stderr=True).status("reading the scene and making its meshes")
+@contextmanager
+def reading(yes: bool = False, what: str = "reading the scene and making its meshes") -> Iterator[None]:
+    """Shows in a terminal that meshes are made; asks where they get very large, unless `yes`."""
+    from supple.mesh.meshing.consent import asking
+
+    console = Console(stderr=True)
+    status = console.status(what)
+
+    def ask(question: str) -> bool:
+        if yes or not (console.is_terminal and sys.stdin is not None and sys.stdin.isatty()):
+            return yes
+        status.stop()
+        answer = console.input(escape(f"{one_line(question)}. Go on? [y/N] "))
+        status.start()
+        return answer.strip().lower() in ("y", "yes")
+
+    with asking(ask, "--yes"), status:
+        yield

@@ -17,8 +17,6 @@ from supple.app.scene_file.yaml_files import YamlDocument, parse_yaml
 from supple.errors import SceneError
 from supple.mesh.mesh_file import load_mesh
 from supple.mesh.meshing.child_process import DEFAULT_TETS
-from supple.mesh.meshing.meshers import INSTALL, ftetwild_installed
-from supple.mesh.meshing.sizes import automatic_tets
 from supple.mesh.meshing.units import likely_scale
 from supple.mesh.tetmesh import TetMesh
 from supple.solvers.auto import Counts, suits_xpbd
@@ -196,10 +194,6 @@ def scene_of_surface(surface: Path, file: str, name: str, scale: float | None = 
     if mesh is not loaded:
         return text, f"{surface}: {size} m{unit}, {tets:,} tets"
     line = f"{surface}: {size} m{unit}, {len(loaded.triangles):,} triangles, about {tets:,} tets"
-    if automatic_tets(loaded) is not None:
-        line += " (it is reduced for that, and drawn as it is)"
     if not report.ok:
         line += f"; it is repaired first: {report.problems[0].partition(':')[0]}"
-        if report.self_intersecting and not ftetwild_installed():
-            line += f" (this needs {INSTALL})"
     return text, line

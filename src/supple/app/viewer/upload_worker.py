@@ -42,7 +42,6 @@ def _mesh(job: dict[str, Any]) -> None:
     import numpy as np
 
     from supple.errors import MeshError, MeshingError
-    from supple.mesh.meshing.sizes import automatic_tets
     from supple.mesh.meshing.tetrahedralize import tetrahedralize
     from supple.mesh.surface import SurfaceMesh
 
@@ -57,9 +56,7 @@ def _mesh(job: dict[str, Any]) -> None:
     surface = surface.transformed(1.0, None, -0.5 * (low + high)).transformed(job["size"] / extent)
     options = {"time_limit": job["seconds"], "memory_limit": job["memory"]}
     try:
-        mesh = tetrahedralize(
-            surface, tets=automatic_tets(surface, job["tets"]), repair=True, mesher="tetgen", **options
-        )
+        mesh = tetrahedralize(surface, tets=job["tets"], repair=True, **options)
     except MeshingError as error:
         raise MeshingError(f"{file}: {error}") from None
     with Path(MESH).open("wb") as out:

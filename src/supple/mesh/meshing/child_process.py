@@ -25,7 +25,6 @@ from supple.errors import MeshingError
 from supple.mesh.io.in_child import PREFIX
 from supple.mesh.meshing import mesher_worker
 from supple.mesh.meshing.spelling import option
-from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)
 
@@ -77,11 +76,17 @@ class MesherFailure(MeshingError):
 
 
 def run_mesher(
-    mesher: str, surface: SurfaceMesh, options: dict[str, Any], limits: Limits, remedy: str = ""
+    mesher: str,
+    vertices: NDArray[np.float64],
+    elements: NDArray[np.integer],
+    options: dict[str, Any],
+    limits: Limits,
+    remedy: str = "",
 ) -> MesherResult:
-    """Run "tetgen", "ftetwild" (elements are tets), "meshfix" or "decimation" (triangles) on a surface, in a child.
+    """Run "tetgen", "ftetwild", "mmg" (its elements are tets), "meshfix" or "decimation" (triangles) in a child.
 
-    `remedy` ends the message where the mesher failed or crashed.
+    The input are triangles (m, 3) of vertices (n, 3), for Mmg also tets (m, 4). `remedy` ends the message where the
+    mesher failed or crashed. A mesh that the child has written before it failed is its result: Mmg tries several.
 
     Raises
     ------
@@ -101,17 +106,26 @@ def run_mesher(
         }
         try:
             (folder / "job.json").write_text(json.dumps(job), "utf-8")
-            np.savez(folder / "surface.npz", vertices=surface.vertices, triangles=surface.triangles)
+            np.savez(folder / "surface.npz", vertices=vertices, elements=elements)
         except OSError as error:
             raise _unwritable(folder, error.strerror or str(error)) from None
-        code, peak = _run_child(mesher, folder, limits)
+        started = time.perf_counter()
+        try:
+            code, peak = _run_child(mesher, folder, limits)
+        except MesherFailure:  # its time is over
+            if not (folder / "mesh.npz").exists():
+                raise
+            code, peak = 1, 0
+        seconds = time.perf_counter() - started
         answer_file = folder / "answer.json"
         answer = json.loads(answer_file.read_text("utf-8")) if answer_file.exists() else {}
         for note in filter(None, answer.get("notes", [])):
             logger.debug("%s: %s", mesher, note)
-        if code == 0 and "error" not in answer:
+        if (folder / "mesh.npz").exists() and "disk" not in answer:
+            if code != 0 or "error" in answer:
+                logger.info("%s failed at a later mesh; an earlier one is used", mesher)
             with np.load(folder / "mesh.npz") as mesh:
-                return MesherResult(mesh["vertices"], mesh["elements"], mesh["labels"], float(answer["seconds"]))
+                return MesherResult(mesh["vertices"], mesh["elements"], mesh["labels"], seconds)
         if "disk" in answer:
             raise _unwritable(folder, answer["disk"])
         starved = limits.memory is not None and peak > STARVED * limits.memory

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
+from supple.mesh.meshing.stuffing import as_large
 from supple.mesh.primitives.isosurface_stuffing import MEAN_EDGE, stuff
 from supple.mesh.skin import Embedding
 from supple.mesh.tetmesh import TetMesh
@@ -41,7 +42,7 @@ def coarser(mesh: TetMesh, tets: int) -> TetMesh | None:
         if edge <= too_fine:
             return None
         try:
-            made = _as_large(stuff("coarser", inside, (low, high), edge), volume)
+            made = as_large(stuff("coarser", inside, (low, high), edge), volume)
         except MeshError:  # no lattice point is inside
             edge *= _STEP
             continue
@@ -53,22 +54,6 @@ def coarser(mesh: TetMesh, tets: int) -> TetMesh | None:
         else:
             edge *= _STEP
     return None
-
-
-def _as_large(mesh: TetMesh, volume: float) -> TetMesh:
-    """The mesh, whose surface cuts corners, with its surface moved outward until it has this volume [m^3]."""
-    x, surface = mesh.vertices.copy(), mesh.surface.triangles
-    areas = 0.5 * np.cross(x[surface[:, 1]] - x[surface[:, 0]], x[surface[:, 2]] - x[surface[:, 0]])
-    normals = np.zeros_like(x)
-    np.add.at(normals, surface.ravel(), np.repeat(areas, 3, axis=0))
-    rows = np.unique(surface)
-    missing = volume - float(mesh.volumes.sum())
-    x[rows] += (
-        missing / np.linalg.norm(areas, axis=1).sum() * normals[rows] / np.linalg.norm(normals[rows], axis=1)[:, None]
-    )
-    corners = x[mesh.tets]
-    right_way = np.linalg.det(corners[:, 1:] - corners[:, :1]) > 0.0
-    return TetMesh(x, mesh.tets) if right_way.all() else mesh
 
 
 def _same_shape(mesh: TetMesh, made: TetMesh, edge: float) -> bool:

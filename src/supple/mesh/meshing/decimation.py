@@ -61,11 +61,11 @@ def decimate_surface(
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low)) or 1.0
     # The library's thresholds are lengths of surfaces of size 1. On faces along the axes all collapses cost exactly
     # nothing, and it leaves triangles without area there.
-    unit = SurfaceMesh((surface.vertices - middle) / size @ _TURN.T, surface.triangles)
+    unit = (surface.vertices - middle) / size @ _TURN.T
     before, problems = surface.check(), []
     for first in _FIRST:
         options = {"triangles": int(triangles), "first": first}
-        result = run_mesher("decimation", unit, options, Limits(time_limit, memory_limit))
+        result = run_mesher("decimation", unit, surface.triangles, options, Limits(time_limit, memory_limit))
         try:
             reduced = SurfaceMesh(result.vertices @ _TURN * size + middle, result.elements).compact()
         except MeshError as error:

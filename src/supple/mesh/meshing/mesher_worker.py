@@ -1,4 +1,4 @@
-"""The program of the child process: a mesher, MeshFix or decimation on arrays from a file, within limits.
+"""The program of the child process: a mesher, Mmg, MeshFix or decimation on arrays from a file, within limits.
 
 It is started by its path, not imported. It uses only NumPy and the mesher, so that it starts quickly and so that no
 part of the parent's program runs a second time. Job and answer are `.npz` and `.json` files in a folder.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,14 @@ from supple.runtime.memory import end_with_parent, limit_process
 
 # TetGen's smoothing leaves some tets up to half as large again as the bound that its refinement kept.
 VOLUME_ATTEMPTS = 5
+# Meshes that are made at most for a number of tets, and how near to it is near enough: a mesh of 2,000 takes .3 to 1 s.
+COUNT_ATTEMPTS, COUNT_TOLERANCE = 6, 0.1
+# The number of tets falls with the edge's third power in a solid, with its second in a wall.
+COUNT_SLOPE = 2.3
+# Of an edge: a tet of a smaller height is flat. A regular one has .8, one of a wall that is an eighth of an edge .12.
+FLAT = 0.05
+# Flat tets come by chance: another mesh of nearly the same edges has others.
+OTHER_EDGE, OTHER_EDGES = 0.98, 2
 
 
 def main(folder: Path) -> int:
@@ -25,23 +32,23 @@ def main(folder: Path) -> int:
     job: dict[str, Any] = json.loads((folder / "job.json").read_text("utf-8"))
     end_with_parent(job["parent"])
     answer: dict[str, Any] = {"notes": limit_process(job["cpu_seconds"], job["memory_limit"])}
-    started = time.perf_counter()
     code = 0
     try:
         import numpy as np
 
         with np.load(folder / "surface.npz") as surface:
-            vertices, triangles = surface["vertices"], surface["triangles"]
+            vertices, elements = surface["vertices"], surface["elements"]
         runs = {
             "tetgen": _run_tetgen,
             "ftetwild": _run_ftetwild,
             "meshfix": _run_meshfix,
             "decimation": _run_decimation,
         }
-        run = runs[job["mesher"]]
-        points, elements, labels = run(vertices, triangles, job["options"], answer["notes"])
-        with (folder / "mesh.npz").open("wb") as file:
-            np.savez(file, vertices=points, elements=elements, labels=labels)
+        if job["mesher"] == "mmg":
+            _run_mmg(vertices, elements, job["options"], answer["notes"], lambda mesh: _write(folder, mesh))
+        else:
+            run = runs[job["mesher"]]
+            _write(folder, run(vertices, elements, job["options"], answer["notes"]))
     except MemoryError:
         answer["error"], code = "out of memory", 1
     except OSError as error:
@@ -49,13 +56,129 @@ def main(folder: Path) -> int:
     except Exception as error:
         text = " ".join(str(error).split())
         answer["error"], code = text if isinstance(error, RuntimeError) else f"{type(error).__name__}: {text}", 1
-    answer["seconds"] = time.perf_counter() - started
     (folder / "answer.json").write_text(json.dumps(answer), "utf-8")
     return code
 
 
+def _write(folder: Path, mesh: tuple[Any, Any, Any]) -> None:
+    """Whole or not at all: a later run may crash, and this one is then the result."""
+    import numpy as np
+
+    with (folder / "part.npz").open("wb") as file:
+        np.savez(file, vertices=mesh[0], elements=mesh[1], labels=mesh[2])
+    (folder / "part.npz").replace(folder / "mesh.npz")
+
+
+def _run_mmg(
+    vertices: Any,
+    elements: Any,
+    options: dict[str, Any],
+    notes: list[str],
+    keep: Callable[[tuple[Any, Any, Any]], None],
+) -> None:
+    """Tets of a length of edges, or of a number of tets, from a closed surface or from other tets of it.
+
+    TetGen fills the surface with as few tets as it can, whatever their shape; Mmg moves, splits, collapses and swaps
+    them until their edges have the length. All its meshes are valid, so that the surface never cuts itself.
+    """
+    import numpy as np
+    from mmgpy import MmgMesh3D  # pyright: ignore[reportMissingImports]
+
+    if elements.shape[1] == 3:
+        shapeless = {"quality": None, "min_dihedral": None, "keep_surface": True, "max_volume": None, "points": None}
+        vertices, elements, _ = _run_tetgen(vertices, elements, shapeless, notes)
+
+    def run(edge: float) -> tuple[Any, Any, Any]:
+        # nofem: tets may have two sides on the surface. Otherwise thin walls get two layers, and ten times the time.
+        # With it, acute corners such as those of a single tet get tets of no volume.
+        for nofem in (1, 0):
+            mesh = MmgMesh3D(vertices, elements.astype(np.int32))
+            distance = options["distance"] * edge
+            mesh.remesh(hsiz=edge, hausd=distance, nofem=nofem, verbose=-1)
+            points, tets = mesh.get_vertices(), mesh.get_tetrahedra()
+            if tets.min() >= 0 and tets.max() < len(points) and _heights(points, tets).min() > 0.0:
+                break
+        else:
+            raise RuntimeError("its tets have no volume")
+        tets = _without_outer_slivers(points, tets, FLAT * edge)
+        return points, tets, np.ones(len(tets))
+
+    edge, wanted = options["edge"], options["tets"]
+    if wanted is None:
+        keep(run(edge))
+        return
+    best, before, longest = np.inf, None, 0.5 * float(np.ptp(vertices, axis=0).max())
+    too_short, too_long, others = 0.0, np.inf, 0
+    for _ in range(COUNT_ATTEMPTS):
+        mesh = run(edge)
+        made = len(mesh[1])
+        flatness = float(_heights(mesh[0], mesh[1]).min()) / edge
+        notes.append(f"edges of {edge:.4g}: {made} tets, smallest height {flatness:.3g} edges")
+        # Half the height weighs as much as being off by a tenth.
+        error = max(abs(np.log(made / wanted)), 0.05) + 0.1 * max(np.log2(FLAT / max(flatness, 1e-9)), 0.0)
+        if error < best:
+            best = error
+            keep(mesh)
+        slope = COUNT_SLOPE
+        if before is not None and before[0] != edge and made != before[1]:
+            slope = float(np.clip(-np.log(made / before[1]) / np.log(edge / before[0]), 0.7, 3.0))
+        before = edge, made
+        if abs(made / wanted - 1.0) < COUNT_TOLERANCE:
+            if flatness >= FLAT or others == OTHER_EDGES:
+                return
+            others += 1
+            edge *= OTHER_EDGE
+            continue
+        if made > wanted and edge >= longest:
+            return
+        too_short, too_long = (max(too_short, edge), too_long) if made > wanted else (too_short, min(too_long, edge))
+        edge = min(edge * float(np.clip((made / wanted) ** (1.0 / slope), 0.3, 3.0)), longest)
+        if not too_short < edge < too_long:
+            edge = (too_short * too_long) ** 0.5
+
+
+# The sides of a tet, each opposite to the corner of its number.
+SIDES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+
+
+def _heights(points: Any, tets: Any) -> Any:
+    """The smallest height of each tet."""
+    import numpy as np
+
+    x = points[tets]
+    six = np.linalg.det(x[:, 1:] - x[:, :1])
+    doubled = [np.linalg.norm(np.cross(x[:, b] - x[:, a], x[:, c] - x[:, a]), axis=1) for a, b, c in SIDES]
+    return six / np.maximum(np.max(doubled, axis=0), 1e-300)
+
+
+def _without_outer_slivers(points: Any, tets: Any, flat: float) -> Any:
+    """The tets without those that are flatter than `flat` and have two sides on the boundary.
+
+    Without one, the boundary has the other diagonal of four points that are nearly in a plane.
+    """
+    import numpy as np
+
+    for _ in range(COUNT_ATTEMPTS):
+        sides = np.sort(tets[:, SIDES].reshape(-1, 3), axis=1)
+        _, inverse, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+        outer = (count[inverse.reshape(-1)] == 1).reshape(-1, 4)
+        edges = tets[:, SIDES][outer][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        edges = set(map(tuple, np.sort(edges, axis=1).tolist()))
+        heights, touched, dropped = _heights(points, tets), set(), []
+        for t in np.flatnonzero((heights < flat) & (outer.sum(axis=1) == 2)):
+            corners = set(tets[t].tolist())
+            new = tuple(sorted(tets[t, outer[t]].tolist()))
+            if new not in edges and not touched & corners:
+                touched |= corners
+                dropped.append(t)
+        if not dropped:
+            break
+        tets = np.delete(tets, dropped, axis=0)
+    return tets
+
+
 def _run_tetgen(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
-    """Tets and the region each belongs to (regions are what the surface separates, cavities among them)."""
+    """Tets, without those in cavities."""
     import tetgen
 
     def run(bound: float | None) -> tuple[Any, Any, Any]:
@@ -69,13 +192,35 @@ def _run_tetgen(vertices: Any, triangles: Any, options: dict[str, Any], notes: l
             fixedvolume=bound is not None,
             maxvolume=-1.0 if bound is None else bound,
             # Time and memory limit the work. TetGen's own limit of 100 000 points would end it without a message.
-            steinerleft=-1,
+            steinerleft=options["points"] or -1,
             regionattrib=True,
             quiet=True,
         )
         return points, tets, regions.reshape(-1)
 
-    return _below_volume(run, options["max_volume"], options["max_volume"], notes)
+    points, tets, regions = _below_volume(run, options["max_volume"], options["max_volume"], notes)
+    inside = _inside(vertices, triangles, points, tets, regions)
+    return points, tets[inside], regions[inside]
+
+
+def _inside(vertices: Any, triangles: Any, points: Any, tets: Any, regions: Any) -> Any:
+    """Which tets lie inside. TetGen fills everything that the surface encloses, also cavities (each is a region)."""
+    import numpy as np
+
+    inside = np.ones(len(tets), dtype=bool)
+    names = np.unique(regions)
+    x = points[tets]
+    volumes = np.abs(np.linalg.det(x[:, 1:] - x[:, :1]))
+    for region in names if len(names) > 1 else ():
+        members = np.flatnonzero(regions == region)
+        a, b, c = (vertices[triangles] - x[members[volumes[members].argmax()]].mean(axis=0)).transpose(1, 0, 2)
+        # The solid angles of van Oosterom, Strackee (1983); their sum is 4 pi inside.
+        la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+        det = np.einsum("ij,ij->i", a, np.cross(b, c))
+        dots = [np.einsum("ij,ij->i", p, q) * r for p, q, r in ((a, b, lc), (b, c, la), (c, a, lb))]
+        if np.arctan2(det, la * lb * lc + sum(dots)).sum() < np.pi:
+            inside[members] = False
+    return inside
 
 
 def _run_ftetwild(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:

@@ -100,7 +100,7 @@ def repair_surface(
         after = repaired.check()
     if not after.ok:
         raise MeshingError(
-            f"repair could not fix the surface: {'; '.join(after.problems)}; use {option('mesher', 'ftetwild')} or fix "
+            f"repair could not fix the surface: {'; '.join(after.problems)}; use {option('mesher', 'stuffing')} or fix "
             "it in a modelling program"
         )
     report = RepairReport(tuple(steps), before, after)
@@ -140,20 +140,25 @@ def _drop_useless(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
 
 def _orient(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
     """Turn triangles to agree with their neighbours, then whole components to face outward."""
+    surface = consistently_oriented(surface, steps)
     report = surface.check()
-    triangles = surface.triangles
-    if len(report.inconsistent_edges) and len(report.non_manifold_edges) == 0:
-        turned = _disagreeing(triangles, len(surface.vertices))
-        if turned is not None:
-            triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
-            steps.append(f"turned {np.count_nonzero(turned)} triangles to agree with their neighbours")
-            surface = SurfaceMesh(surface.vertices, triangles)
-            report = surface.check()
     if len(report.wrong_facing_components):
         rows = np.isin(surface.components.labels, report.wrong_facing_components)
-        surface = SurfaceMesh(surface.vertices, np.where(rows[:, None], triangles[:, ::-1], triangles))
+        surface = SurfaceMesh(surface.vertices, np.where(rows[:, None], surface.triangles[:, ::-1], surface.triangles))
         steps.append(f"turned {len(report.wrong_facing_components)} components that faced the wrong way")
     return surface
+
+
+def consistently_oriented(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
+    """Turn triangles to agree with their neighbours, where all can; `steps` gets a line about it."""
+    report = surface.check()
+    if len(report.inconsistent_edges) == 0 or len(report.non_manifold_edges):
+        return surface
+    turned = _disagreeing(surface.triangles, len(surface.vertices))
+    if turned is None:
+        return surface
+    steps.append(f"turned {np.count_nonzero(turned)} triangles to agree with their neighbours")
+    return SurfaceMesh(surface.vertices, np.where(turned[:, None], surface.triangles[:, ::-1], surface.triangles))
 
 
 def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bool_] | None:
@@ -192,7 +197,9 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
     faulty = [k for k in range(count) if faults[k]]
     if not faulty:
         return surface
-    result = run_mesher("meshfix", surface, {"components": labels.tolist(), "faulty": faulty}, limits)
+    result = run_mesher(
+        "meshfix", surface.vertices, surface.triangles, {"components": labels.tolist(), "faulty": faulty}, limits
+    )
     kept: list[SurfaceMesh] = []
     for k, piece in enumerate(pieces):
         if not faults[k]:
@@ -206,7 +213,7 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
             how_much = "all" if loss == 1.0 else f"{100.0 * loss:.0f} % of the area"
             raise MeshingError(
                 f"repair would drop {how_much} of {what}: remove it yourself, allow it in Python with repair_surface("
-                f"surface, allow_lost_components=True), or use {option('mesher', 'ftetwild')}"
+                f"surface, allow_lost_components=True), or use {option('mesher', 'stuffing')}"
             )
         if fixed is None or loss == 1.0:
             steps.append(f"dropped {what}")

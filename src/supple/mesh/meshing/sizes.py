@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
 
 from supple.errors import MeshingError
-from supple.mesh.meshing.child_process import DAMAGED, DEFAULT_TETS, MesherFailure
+from supple.mesh.meshing.consent import agreed, beforehand
+from supple.mesh.meshing.meshers import TETS_OF_SQUARE
 from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
-from supple.mesh.tetmesh import TetMesh
 
 logger = logging.getLogger(__name__)
 
@@ -20,18 +19,11 @@ TETS_OF_BOUND = 2.5
 MANY = 1_000_000
 # Of TetGen, which needed 314 to 319 for each tet more, up to two million; fTetWild needs more.
 BYTES_OF_TET = 300.0
-COUNT_TOLERANCE = 0.1
-MOST_TRIES = 6
-
-# Tets for each triangle of a coarse surface, at the usual quality: a ball of 100 to 300 triangles has 5 to 7.
-TETS_OF_TRIANGLE, _LEAST_OF_TRIANGLE = 6, 5
-# Surfaces of fewer triangles are not reduced further: they lose their shape.
-_FEWEST_TRIANGLES = 100
-_MOST_SURFACES = 4
-# TetGen's failures depend on where single vertices lie: it fills most surfaces of slightly fewer triangles.
-_OTHER_TRIANGLES = 0.9
-# Ratio of two bounds from which on their meshes show how the number depends on it: TetGen's is uneven over less.
-_LEVER = 2.0
+# Walls may be so many times thinner than edges are long: the smallest angle between the sides of a regular prism's tets
+# is then 7 degrees.
+MOST_SLENDER = 8.0
+# A mesh of more times the tets that were asked for is another thing than what was asked for.
+MOST_TIMES = 10.0
 
 
 def volume_of_edge(edge: float) -> float:
@@ -67,124 +59,42 @@ def refuse_too_many(tets: float, memory: int | None) -> None:
         )
 
 
-def automatic_tets(surface: SurfaceMesh, most: int = DEFAULT_TETS) -> int | None:
-    """The number of tets to ask for where nobody has given a size: None, the coarsest mesh, where it has no more."""
-    return most if TETS_OF_TRIANGLE * len(surface.triangles) > most else None
+def tets_of_walls(surface: SurfaceMesh, tets: int) -> int:
+    """The number of tets to ask for: as wanted, or more where tets would be longer than eight times a wall's thickness.
 
+    The thickness is the mean one, twice the volume over the area. It takes no time, and is that of shells and sheets.
 
-def fill_with_count(
-    surface: SurfaceMesh,
-    count: int,
-    make: Callable[[SurfaceMesh, float], TetMesh],
-    reduce: Callable[[SurfaceMesh, int], SurfaceMesh] | None,
-    volume: float,
-) -> tuple[TetMesh, SurfaceMesh]:
-    """About `count` tets in a surface, which is reduced where its triangles need more; and the surface that was filled.
-
-    Parameters
-    ----------
-    make : fills a surface with tets of at most a volume [m^3]; reduce : a surface to a number of triangles, or None
-        where the triangles must stay
-    volume : of the surface, about [m^3]
+    Raises
+    ------
+    MeshingError : where ten times as many are needed, and nobody agrees to that.
     """
-    fewest = max(_FEWEST_TRIANGLES, count // TETS_OF_TRIANGLE)
-    used, best = surface if reduce is None else coarse_enough(surface, count, reduce), None
-    for left in reversed(range(_MOST_SURFACES)):
-        filled, now = used, len(used.triangles)
-        logger.info("filling %d triangles with about %d tets", now, count)
-        try:
-            mesh = mesh_with_count(lambda bound, filled=filled: make(filled, bound), count, volume)
-        except MesherFailure as failure:
-            if reduce is None or failure.kind not in DAMAGED or left == 0:
-                if best is None:
-                    raise
-                break
-            fewer = int(_OTHER_TRIANGLES * now)
-            logger.info("the mesher failed on %d triangles; reducing the surface to %d", now, fewer)
-        else:
-            made = len(mesh.tets)
-            if best is None or made < len(best[0].tets):
-                best = mesh, used
-            if made <= (1.0 + COUNT_TOLERANCE) * count:
-                return mesh, used
-            fewer = max(_FEWEST_TRIANGLES, int(now * count / made))
-        if reduce is None or left == 0 or fewer >= now:
-            break
-        used = _reduced(surface, fewer, reduce)
-        if len(used.triangles) >= now:
-            break
-    assert best is not None
-    mesh, used = best
-    if reduce is None:
-        remedy = f"; reduce them with {option('decimate', fewest)}" if fewest < len(used.triangles) else ""
-    else:
-        remedy = ", and it cannot be reduced further without changing its shape"
-    numbers = len(mesh.tets), count, len(used.triangles)
-    logger.warning("%d tets instead of %d: the surface of %d triangles needs so many%s", *numbers, remedy)
-    return best
+    thickness, needed = needed_by_walls(surface)
+    if needed <= tets:
+        return tets
+    walls = f"its walls are {thickness:.2g} m thick on average: tets that are at most {MOST_SLENDER:g} times as long"
+    allow(f"{walls} are about {needed:,}", needed, tets)
+    logger.warning("%s are about %s instead of %s", walls, f"{needed:,}", f"{tets:,}")
+    return needed
 
 
-def coarse_enough(surface: SurfaceMesh, count: int, reduce: Callable[[SurfaceMesh, int], SurfaceMesh]) -> SurfaceMesh:
-    """The surface, reduced where its triangles certainly need more tets than `count`."""
-    if _LEAST_OF_TRIANGLE * len(surface.triangles) <= (1.0 + COUNT_TOLERANCE) * count:
-        return surface
-    return _reduced(surface, max(_FEWEST_TRIANGLES, count // TETS_OF_TRIANGLE), reduce)
+def needed_by_walls(surface: SurfaceMesh) -> tuple[float, int]:
+    """The mean thickness of walls [m], and the least number of tets for it."""
+    thickness = 2.0 * surface.volume / surface.area
+    if thickness <= 0.0:
+        return 0.0, 0
+    return thickness, math.ceil(TETS_OF_SQUARE * surface.area / (MOST_SLENDER * thickness) ** 2)
 
 
-def _reduced(surface: SurfaceMesh, triangles: int, reduce: Callable[[SurfaceMesh, int], SurfaceMesh]) -> SurfaceMesh:
-    """A surface of so few triangles; of twice as many, and so on, where they would have faults or another shape."""
-    while triangles < len(surface.triangles):
-        try:
-            return reduce(surface, triangles)
-        except MesherFailure:
-            raise
-        except MeshingError as damage:
-            logger.info("%s", str(damage).replace("give a larger number", "trying twice as many"))
-            triangles *= 2
-    return surface
+def allow(why: str, needed: int, tets: int) -> None:
+    """Ask where a surface needs ten times the tets that were asked for.
 
-
-def mesh_with_count(make: Callable[[float], TetMesh], count: int, volume: float) -> TetMesh:
-    """The mesh whose number of tets is nearest to `count`, of at most six that are made.
-
-    Parameters
-    ----------
-    make : makes a mesh whose tets are at most as large as the number given [m^3]
-    count : the number of tets to reach within 10 %
-    volume : of the whole mesh, about [m^3]
-
-    The number of tets is about inversely proportional to the bound on their volume. Where the surface alone rules (its
-    triangles are smaller than such tets), no bound reaches the number: the coarsest mesh is returned.
-    That is so where the power law through the last two meshes needs a bound above the whole volume.
+    Raises
+    ------
+    MeshingError : where nobody agrees to that; with the remedy.
     """
-    bound = 2.0 * volume / count  # a mean tet is about half as large as the largest
-    too_fine, too_coarse = 0.0, math.inf
-    best: TetMesh | None = None
-    last: tuple[float, int] | None = None  # bound and tets of the mesh before, where these were too many
-    for _ in range(MOST_TRIES):
-        mesh = make(bound)
-        made = len(mesh.tets)
-        if best is None or abs(made - count) < abs(len(best.tets) - count):
-            best = mesh
-        if abs(made - count) <= COUNT_TOLERANCE * count or bound > volume:
-            break
-        if made > count:
-            if last is not None and too_coarse == math.inf and not _reaches(count, last, (bound, made), volume):
-                break
-            too_fine, last = max(too_fine, bound), (bound, made)
-        else:
-            too_coarse = min(too_coarse, bound)
-        bound *= made / count
-        if not too_fine < bound < too_coarse:
-            bound = math.sqrt(too_fine * too_coarse)
-    assert best is not None
-    return best
-
-
-def _reaches(count: int, before: tuple[float, int], now: tuple[float, int], volume: float) -> bool:
-    """Whether the power law through two meshes (bound, tets) has so few tets at some bound below the whole volume."""
-    (small, many), (large, fewer) = before, now
-    if large < _LEVER * small:
-        return True
-    slope = math.log(many / fewer) / math.log(large / small)
-    return slope > 0.0 and math.log(fewer / count) <= slope * math.log(volume / large)
+    if needed <= MOST_TIMES * tets:
+        return
+    many = f"{why}, {needed / tets:.0f} times the {tets:,} that were asked for"
+    if not agreed(many):
+        more = option("tets", int(float(f"{1.05 * needed:.2g}")))
+        raise MeshingError(f"{many}; ask for them ({more}{beforehand()}), or give a simpler or thicker surface")

@@ -89,15 +89,15 @@ def _extent(low: np.ndarray, high: np.ndarray) -> str:
 
 def _surface_rows(surface: SurfaceMesh, file: Path) -> list[tuple[str, str]]:
     from supple.mesh.meshing.child_process import DEFAULT_TETS
-    from supple.mesh.meshing.sizes import TETS_OF_TRIANGLE, automatic_tets
+    from supple.mesh.meshing.sizes import needed_by_walls
     from supple.mesh.meshing.spelling import option, spelled_for
     from supple.mesh.meshing.units import millimetres_hint
 
     report = surface.check()
-    needed = TETS_OF_TRIANGLE * len(surface.triangles)
-    tets = f"about {needed:,} for all triangles"
-    if automatic_tets(surface) is not None:
-        tets += f"; for {DEFAULT_TETS:,} tets it is reduced to about {DEFAULT_TETS // TETS_OF_TRIANGLE} triangles first"
+    thickness, needed = needed_by_walls(surface) if report.watertight else (0.0, 0)
+    tets = f"about {DEFAULT_TETS:,} where no size is given"
+    if needed > DEFAULT_TETS:
+        tets = f"about {needed:,} or more: walls are {thickness:.2g} m thick on average"
     with spelled_for("shell"):
         hint = millimetres_hint(file, surface.vertices)
         repair = "" if report.ok else f"\nmesh it with {option('repair', True)}"

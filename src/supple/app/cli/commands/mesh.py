@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import whole_number
+from supple.app.cli.arguments import Yes, whole_number
 from supple.errors import MeshError, MeshingError
 
 if TYPE_CHECKING:
@@ -29,15 +29,16 @@ def mesh(
     quality: float = 1.4,
     min_dihedral: float | None = None,
     keep_surface: Annotated[bool, Parameter(negative="")] = False,
-    mesher: Literal["auto", "tetgen", "ftetwild"] = "auto",
+    mesher: Literal["auto", "tetgen", "stuffing", "ftetwild"] = "auto",
     repair: Annotated[bool, Parameter(negative="")] = False,
     decimate: Annotated[int | None, Parameter(converter=whole_number)] = None,
     envelope: float = 1e-3,
     time_limit: float = 120.0,
     memory_limit: float = 4.0,
     base_index: Literal[0, 1] = 1,
+    yes: Yes = False,
 ) -> None:
-    """Fill a surface with tets: TetGen for clean surfaces, fTetWild for dirty ones.
+    """Fill a surface with tets of about the size that is asked for.
 
     Parameters
     ----------
@@ -49,24 +50,27 @@ def mesh(
     scale
         Factor of all coordinates: 0.001 for a surface in millimetres.
     tets
-        Number of tets, within 10 %: 5,000 where no other size and no --keep-surface is given. A surface whose
-        triangles need more is reduced first.
+        Number of tets, within 10 % where the surface allows it: 2,000 where no other size and no --keep-surface is
+        given. The surface is remeshed to that size; sharp edges stay.
     edge
-        Length of the tets' edges [m], instead of a number of tets.
+        Mean length of the tets' edges [m], instead of a number of tets.
     max_volume
-        No tet is larger than this [m^3].
+        No tet is larger than this [m^3], by TetGen alone.
     quality
-        TetGen's bound on circumradius over shortest edge, above 1: smaller is better shaped, and more tets.
+        TetGen's bound on circumradius over shortest edge, above 1, for --max-volume: smaller is better shaped.
     min_dihedral
         Smallest dihedral angle that TetGen tries to reach [degrees]; with values much above 18 it may not end.
     keep_surface
-        Add no vertices on the surface.
+        Change no triangle of the surface.
     mesher
-        "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other, and where TetGen fails.
+        "auto" uses TetGen and Mmg for a clean surface, and stuffing, which rounds sharp edges, for any other, and where
+        they fail. "ftetwild" is an extra, for thin walls that are not clean.
     repair
-        Repair a surface that is not clean first, and list the changes. Where that fails, fTetWild meshes it as it is.
+        Repair a surface that is not clean first, and list the changes. Where that fails, it is filled as it is.
     decimate
-        Number of triangles to which the surface is reduced first, instead of one that fits the number of tets.
+        Number of triangles to which the surface is reduced first.
+    yes
+        Go on without a question where more than 10 times the tets are needed.
     envelope
         How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
     time_limit
@@ -76,8 +80,7 @@ def mesh(
     base_index
         Number of the first vertex in TetGen's files.
     """
-    from rich.console import Console
-
+    from supple.app.cli.console import reading
     from supple.mesh.io.mesh_files import TET_EXTENSIONS
     from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path
     from supple.mesh.meshing.child_process import DEFAULT_TETS
@@ -102,7 +105,7 @@ def mesh(
         refuse_to_replace(surface, target)
     if tets is edge is max_volume is None and not keep_surface:
         tets = DEFAULT_TETS
-    with spelled_for("shell"), Console(stderr=True).status("meshing"):
+    with spelled_for("shell"), reading(yes, "meshing"):
         loaded = _scaled(SurfaceMesh.load(surface), scale, surface)
         try:
             filled, report = tetrahedralize_reported(
@@ -150,18 +153,21 @@ def _bytes(gibibytes: float) -> int:
 def _summarize(tets: TetMesh, report: MeshingReport, files: list[Path]) -> None:
     from supple.app.cli.console import print_table
 
+    fine = report.fine.volume
+    change = f" ({100.0 * (tets.volume / fine - 1.0):+.2f} %)" if report.reduced and fine > 0.0 else ""
     rows = {
         "mesher": f"{report.mesher}, {report.seconds:.2f} s",
         "vertices": str(len(tets.vertices)),
         "tets": str(len(tets.tets)),
         "surface triangles": str(len(tets.surface.triangles)),
-        "volume": f"{tets.volume:.6g} m^3",
+        "volume": f"{tets.volume:.6g} m^3{change}",
         "largest tet": f"{tets.volumes.max():.4g} m^3",
         "smallest dihedral": f"{tets.min_dihedrals.min():.2f} degrees",
         "files": "\n".join(map(str, files)),
     }
     if report.reduced:
-        rows["surface"] = f"reduced from {len(report.fine.triangles)} to {len(report.filled.triangles)} triangles"
+        triangles = f"{len(report.fine.triangles)} -> {len(report.filled.triangles)} triangles"
+        rows["surface"] = f"{triangles}, at most {report.distance:.3g} m apart"
     if report.repair is not None:
         rows["repair"] = str(report.repair)
     print_table(rows.items())

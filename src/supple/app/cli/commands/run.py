@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Confine, Overwrite, Seconds, Steps
+from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Confine, Overwrite, Seconds, Steps, Yes
 
 if TYPE_CHECKING:
     from supple.app.scene_file.loader import Run
@@ -31,6 +31,7 @@ def run(
     checkpoint_every: CheckpointEvery = ON_THE_WAY,
     confine: Confine = False,
     overwrite: Overwrite = False,
+    yes: Yes = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> int:
     """Simulate a scene file into a run folder.
@@ -71,6 +72,8 @@ def run(
         Read meshes from the folder of the scene file, and folders below, only: for a file of a stranger.
     overwrite
         Replace an earlier run in the folder.
+    yes
+        Go on without a question where a mesh needs more than 10 times the tets that were asked for.
     quiet
         Print neither progress nor summary.
     """
@@ -88,7 +91,7 @@ def run(
         from supple.runtime.replacing import refuse_to_replace
 
         refuse_to_replace(scene, trace)
-    with reading():
+    with reading(yes):
         described = load_run(scene, confine=confine)
     if separate:
         described = moved_apart(described)

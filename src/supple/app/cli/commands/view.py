@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import recording_at, whole_number
+from supple.app.cli.arguments import Yes, recording_at, whole_number
 
 if TYPE_CHECKING:
     from supple.app.viewer.protocol.live_source import LiveSource
@@ -30,6 +30,7 @@ def view(
     port: Port = None,
     open_: Open = True,
     confine: bool = True,
+    yes: Yes = False,
 ) -> None:
     """Show a recording, or a scene that is simulated live and can be dragged and tuned, in a browser.
 
@@ -52,6 +53,8 @@ def view(
         Open the page in a browser.
     confine
         Read meshes from the folder of the scene file, and folders below, only.
+    yes
+        Go on without a question where a mesh needs more than 10 times the tets that were asked for.
     """
 
     found = find_source(source)
@@ -68,7 +71,7 @@ def view(
     from supple.app.scene_file.loader import load_run
     from supple.app.viewer.protocol.live_source import LiveSource
 
-    with reading():
+    with reading(yes):
         run = load_run(found, confine=confine)
     if solver is not None:
         run = replace(run, solver=solver_of_kind(solver))

@@ -45,21 +45,23 @@ MESHING_OPTIONS = (
 class MeshFileModel(Model):
     """A mesh file. Where it holds a surface, that is filled with tetrahedra according to the meshing options.
 
-    Without a size, a surface whose triangles need more than 5,000 tetrahedra is filled with so many. A surface that is
-    reduced for that, or by `decimate`, is the skin of the body.
+    Without a size, a surface whose triangles need more than about 2,000 tetrahedra is filled with so many. A surface
+    that is remeshed for that, or reduced by `decimate`, is the skin of the body.
     """
 
     file: FilePath = Field(description="relative to the scene file")
     scale: Positive = Field(default=1.0, description="of all coordinates: 0.001 for a file in millimetres")
-    tets: int | None = Field(default=None, gt=0, le=10**8, description="number of tetrahedra, within 10 %")
-    edge: Positive | None = Field(default=None, description="length of the tetrahedra's edges [m], after scaling")
+    tets: int | None = Field(default=None, gt=0, le=10**8, description="number of tetrahedra, about")
+    edge: Positive | None = Field(default=None, description="mean length of the tetrahedra's edges [m], after scaling")
     max_volume: Positive | None = Field(default=None, description="of a tetrahedron [m^3], after scaling")
     quality: float | None = Field(
         default=None, ge=1.0, le=100.0, description="largest ratio of circumradius to shortest edge"
     )
     min_dihedral: float | None = Field(default=None, ge=0.0, lt=70.0, description="[degrees]")
     keep_surface: bool | None = Field(default=None, description="true: no new vertices on the surface")
-    mesher: Literal["auto", "tetgen", "ftetwild"] | None = Field(default=None, description="program for the tetrahedra")
+    mesher: Literal["auto", "tetgen", "stuffing", "ftetwild"] | None = Field(
+        default=None, description="program for the tetrahedra"
+    )
     repair: bool | None = Field(default=None, description="true: repair the surface first, if it has faults")
     decimate: int | None = Field(
         default=None, ge=4, le=10**8, description="number of triangles to which the surface is reduced first"
@@ -161,13 +163,9 @@ class MeshStore:
         loaded = self._loaded(source)
         if isinstance(loaded, TetMesh):
             return loaded, None
-        from supple.mesh.meshing.sizes import automatic_tets
         from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
 
-        options = source.meshing
-        if not options.keys() & {"tets", "edge", "max_volume", "decimate", "keep_surface"}:
-            options["tets"] = automatic_tets(loaded)
-        mesh, report = tetrahedralize_reported(loaded, **options)
+        mesh, report = tetrahedralize_reported(loaded, **source.meshing)
         if report.reduced:
             logger.info("%s: its %d triangles are drawn, as the skin", source.file, len(report.fine.triangles))
         return mesh, report.fine if report.reduced else None
