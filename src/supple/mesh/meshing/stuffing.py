@@ -18,11 +18,11 @@ from supple.numerics.geometry.winding_numbers import winding_numbers
 logger = logging.getLogger(__name__)
 
 _MOST_TRIES = 6
-# Of moving the boundary: the first leaves 2 % of a coarse ball, two leave .1 %.
+# Of moving the boundary: a ball of 24 tets lacks 3, .5 and .1 % of its volume after one, two and three.
 _ROUNDS = 3
 _TOLERANCE = 0.1
 # Of the edge, by which the boundary is moved outward for the volume: where it is more, walls are thinner than tets. A
-# ball of 60 tets has .18.
+# ball of 24 tets has .15, one of 192 .07 (of the mean edge).
 _FARTHEST = 0.2
 # Points in the box around the surface by which its volume is counted, along each side.
 _GRID = 64
