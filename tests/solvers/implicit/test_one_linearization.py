@@ -11,7 +11,7 @@ from supple.model.state import State
 from supple.runtime.threads import numba_threads
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.xpbd.assessment.surfaces import SurfaceCheck, crossings
-from supple.solvers.xpbd.contact.contact import mean_edge_length
+from supple.solvers.xpbd.contact.search.surface import mean_edge_length
 
 FLOOR = [sp.HalfSpace(point=(0, 0, 0), normal=(0, 1, 0), friction=0.5)]
 

@@ -64,8 +64,9 @@ def _meeting(s: StartSurfaces, table: PairTable) -> tuple[set[tuple[int, int]], 
     for a, b in np.unique(things, axis=0):
         mine = (things == (a, b)).all(axis=1)
         some = pairs[mine]
-        crossing = bool((kinds[mine] == CROSSING).any())
-        kind = "overlaps" if crossing or (a != b and _still_meets(s, int(a), int(b))) else "touches"
+        # Of two things, what crosses only by round-off touches.
+        crossing = _still_meets(s, int(a), int(b)) if a != b else bool((kinds[mine] == CROSSING).any())
+        kind = "overlaps" if crossing else "touches"
         depths, points = _depths(s.points[s.triangles[some[:, 0]]], s.points[s.triangles[some[:, 1]]])
         deepest = int(depths.argmax())
         depth = float(depths[deepest]) if kind == "overlaps" else 0.0

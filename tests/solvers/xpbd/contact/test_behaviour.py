@@ -8,7 +8,7 @@ import pytest
 import supple as sp
 from supple.mesh import shapes
 from supple.solvers.xpbd.assessment.surfaces import SurfaceCheck, crossings
-from supple.solvers.xpbd.contact.contact import mean_edge_length
+from supple.solvers.xpbd.contact.search.surface import mean_edge_length
 
 pytestmark = pytest.mark.slow  # of a trial beside the package
 SLOPE = np.arctan(0.5)

@@ -78,7 +78,7 @@ def test_friction_of_a_pair_acts_on_a_slope_beside_a_body_without_a_pair(flat):
     else:
         plate = PLATE.transformed(rotation=rotation_matrix((0, 0, -SLOPE))).transformed(translation=-0.1 * NORMAL)
         floor = sp.obstacles.TriangleObstacle(surface=plate, friction=0.2, name="slope")
-    lifted = (0.05 if flat else 0.0565) * NORMAL
+    lifted = (0.05 if flat else 0.0506) * NORMAL
     bodies = [block(n, lifted + np.array([0, 0, z]), tilted=True) for n, z in (("own", -0.3), ("pair", 0.3))]
     scene = sp.Scene(bodies, [floor], contact_pairs=[sp.ContactPair("pair", "slope", friction=0.7)])
     x = last_of(scene, 24, sp.XPBD(substeps=20, accuracy=0.9)).positions

@@ -3,10 +3,10 @@
 import ipctk
 import numpy as np
 import pytest
+from tests.scenes import contact_gap
 
 import supple as sp
 from supple.model.system import build_system
-from supple.solvers.xpbd.contact.contact import GAP, mean_edge_length
 from supple.solvers.xpbd.solver import XPBD
 
 STUFF = sp.StableNeoHookean(youngs=2e5, poisson=0.4, density=1000)
@@ -58,7 +58,7 @@ def test_two_crossing_bars_stop_each_other(speed, friction):
         assert frame.report.kinetic_energy + frame.report.elastic_energy < energy * 1.02
         if frame.report.details.smallest_gap is not None:
             smallest.append(frame.report.details.smallest_gap)
-    thickness = GAP * mean_edge_length(system)
+    thickness = contact_gap(scene.bodies[0])
     assert min(smallest) == pytest.approx(thickness, rel=0.05)
 
 
@@ -68,7 +68,7 @@ def test_a_bar_rests_across_another_and_keeps_the_thickness():
     low, high = scene.bodies
     pinned = sp.Pin("low", np.arange(len(low.mesh.vertices)))
     scene = sp.Scene([low, high], pins=[pinned], gravity=(0, -1.0, 0))
-    thickness = GAP * mean_edge_length(build_system(scene))
+    thickness = contact_gap(low)
     gaps = []
     for frame in sp.simulate(scene, XPBD(substeps=40), 1 / 60, 30):
         assert not surfaces_meet(frame)

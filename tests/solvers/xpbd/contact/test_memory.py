@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.model.system import build_system, initial_state
-from supple.solvers.xpbd.contact.contact import GAP, mean_edge_length
+from supple.model.system import initial_state
 from supple.solvers.xpbd.contact.memory import ContactMemory
 from supple.solvers.xpbd.solver import XPBD
 
@@ -80,8 +79,7 @@ def same_bits(one, other):
 def test_a_run_that_continues_from_a_frame_has_the_same_bits(name):
     scene, _ = SCENES[name]
     whole = run(name, 2 * STEPS)
-    gaps = [frame.report.details.smallest_gap for frame in whole]
-    assert min(gap for gap in gaps if gap is not None) <= GAP * mean_edge_length(build_system(scene))
+    assert max(frame.report.details.contacts for frame in whole) > 0
     for middle in (*whole[:3], whole[STEPS - 1]):
         steps = 2 * STEPS - middle.index
         again = list(sp.simulate(scene, SOLVER, DT, steps, start=middle))

@@ -27,9 +27,11 @@ from supple.solvers.xpbd.contact.tets import determinant, least_J, share_of_tet
 
 # Of the gap: a distance below this may not become smaller in a substep.
 NEAREST = 0.02
-# Of the gap: what narrower ones are widened to. With a half, boxes that are stacked with gaps of 1 to 3 % are lifted,
-# and gain energy; with .15, a ball between two bars is held back.
-WIDENED = 0.2
+# Of the gap: to what distance things are parted that begin through each other, and pairs that have been that far apart
+# and came nearer by what rows leave. With .15, a ball between two bars is held back. And things that touch, of which no
+# side is known at the next look: a body moves for it by less than 1e-6 of its edges, which is below round-off of its
+# energy.
+PARTED, APART = 0.2, 1e-5
 # Of sqrt(a c), see `_keeps_apart`: 1 is where sides meet.
 TURNING = 0.9
 # Without carried nodes three rounds are the most that was seen; what is crushed needs no end.
@@ -41,12 +43,15 @@ KEEP_DISTANCE, KEEP_J = 0.1, 0.2
 class Marks(NamedTuple):
     """Scratch memory: the round in which a node was changed last (N,), the nodes that were, which rows have a plane.
 
-    longest : (1,) the square of the longest way that was cut [m^2]
+    bodies : (b,) rigid bodies whose motion was shortened
+    gaps : (N,) of the nodes [m]; longest : (1,) the square of the longest way that was cut, in gaps
     """
 
     stamp: NDArray[np.int64]
     changed: NDArray[np.int64]
     planes: NDArray[np.bool_]
+    bodies: NDArray[np.bool_]
+    gaps: NDArray[np.float64]
     longest: NDArray[np.float64]
 
 
@@ -65,7 +70,7 @@ def _shorten(base, points, i, share, marks, count, turn):
         moved = moved or place != points[i, j]
         square += (place - points[i, j]) ** 2
         points[i, j] = place
-    marks.longest[0] = max(marks.longest[0], square)
+    marks.longest[0] = max(marks.longest[0], square / marks.gaps[i] ** 2)
     return _note(i, marks, count, turn) if moved else count
 
 
@@ -75,6 +80,7 @@ def _shorten_all(base, points, i, share, movers, marks, count, turn):
     b = movers.bodies.body[i]
     if b < 0:
         return _shorten(base, points, i, share, marks, count, turn)
+    marks.bodies[b] = True
     for k in range(movers.nodes.start[b], movers.nodes.start[b + 1]):
         count = _shorten(base, points, movers.nodes.items[k], share, marks, count, turn)
     return count
@@ -164,20 +170,20 @@ def _plane(base, points, rows, e, n, margin):
 
 
 @njit(cache=True)
-def admit(base, points, movers, rows, count, tets, low, moved, keep, nearest, marks, cuts):
+def admit(base, points, movers, rows, count, tets, low, moved, keep, marks, cuts):
     """Shorten motions from `base` (N, 3) in `points` (N, 4) until the guarantee holds; see the module.
 
     Parameters
     ----------
     low : number of tets in `tets.low`, as measured; moved : number of nodes in `marks.changed` that moved since then
-    keep : share of J that a tet keeps; nearest : floor of distances [m]
+    keep : share of J that a tet keeps
 
     Returns
     -------
     cut : number of rows of `cuts`; rounds
     """
     cut = rounds = 0
-    marks.planes[:count] = False
+    marks.planes[:count] = marks.bodies[:] = False
     changed = moved
     while True:
         if changed:
@@ -207,14 +213,18 @@ def admit(base, points, movers, rows, count, tets, low, moved, keep, nearest, ma
             if marks.planes[e] or rows.kinds[e] == SHAPE or rows.distances[e] <= 0.0:
                 continue
             n = row(rows.normals, e)
-            remains = least_distance(rows.distances[e], nearest)
-            bends = 0.0
+            remains = least_distance(rows.distances[e], NEAREST * rows.gaps[e])
+            # A body that is shortened is put back from straight ways onto its arcs.
+            bends = most = 0.0
             for i in range(4):
-                bends = max(bends, movers.bodies.bends[rows.nodes[e, i]])
+                b, bend = movers.bodies.body[rows.nodes[e, i]], movers.bodies.bends[rows.nodes[e, i]]
+                most = max(most, bend)
+                if b >= 0 and marks.bodies[b]:
+                    bends = max(bends, bend)
             if _keeps_apart(base, points, rows, e, n, remains, bends):
                 continue
             marks.planes[e] = True
-            margin = 0.5 * remains
+            margin = min(0.5 * remains + most, 0.5 * (1.0 - 1e-6) * rows.distances[e])
             where = _plane(base, points, rows, e, n, margin)
             least = 1.0
             for i in range(4):
@@ -256,21 +266,22 @@ def _low_around(points, tets, keep, marks, changed, low):
 
 
 @njit(cache=True)
-def count_crossing(base, points, rows, count, nearest):
+def count_crossing(base, points, rows, count):
     """How many pairs that were apart are not, after `admit`: what was carried went through something."""
     bad = 0
     for e in range(count):
         if rows.kinds[e] != SHAPE and rows.distances[e] > 0.0:
             n = row(rows.normals, e)
-            bad += not _keeps_apart(base, points, rows, e, n, 0.5 * least_distance(rows.distances[e], nearest), 0.0)
+            remains = least_distance(rows.distances[e], NEAREST * rows.gaps[e])
+            bad += not _keeps_apart(base, points, rows, e, n, 0.5 * remains, 0.0)
     return bad
 
 
 @njit(cache=True)
-def widen(points, movers, loose, rows, count, most, marks):
-    """Widen gaps of pushing pairs that are too narrow by at most `most` [m]; put nodes back onto walls.
+def part(points, movers, loose, pairs, rows, count, most, marks):
+    """Part what is through each other by at most `most` [m], and what touches; put nodes back onto walls.
 
-    So a node that begins behind a surface leaves it slowly.
+    What is apart is never moved farther apart than it has been: that would be energy without a source.
 
     Velocities do not change. Bodies are shifted by their inverse masses `loose` (b,). Returns how many nodes of
     `marks.changed` moved.
@@ -284,9 +295,12 @@ def widen(points, movers, loose, rows, count, most, marks):
         for i in range(4):
             s += rows.weights[e, i] * along(points, rows.nodes[e, i], n)
         if rows.kinds[e] == SHAPE:
-            lack = rows.gaps[e] - s if rows.distances[e] >= 0.0 else min(most, rows.gaps[e] - s)
+            lack = rows.targets[e] - s if rows.distances[e] >= 0.0 else min(most, -s)
+        elif pairs.deep[rows.pairs[e]]:
+            lack = min(most, PARTED * rows.gaps[e] - s)
         else:
-            lack = min(most, WIDENED * rows.gaps[e] - s) if rows.distances[e] < rows.gaps[e] else 0.0
+            known = min(PARTED * rows.gaps[e], pairs.reached[rows.pairs[e]])
+            lack = min(most, max(APART * rows.gaps[e], known) - s) if rows.distances[e] < rows.gaps[e] else 0.0
         if not lack > 0.0:
             continue
         for i in range(1 if rows.kinds[e] == SHAPE else 4):

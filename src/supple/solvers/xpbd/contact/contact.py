@@ -20,8 +20,8 @@ from supple.solvers.xpbd.contact.frame_forces import FrameForces, LoadedRows, lo
 from supple.solvers.xpbd.contact.islands import keep_active
 from supple.solvers.xpbd.contact.memory import ContactMemory
 from supple.solvers.xpbd.contact.nodes import Nodes
-from supple.solvers.xpbd.contact.row_solver import RESIDUAL, RowSolver
-from supple.solvers.xpbd.contact.rows import NIL, Rows, detect, is_last_shape, no_walls
+from supple.solvers.xpbd.contact.row_solver import RowSolver
+from supple.solvers.xpbd.contact.rows import Rows, detect, is_last_shape, no_walls
 from supple.solvers.xpbd.contact.search.lists import Lists
 from supple.solvers.xpbd.contact.search.overlaps import find_overlaps
 from supple.solvers.xpbd.contact.search.surface import row_surface
@@ -33,11 +33,14 @@ from supple.solvers.xpbd.response_rates import response_rates
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joint_rows import JointRows
 
-# Of the mean edge: the gap between surfaces. Of the gap: how far nodes may go beyond the places that were expected when
-# rows were found.
-GAP, SLACK = 0.05, 0.25
-# Of the mean edge: by how much a gap that is too narrow is widened in a frame.
+# Of the mean edge: how far nodes may go beyond the places that were expected when rows were found.
+SLACK = 0.0125
+# Of the mean edge: by how much things that are through each other are parted in a frame.
 RECOVERED = 0.05
+# Of the gap: cuts that do not count.
+HARMLESS = 0.5
+# See `detect`.
+ONLY_MEETING = -1.0
 
 
 @dataclass
@@ -64,24 +67,22 @@ class Contact:
     ----------
     nodes : what moves; tets : of the system
     forces : of the substeps since the frame began; counts : in these
-    edge_length : mean surface edge [m]; gap : that surfaces keep [m]
+    edge_length : mean surface edge [m]
     """
 
     def __init__(
         self, system: System, rigid: RigidBodies, inverse_masses: NDArray[np.float64], settings: XPBDContact | None
     ) -> None:
         n = len(system.masses)
-        self.edge_length = mean_edge_length(system)
         self._rigid = rigid
-        thickness = settings.thickness if settings is not None else None
-        self.gap = GAP * self.edge_length if thickness is None else thickness
-        lengths = self.edge_length, self.gap
-        self._surface = surface = row_surface(system, rigid, len(inverse_masses) - n, settings, lengths)
+        self._surface = surface = row_surface(system, rigid, len(inverse_masses) - n, settings)
+        self.edge_length = surface.edge_length
+        self._faces = surface.simplices.around, surface.simplices.triangles
         count, poses = surface.count, ObstaclePoses(system.obstacles)
         self.nodes = Nodes(surface, rigid, poses, inverse_masses)
-        self._solver = RowSolver(self.nodes, rigid, system.gravity, self.gap, system.joined_components)
+        self._solver = RowSolver(self.nodes, rigid, system.gravity, system.joined_components)
         self._shapes = RowShapes(system, poses)
-        self._lists = Lists(surface, self._shapes, self.gap)
+        self._lists = Lists(surface, self._shapes)
         self.tets = Tets.of(system, count)
         self._rows = Rows.room(1024)
         self._chosen = np.zeros(0, dtype=np.bool_)
@@ -89,7 +90,8 @@ class Contact:
         # Of what has no elastic energy, nothing is kept; a finite number, as infinity times zero is not one.
         self._rates[:n] = np.minimum(response_rates(system), 1e100)
         changed = np.zeros(count, np.int64), np.zeros(8 * count, np.int64)
-        self._marks = Marks(*changed, np.zeros(0, np.bool_), np.zeros(1))
+        none = np.zeros(0, np.bool_), np.zeros(len(rigid), np.bool_)
+        self._marks = Marks(*changed, *none, surface.simplices.gaps, np.zeros(1))
         self._cuts = Cuts.room(0)
         self._expected, self._far = np.zeros((count, 3)), np.zeros(count, dtype=np.bool_)
         self._everyone = np.zeros(0, dtype=np.bool_)
@@ -180,7 +182,7 @@ class Contact:
         self._before[:] = nodes.v
         if not lists.loaded:  # so that no kernel is compiled for what does not push
             return
-        push_kept(nodes.at_begin(), nodes.bodies, nodes.v, lists.near, lists.pairs, self._walls, self.gap, h)
+        push_kept(nodes.at_begin(), nodes.bodies, nodes.v, lists.near, lists.pairs, self._walls, self._faces, h)
         nodes.take_twists(h)
         nodes.impulses += (nodes.v - self._before)[: len(nodes.impulses)]
 
@@ -200,16 +202,16 @@ class Contact:
         if len(self._chosen) != len(self._lists.pairs.keys):
             self._chosen = np.zeros(len(self._lists.pairs.keys), dtype=np.bool_)
         self._chosen[:] = False
-        rows = self._detect(0, (1.0 + 2.0 * SLACK) * self.gap, self._everyone)
+        rows = self._detect(0, 2.0 * SLACK * self.edge_length, self._everyone)
         self.counts.smallest = min(self.counts.smallest, float(self._rows.distances[:rows].min(initial=math.inf)))
         return rows
 
-    def _detect(self, first: int, reach: float, moved: NDArray[np.bool_]) -> int:
+    def _detect(self, first: int, slack: float, moved: NDArray[np.bool_]) -> int:
         lists, nodes = self._lists, self.nodes
         self._make_room(first + len(lists.near))
-        whole = nodes.begin, nodes.x, nodes.bodies, self._surface.simplices.first
+        whole = nodes.begin, nodes.x, nodes.bodies, self._faces, self._surface.simplices.first
         listed = lists.near, lists.pairs, self._walls
-        return detect(*whole, *listed, reach, NIL * self.gap, self._chosen, moved, first, self._rows)
+        return detect(*whole, *listed, slack, self._chosen, moved, first, self._rows)
 
     def _make_room(self, count: int) -> None:
         if count > len(self._rows.pairs):
@@ -233,7 +235,7 @@ class Contact:
 
     def keep_active(self, low: int, left: float, flat: float, *, first: bool = False) -> bool:
         """Leave the islands with low tets active, `left` in gaps; see `islands.keep_active`."""
-        return keep_active(self.tets, low, self._solver.islands, left * self.gap, flat, first)
+        return keep_active(self.tets, low, self._solver.islands, left, flat, first)
 
     def project_low(self, bounds: NDArray[np.float64]) -> None:
         """Project the tets of active islands; see `tets.project_low`."""
@@ -260,12 +262,12 @@ class Contact:
     def cut_inside(self, base: NDArray[np.float64], low: int, keep: float) -> int:
         """Shorten motions from `base` (N, 3) of the nodes of the first `low` tets; see `admit`."""
         self._make_room(0)
-        room = self._rows, 0, self.tets, low, 0, keep, 0.0, self._marks, self._cuts
+        room = self._rows, 0, self.tets, low, 0, keep, self._marks, self._cuts
         guarantee.admit(base, self.nodes.x, self.nodes.movers, *room)
         return volumes.measure(self.nodes.x, self.tets, False, guarantee.KEEP_J)
 
     def admit(self, rows: int, low: int) -> None:
-        """Widen gaps and put nodes back onto walls, then shorten motions until the guarantee holds.
+        """Part what is through each other, put nodes back onto walls, then shorten motions until the guarantee holds.
 
         low : number of tets that have lost too much, as listed
         """
@@ -275,37 +277,42 @@ class Contact:
             loose = np.where(self._rigid.joined, 0.0, nodes.bodies.w)
             recovered = RECOVERED * self.edge_length * h / self._dt
             if rows:
-                moved = guarantee.widen(nodes.x, nodes.movers, loose, self._rows, rows, recovered, self._marks)
+                pushing = loose, self._lists.pairs, self._rows, rows
+                moved = guarantee.part(nodes.x, nodes.movers, *pushing, recovered, self._marks)
             # Pairs that were left out are asked again where something went farther than was expected.
-            if _farther(nodes.x, self._expected, SLACK * self.gap, self._far):
-                rows = self._detect(rows, 0.0, self._far)
+            if _farther(nodes.x, self._expected, SLACK * self.edge_length, self._far):
+                rows = self._detect(rows, ONLY_MEETING, self._far)
         else:
             self._make_room(0)
         v = nodes.v[: len(nodes.impulses)].copy()
         cut = self._cut(rows, low, moved)
-        if self and not self._lists.cover(nodes.begin, nodes.x, h, self._frames[0]):
-            # A node has left what the lists expect of it: lists of this very motion, and again.
+        if self:
+            self._lists.end_substep(h)
+        for _ in range(guarantee.MOST_ROUNDS if self else 0):
+            # Where a node has left what the lists expect of it: lists of this very motion, and again. What that cuts
+            # may have left its place, too.
+            if self._lists.cover(nodes.begin, nodes.x, h, self._frames[0]):
+                break
             self._chosen = np.zeros(len(self._lists.pairs.keys), dtype=np.bool_)
             self._measure_walls()
-            cut += self._cut(self._detect(0, 0.0, self._everyone), 0, 0)
+            cut += self._cut(self._detect(0, ONLY_MEETING, self._everyone), 0, 0)
         if cut or moved:
             keep_spin(nodes.begin, nodes.x, nodes.v[: len(v)], h, *self._spins)
             nodes.impulses += nodes.v[: len(v)] - v
-        # A cut that is smaller than the error that rows may leave does not count.
-        self.counts.cut += math.sqrt(self._marks.longest[0]) > RESIDUAL * self.gap
+        self.counts.cut += math.sqrt(self._marks.longest[0]) > HARMLESS
 
     def _cut(self, rows: int, low: int, moved: int) -> int:
         if not (rows or low or moved):
             return 0
-        nearest, nodes = guarantee.NEAREST * self.gap, self.nodes
-        room = self._rows, rows, self.tets, low, moved, guarantee.KEEP_J, nearest, self._marks, self._cuts
+        nodes = self.nodes
+        room = self._rows, rows, self.tets, low, moved, guarantee.KEEP_J, self._marks, self._cuts
         base = nodes.carried()
         cut, _ = guarantee.admit(base, nodes.x, nodes.movers, *room)
         if cut:
             nodes.settle()
             share_motion(nodes.x, nodes.movers, self._rows, nodes.begin, nodes.v, self._cuts, cut)
             nodes.take_twists(1.0)
-            crossing = guarantee.count_crossing(base, nodes.x, self._rows, rows, nearest)
+            crossing = guarantee.count_crossing(base, nodes.x, self._rows, rows)
             low = volumes.measure(nodes.x, self.tets, False, 0.5 * guarantee.KEEP_J)
             self.counts.crushed += crossing + low > 0
         return cut
@@ -320,9 +327,3 @@ def _farther(points, reference, most, far):
         far[i] = not dot(d, d) <= most * most
         found = found or far[i]
     return found
-
-
-def mean_edge_length(system: System) -> float:
-    """Mean edge length of all the bodies' surfaces at rest [m]."""
-    a, b, c = system.rest_points[system.triangles].transpose(1, 0, 2)
-    return float(np.mean([np.linalg.norm(a - b, axis=1), np.linalg.norm(b - c, axis=1), np.linalg.norm(c - a, axis=1)]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -128,8 +129,11 @@ def keep_spin(begin, points, velocities, h, masses, labels, free, sums):
 
 @njit
 def _stop_approach(points, bodies, rows, e, velocities, part):
-    """Take back a part of the approach of a row by opposite impulses; those on bodies go to their twists."""
-    n, speed = row(rows.normals, e), 0.0
+    """Take back a part of the approach of a row by opposite impulses; those on bodies go to their twists.
+
+    What does not approach where the substep begins met as it turned: then a part of all relative motion is taken back.
+    """
+    n, relative = row(rows.normals, e), (0.0, 0.0, 0.0)
     for i in range(4):
         v = rows.nodes[e, i]
         b = bodies.body[v]
@@ -138,7 +142,14 @@ def _stop_approach(points, bodies, rows, e, velocities, part):
             t = bodies.twists
             turned = cross((t[b, 3], t[b, 4], t[b, 5]), row(bodies.arms, v))
             u = (u[0] + t[b, 0] + turned[0], u[1] + t[b, 1] + turned[1], u[2] + t[b, 2] + turned[2])
-        speed += rows.weights[e, i] * dot(n, u)
+        c = rows.weights[e, i]
+        relative = (relative[0] + c * u[0], relative[1] + c * u[1], relative[2] + c * u[2])
+    speed = dot(n, relative)
+    if speed >= 0.0:
+        length = math.sqrt(dot(relative, relative))
+        if length > 0.0:
+            n, speed = (relative[0] / length, relative[1] / length, relative[2] / length), length
+            n, speed = (-n[0], -n[1], -n[2]), -speed
     soft = softness(points, bodies, rows, e, n)
     if not speed < 0.0 or not soft > 0.0:
         return

@@ -21,7 +21,7 @@ class Islands(NamedTuple):
     piece : (N,) of each node, -1 for those of obstacles; rigid : (p,) whether a rigid body is in a piece
     root : (p,) the piece that stands for the island of each one; the next are of islands, in the rows of these
     stiff : (p,) whether a rigid body is in it; active : (p,) whether it is swept; swept : (p,) within a solution
-    residual : (p,) what the last sweep over its rows changed [m]; least : (p,) J of its tets
+    residual, changes : (p,) what the last sweep over its rows changed, in gaps and [m]; least : (p,) J of its tets
     """
 
     piece: NDArray[np.int32]
@@ -31,6 +31,7 @@ class Islands(NamedTuple):
     active: NDArray[np.bool_]
     swept: NDArray[np.bool_]
     residual: NDArray[np.float64]
+    changes: NDArray[np.float64]
     least: NDArray[np.float64]
 
     @classmethod
@@ -39,8 +40,8 @@ class Islands(NamedTuple):
         count = int(piece.max(initial=-1)) + 1
         has_rigid = np.zeros(count, dtype=np.bool_)
         has_rigid[rigid] = True
-        stiff, active, swept = np.zeros((3, count), dtype=np.bool_)
-        return cls(piece, has_rigid, np.zeros(count, np.int32), stiff, active, swept, np.zeros(count), np.zeros(count))
+        root, flags, numbers = np.zeros(count, np.int32), np.zeros((3, count), np.bool_), np.zeros((3, count))
+        return cls(piece, has_rigid, root, flags[0], flags[1], flags[2], numbers[0], numbers[1], numbers[2])
 
 
 @njit
@@ -94,7 +95,7 @@ def find_islands(points, rows, count, islands):
 def keep_active(tets, low, islands, changes, flat, first):
     """Leave those islands active that have a tet among the first `low` of `tets.low`.
 
-    Or, unless it is the `first` time, whose last sweep changed more than `changes` [m] with a J of at most `flat`.
+    Or, unless it is the `first` time, whose last sweep changed more than `changes` gaps with a J of at most `flat`.
     Returns whether any is active.
     """
     islands.least[:] = np.inf

@@ -15,6 +15,7 @@ class ListMemory:
     Attributes
     ----------
     points : (k, 2) points and triangles; edges : (l, 2); walls : (m, 2) nodes and shapes
+    reached : (k + l,) see `Pairs` [m]
     x, v : (N, 3) where nodes were and how fast, when the list began [m], [m/s]
     age, until : the time since then, and how long the list holds [s]
     collide : (p, p) which things could touch; on_shapes : (p, s) which of them simple shapes
@@ -24,6 +25,7 @@ class ListMemory:
     points: NDArray[np.int32]
     edges: NDArray[np.int32]
     walls: NDArray[np.int32]
+    reached: NDArray[np.float64]
     x: NDArray[np.float64]
     v: NDArray[np.float64]
     age: float

@@ -21,6 +21,8 @@ from supple.runtime.kernel_cache import njit
 POINT, EDGES, SHAPE = 0, 1, 2
 # Of `Pairs.near`.
 FAR, NEAR, UNKNOWN = 0, 1, 2
+# Of the gap: what is nearer touches. The cosine of the angle between the normals of what does.
+NIL, OPPOSED = 5e-6, -0.25
 
 
 class Pairs(NamedTuple):
@@ -35,8 +37,9 @@ class Pairs(NamedTuple):
     pushes : (k,) whether the pair pushes; pairs of one body that are near each other at rest are only kept apart
     deep : (k,) whether the sides were through each other when the frame began; then they are not kept on their sides,
         but pushed out along the normals at that time
-    friction : (k,) its coefficient; gaps : (k,) the distance that is kept [m]
+    friction : (k,) its coefficient; gaps : (k,) the smallest gap of its nodes [m]
     normals : (k, 3) as of the latest look; impulses : (k, 3) with which the next substep begins [kg m]
+    reached : (k,) the largest distance of the pair's rows so far, its gap at most [m]
     near : (k,) int8, whether the pair may come near while its nodes go on, see `near_pairs`
     """
 
@@ -50,6 +53,7 @@ class Pairs(NamedTuple):
     gaps: NDArray[np.float64]
     normals: NDArray[np.float64]
     impulses: NDArray[np.float64]
+    reached: NDArray[np.float64]
     near: NDArray[np.int8]
 
     @classmethod
@@ -62,7 +66,7 @@ class Pairs(NamedTuple):
             np.zeros(k, np.int64),
         )
         flags, vectors = (np.empty(k, np.bool_), np.zeros(k, np.bool_)), (np.zeros((k, 3)), np.zeros((k, 3)))
-        return cls(*numbers, *flags, np.empty(k), np.empty(k), *vectors, np.full(k, UNKNOWN, np.int8))
+        return cls(*numbers, *flags, np.empty(k), np.empty(k), *vectors, np.zeros(k), np.full(k, UNKNOWN, np.int8))
 
 
 @njit
@@ -83,14 +87,16 @@ def weights_of(x, nodes, k, kind):
 
 
 @njit
-def facing(x, pairs, k, nil):
+def facing(x, pairs, k, faces):
     """The weights (4) of a pair of surfaces, the unit normal from its second side to its first, and the distance.
 
-    Below zero where the sides of a deep pair are on the wrong sides of each other. The normal of a point that touches
-    a triangle is that of the triangle, and edges that touch have none; what is nearer than `nil` [m] touches.
+    Below zero where the sides of a deep pair are on the wrong sides of each other. The normal of what touches, or is
+    behind the other by no more, comes from the surfaces; it is zero where these do not face each other.
+
+    faces : the triangles around each node, and their nodes (f, 3)
     """
     c, r = weights_of(x, pairs.nodes, k, pairs.kinds[k])
-    size = math.sqrt(dot(r, r))
+    size, nil = math.sqrt(dot(r, r)), NIL * pairs.gaps[k]
     old = row(pairs.normals, k)
     if pairs.deep[k]:
         if size <= nil:
@@ -98,13 +104,47 @@ def facing(x, pairs, k, nil):
         if dot(r, old) < 0.0:
             return c, (-r[0] / size, -r[1] / size, -r[2] / size), -size
     elif size <= nil:
-        if pairs.kinds[k] == EDGES:
-            return c, (0.0, 0.0, 0.0), 0.0
-        p = row(x, pairs.nodes[k, 1])
-        m = cross(subtract(row(x, pairs.nodes[k, 2]), p), subtract(row(x, pairs.nodes[k, 3]), p))
-        length = math.sqrt(dot(m, m))
-        return c, (m[0] / length, m[1] / length, m[2] / length), 0.0
+        n = _normal_of_touching(x, pairs.nodes, k, pairs.kinds[k], faces)
+        return c, n, dot(n, r)
     return c, (r[0] / size, r[1] / size, r[2] / size), size
+
+
+@njit
+def _normal_of_touching(x, nodes, k, kind, faces):
+    """The unit normal from the second side of a pair to the first one, from the surfaces around them, or zero."""
+    a, b = row(x, nodes[k, 0]), row(x, nodes[k, 1])
+    c, d = row(x, nodes[k, 2]), row(x, nodes[k, 3])
+    one = normal_at(x, nodes[k, 0], faces)
+    if kind == POINT:
+        m, other = cross(subtract(c, b), subtract(d, b)), (0.0, 0.0, 0.0)
+    else:
+        m, two = cross(subtract(b, a), subtract(d, c)), normal_at(x, nodes[k, 1], faces)
+        one = (one[0] + two[0], one[1] + two[1], one[2] + two[2])
+        p, q = normal_at(x, nodes[k, 2], faces), normal_at(x, nodes[k, 3], faces)
+        other = (p[0] + q[0], p[1] + q[1], p[2] + q[2])
+        if dot(m, subtract(other, one)) < 0.0:
+            m = (-m[0], -m[1], -m[2])
+    length = math.sqrt(dot(m, m))
+    if not length > 0.0:
+        return (0.0, 0.0, 0.0)
+    n = (m[0] / length, m[1] / length, m[2] / length)
+    faces_first = dot(n, one) < OPPOSED * math.sqrt(dot(one, one))
+    faces_second = kind == POINT or dot(n, other) > -OPPOSED * math.sqrt(dot(other, other))
+    return n if faces_first and faces_second else (0.0, 0.0, 0.0)
+
+
+@njit(cache=True)
+def normal_at(x, i, faces):
+    """The unit normal of the surface at node i."""
+    (start, items), triangles = faces
+    n = (0.0, 0.0, 0.0)
+    for k in range(start[i], start[i + 1]):
+        t = items[k]
+        p = row(x, triangles[t, 0])
+        m = cross(subtract(row(x, triangles[t, 1]), p), subtract(row(x, triangles[t, 2]), p))
+        n = (n[0] + m[0], n[1] + m[1], n[2] + m[2])
+    length = math.sqrt(dot(n, n))
+    return (n[0] / length, n[1] / length, n[2] / length) if length > 0.0 else n
 
 
 @njit(inline="always")
@@ -125,10 +165,11 @@ def loaded_pairs(impulses):
 
 
 @njit(cache=True)
-def describe_pairs(first, points, edges, simplices, far, pairs):
+def describe_pairs(first, points, edges, simplices, pairs):
     """Fill in what pairs of surfaces are, from row `first` on: nodes, kinds, keys, whether they push, friction, gaps.
 
-    points : (k, 2) points and triangles; edges : (l, 2); far : [m] pairs of one body push that are farther at rest
+    points : (k, 2) points and triangles; edges : (l, 2)
+    Pairs of one body push that are farther from each other at rest than twice their gap.
     """
     s = simplices
     for e in range(len(points) + len(edges)):
@@ -147,11 +188,13 @@ def describe_pairs(first, points, edges, simplices, far, pairs):
             pairs.kinds[k] = EDGES
             pairs.keys[k] = -1 - (np.int64(a) << 31 | b)
         one, other = s.owner[pairs.nodes[k, 0]], s.owner[pairs.nodes[k, 3]]
-        pairs.friction[k], pairs.gaps[k] = s.friction[one, other], s.gaps[one, other]
+        pairs.friction[k], pairs.gaps[k] = s.friction[one, other], np.inf
+        for i in range(4):
+            pairs.gaps[k] = min(pairs.gaps[k], s.gaps[pairs.nodes[k, i]])
         pairs.pushes[k] = True
         if one == other:
             _, r = weights_of(s.rest, pairs.nodes, k, pairs.kinds[k])
-            pairs.pushes[k] = dot(r, r) > far * far
+            pairs.pushes[k] = dot(r, r) > (2.0 * pairs.gaps[k]) ** 2
 
 
 @njit
@@ -203,12 +246,12 @@ def copy_pairs(old, rows, new, first):
             new.normals[k, j], new.impulses[k, j] = old.normals[o, j], old.impulses[o, j]
         new.kinds[k], new.shapes[k], new.keys[k], new.near[k] = old.kinds[o], old.shapes[o], old.keys[o], old.near[o]
         new.pushes[k], new.deep[k] = old.pushes[o], old.deep[o]
-        new.friction[k], new.gaps[k] = old.friction[o], old.gaps[o]
+        new.friction[k], new.gaps[k], new.reached[k] = old.friction[o], old.gaps[o], old.reached[o]
 
 
 @njit(cache=True)
 def near_pairs(x, v, pairs, time, reach, moved, out):
-    """List the pairs that may come nearer than `reach` while their nodes go on for a time, and all pairs with shapes.
+    """List the pairs that may come nearer than their gap and `reach` while their nodes go on, and all with shapes.
 
     Of others it is known already, unless a node has `moved` (N,); returns the number of near pairs.
     """
@@ -226,7 +269,7 @@ def near_pairs(x, v, pairs, time, reach, moved, out):
             or moved[nodes[k, 3]]
         ):
             pairs.near[k] = FAR
-            far = reach + time * relative_speed(v, nodes, k, kind)
+            far = pairs.gaps[k] + reach + time * relative_speed(v, nodes, k, kind)
             if room_between(x, x, nodes, k, kind, row(pairs.normals, k)) > far:
                 continue
             _, r = weights_of(x, nodes, k, kind)
@@ -255,3 +298,4 @@ def hand_on(old: Pairs, kept: NDArray[np.int64], new: Pairs) -> None:
     same = old.keys[held[place]] == new.keys[open_]
     found, source = open_[same], held[place[same]]
     new.impulses[found], new.normals[found] = old.impulses[source], old.normals[source]
+    new.reached[found] = old.reached[source]

@@ -22,6 +22,8 @@ RESIDUAL, MOST_SWEEPS = 0.02, 4
 # The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps. In a heap of 200
 # boxes neither 10 nor 60 sweeps are enough; impulses that are kept go on with them.
 RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 10
+# Rows are solved again with bodies where they are while these turn by more than this [rad], at most so often.
+MOST_TURNS, SMALL_TURN = 4, 2e-3
 # With joints, and for each joint where that is more: what pulls at a chain has to go along it.
 MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT = 60, 10
 # The largest correction of joints, as a share of their size, after which sweeps end: a tenth of what is looked for.
@@ -39,14 +41,9 @@ class RowSolver:
     """
 
     def __init__(
-        self,
-        nodes: Nodes,
-        rigid: RigidBodies,
-        gravity: NDArray[np.float64],
-        gap: float,
-        pieces: NDArray[np.int32],
+        self, nodes: Nodes, rigid: RigidBodies, gravity: NDArray[np.float64], pieces: NDArray[np.int32]
     ) -> None:
-        self._nodes, self._rigid, self._gap = nodes, rigid, gap
+        self._nodes, self._rigid = nodes, rigid
         self._gravity = math.hypot(*gravity)
         self.left = 0.0
         self.islands = Islands.of(nodes.of_pieces(pieces), pieces[rigid.control[:, 0]])
@@ -65,11 +62,14 @@ class RowSolver:
             self.islands.residual[:] = 0.0
             return 0.0
         nodes = self._nodes
-        x = self._prepared(rows, count)
-        contacts = nodes.x, nodes.bodies, nodes.begin, rows, count, self.islands
-        _, residual = solve(*contacts, self._tolerances(h), most)
-        self._take_over(x, h)
-        self.left = residual / self._gap
+        for _ in range(MOST_TURNS):
+            x = self._prepared(rows, count)
+            contacts = nodes.x, nodes.bodies, nodes.begin, rows, count, self.islands
+            _, self.left = solve(*contacts, self._tolerances(h), most)
+            turns = (nodes.bodies.twists[:, 3:] ** 2).sum(axis=1).max(initial=0.0)
+            self._take_over(x, h)
+            if not turns > SMALL_TURN**2:
+                break
         return self.left
 
     def solve_joined(
@@ -86,8 +86,7 @@ class RowSolver:
         find_islands(nodes.x, rows, count, self.islands)
         if count:
             contacts = nodes.x, nodes.bodies, nodes.begin, rows, count, self.islands
-            off, residual = solve_joined(*contacts, joints, impulses, enough, self._tolerances(h), most)
-            self.left = residual / self._gap
+            off, self.left = solve_joined(*contacts, joints, impulses, enough, self._tolerances(h), most)
         else:
             solve_joints(joints, impulses, nodes.bodies.twists, most)
             off = 0.5 * float((nodes.bodies.twists[:, 3:] ** 2).sum(axis=1).max(initial=0.0))
@@ -106,9 +105,9 @@ class RowSolver:
         return nodes.x[: len(nodes.impulses), :3].copy()
 
     def _tolerances(self, h: float) -> tuple[float, float]:
-        """What the last sweep over the rows of islands without and with rigid bodies may change [m]."""
-        fall, tolerance = self._gravity * h**2, RESIDUAL * self._gap
-        return tolerance, min(tolerance, RIGID_RESIDUAL * fall) if fall > 0.0 else tolerance
+        """What the last sweep over the rows may change, in gaps, and in islands with rigid bodies [m]."""
+        fall = self._gravity * h**2
+        return RESIDUAL, RIGID_RESIDUAL * fall if fall > 0.0 else math.inf
 
     def _take_over(self, x: NDArray[np.float64], h: float, of_joints: NDArray[np.float64] | None = None) -> None:
         """Give velocities the changes of places since x (n, 3), and of bodies.
@@ -133,7 +132,7 @@ def solve_joined(points, bodies, begin, rows, count, islands, joints, impulses, 
     joints : their rows, with impulses (r,) [kg m], in place
     enough : contacts are left alone if joints need smaller corrections, as shares of their size
 
-    Returns the largest correction of joints in the first turn, and what the last sweep over contacts changed [m].
+    Returns the largest correction of joints in the first turn, and what the last sweep over contacts changed, in gaps.
     """
     first, residual = np.inf, 0.0
     for turn in range(most):
@@ -148,6 +147,6 @@ def solve_joined(points, bodies, begin, rows, count, islands, joints, impulses, 
             if first <= enough:
                 break
         _, residual = solve(points, bodies, begin, rows, count, islands, tolerances, (1, 1))
-        if largest <= _SMALL and residual <= tolerances[1]:
+        if largest <= _SMALL and residual <= tolerances[0] and islands.changes.max() <= tolerances[1]:
             break
     return first, residual

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.levers import set_levers, softness
-from supple.solvers.xpbd.contact.pairs import EDGES, POINT, SHAPE, Pairs, along, facing, is_loaded, room_between
+from supple.solvers.xpbd.contact.pairs import EDGES, NIL, POINT, SHAPE, Pairs, along, facing, is_loaded, room_between
 from supple.solvers.xpbd.contact.shapes import Walls
 
-# Of the gap: what is nearer touches.
-NIL = 1e-6
+# Of the gap: the distance from simple shapes.
+SKIN = 0.01
 # Edges at a smaller angle [rad] do not push each other.
 PARALLEL = 0.05
 
@@ -30,7 +30,7 @@ class Rows(NamedTuple):
     ----------
     pairs : (r,) the number of each row's pair; nodes : (r, 4) its nodes, kinds : (r,) its kind
     weights : (r, 4) c_i; places : (r, 3) q (see `pairs`); normals : (r, 3) n
-    targets, distances : (r,) the least n . r, and d [m]; gaps : (r,) that are kept [m]
+    targets, distances : (r,) the least n . r, and d [m]; gaps : (r,) of the pairs [m]
     masses : (r,) the impulse [kg m] along n that changes n . r by one, see `softness`; 0 where nothing moves or pushes
     across : (r,) the same along the surface, of rows with a rigid body; 0 until something slips
     friction : (r,); impulses : (r, 3), accumulated [kg m]
@@ -67,15 +67,15 @@ class Rows(NamedTuple):
 
 
 @njit(cache=True)
-def detect(begin, end, bodies, first_of, near, pairs, walls, reach, nil, chosen, moved, first, rows):
-    """Append the rows of all pairs that are not sure to keep `reach` [m] on the way; returns the number of rows.
+def detect(begin, end, bodies, faces, first_of, near, pairs, walls, slack, chosen, moved, first, rows):
+    """Append the rows of all pairs that are not sure to keep their reach on the way; returns the number of rows.
 
     Parameters
     ----------
     begin : (N, >= 3) x_n; end : (N, 4) places to which nodes would go, and inverse masses
-    first_of : see `Simplices.first`
+    faces : see `facing`; first_of : see `Simplices.first`
     near : (m,) the pairs that are asked; walls : of the last of these, those with shapes
-    nil : surfaces that are nearer touch [m]
+    slack : the reach of a pair is its gap and this [m]; below zero: the reach is zero
     chosen : (k,) the pairs that are rows already; out
     moved : (N,) of a pair, one node is among these; empty: all pairs are asked
     first : how many rows there are already
@@ -91,26 +91,31 @@ def detect(begin, end, bodies, first_of, near, pairs, walls, reach, nil, chosen,
         if len(moved) and not (moved[p] or moved[q] or moved[r] or moved[s]):
             continue
         loaded = is_loaded(pairs.impulses, k)
+        reach = pairs.gaps[k] + slack if slack >= 0.0 else 0.0
         if kind == SHAPE:
             w = m - shape
             n, place = row(walls.normals, w), row(walls.places, w)
             if not loaded and along(end, p, n) - dot(place, n) > reach:
                 continue
             c, d = (1.0, 0.0, 0.0, 0.0), walls.gaps[w]
-            target = min(pairs.gaps[k], d)
+            # What is behind a wall leaves it slowly.
+            skin = SKIN * pairs.gaps[k]
+            target = min(skin, d) if d >= 0.0 else min(0.0, d + skin)
         else:
             loaded = loaded or pairs.deep[k]
             if not loaded and room_between(begin, end, pairs.nodes, k, kind, row(pairs.normals, k)) > reach:
                 continue
-            c, n, d = facing(begin, pairs, k, nil)
-            if d == 0.0 and kind == EDGES:
+            c, n, d = facing(begin, pairs, k, faces)
+            if n == (0.0, 0.0, 0.0):
                 continue
-            place, target = (0.0, 0.0, 0.0), min(pairs.gaps[k], d)
+            place = (0.0, 0.0, 0.0)
+            target = min(pairs.gaps[k], d)
         for j in range(3):
             pairs.normals[k, j] = n[j]
         if kind != SHAPE and not loaded and room_between(begin, end, pairs.nodes, k, kind, n) > reach:
             continue
         chosen[k] = True
+        pairs.reached[k] = max(pairs.reached[k], min(pairs.gaps[k], d))
         for i in range(4):
             rows.nodes[count, i] = pairs.nodes[k, i]
             rows.weights[count, i] = c[i]
@@ -124,7 +129,7 @@ def detect(begin, end, bodies, first_of, near, pairs, walls, reach, nil, chosen,
         pushes = pairs.pushes[k]
         if kind == EDGES and not pairs.deep[k]:
             pushes = pushes and _cross(begin, pairs.nodes, k, c)
-        elif kind == POINT and not pairs.deep[k]:
+        elif kind == POINT and not pairs.deep[k] and d > NIL * pairs.gaps[k]:
             pushes = pushes and _is_own(c, pairs.shapes[k], first_of)
         rows.masses[count] = 1.0 / soft if soft > 0.0 and pushes else 0.0
         rows.across[count], rows.friction[count] = 0.0, pairs.friction[k]

@@ -21,8 +21,9 @@ class XPBDContact(Kind):
 
     Parameters
     ----------
-    thickness : gap that is kept between surfaces of bodies, and between bodies and triangle obstacles [m]; a tenth of
-        it from obstacles with a formula. None: a twentieth of the mean edge length of the surfaces of all bodies.
+    thickness : gap that surfaces keep [m], a hundredth of it from half-spaces and rooms. None: of each side at each
+        place the smallest of 0.003 of its diagonal, a twentieth of its mean surface edge, and a twentieth of its
+        thickness there; of two sides the smaller one. What begins nearer keeps that distance.
     body_collision : whether bodies collide with each other.
     self_collision : whether a body collides with itself.
 

@@ -17,7 +17,6 @@ from supple.solvers.xpbd.contact.bodies import push_node, turn_body
 from supple.solvers.xpbd.contact.islands import island_of
 from supple.solvers.xpbd.contact.levers import push_row, softness, vector
 from supple.solvers.xpbd.contact.pairs import SHAPE, facing, is_loaded, weights_of
-from supple.solvers.xpbd.contact.rows import NIL
 
 
 @njit
@@ -63,20 +62,21 @@ def _turn(out, scale, points, bodies, begin, nodes, e, moment):
 
 @njit(cache=True)
 def solve(points, bodies, begin, rows, count, islands, tolerances, most):
-    """Sweep over the rows of each active island until no sweep changes an n . r by more than its tolerance [m].
+    """Sweep over the rows of each active island until no sweep changes an n . r by more than its tolerance.
 
-    tolerances, most : of islands without and with rigid bodies; `most` is the largest number of sweeps
+    tolerances : in gaps, and of islands with rigid bodies also [m]
+    most : the largest number of sweeps of islands without and with rigid bodies
 
-    Returns the number of sweeps, and the largest change in the last one of any island [m].
+    Returns the number of sweeps, and the largest change in the last one of any island, in gaps.
     """
     sweeps, some, largest = 0, count > 0, 0.0
     islands.swept[:] = islands.active
-    islands.residual[:] = 0.0
+    islands.residual[:] = islands.changes[:] = 0.0
     while some:
         sweeps += 1
         for p in range(len(islands.swept)):
             if islands.swept[p]:
-                islands.residual[p] = 0.0
+                islands.residual[p] = islands.changes[p] = 0.0
         for e in range(count):
             mass = rows.masses[e]
             if mass == 0.0:
@@ -90,7 +90,9 @@ def solve(points, bodies, begin, rows, count, islands, tolerances, most):
             push = max(0.0, before + (rows.targets[e] - s) * mass)
             if push == 0.0 and before == 0.0:
                 continue
-            islands.residual[island] = max(islands.residual[island], abs(push - before) / mass)
+            moved = abs(push - before) / mass
+            islands.residual[island] = max(islands.residual[island], moved / rows.gaps[e])
+            islands.changes[island] = max(islands.changes[island], moved)
             held = (f[0] - before * n[0], f[1] - before * n[1], f[2] - before * n[2])
             slip = (r[0] - s * n[0], r[1] - s * n[1], r[2] - s * n[2])
             if rows.friction[e] > 0.0 and rows.rigid[e]:
@@ -114,15 +116,16 @@ def solve(points, bodies, begin, rows, count, islands, tolerances, most):
                 rows.impulses[e, j] = new[j]
         some, largest = False, 0.0
         for p in range(len(islands.swept)):
-            kind = 1 if islands.stiff[p] else 0
-            islands.swept[p] = islands.swept[p] and islands.residual[p] > tolerances[kind] and sweeps < most[kind]
+            stiff = islands.stiff[p]
+            open_ = islands.residual[p] > tolerances[0] or (stiff and islands.changes[p] > tolerances[1])
+            islands.swept[p] = islands.swept[p] and open_ and sweeps < most[1 if stiff else 0]
             some = some or islands.swept[p]
             largest = max(largest, islands.residual[p])
     return sweeps, largest
 
 
 @njit(cache=True)
-def push_kept(points, bodies, velocities, near, pairs, walls, gap, h):
+def push_kept(points, bodies, velocities, near, pairs, walls, faces, h):
     """Begin a substep with the kept impulses, along the normals at x_n; impulses of pairs that do not push are zero."""
     shape = len(near) - len(walls.gaps)
     for m in range(len(near)):
@@ -132,9 +135,9 @@ def push_kept(points, bodies, velocities, near, pairs, walls, gap, h):
         if pairs.kinds[k] == SHAPE:
             d, n = walls.gaps[m - shape], row(walls.normals, m - shape)
         else:
-            _, n, d = facing(points, pairs, k, NIL * gap)
+            _, n, d = facing(points, pairs, k, faces)
         f, old = row(pairs.impulses, k), row(pairs.normals, k)
-        if d > 2.0 * gap or dot(n, old) < 0.5:
+        if d > 2.0 * pairs.gaps[k] or dot(n, old) < 0.5:
             pairs.impulses[k, :] = 0.0
             continue
         push = dot(f, old)
@@ -159,7 +162,7 @@ def push_kept(points, bodies, velocities, near, pairs, walls, gap, h):
             for j in range(3):
                 velocities[v, j] += points[v, 3] * f[j] / h
         if pairs.kinds[k] != SHAPE:
-            _, _, d = facing(points, pairs, k, NIL * gap)
+            _, _, d = facing(points, pairs, k, faces)
             m = cross(row(pairs.normals, k), row(pairs.impulses, k))
             if m[0] != 0.0 or m[1] != 0.0 or m[2] != 0.0:
                 _turn(velocities, 1.0 / h, points, bodies, points, pairs.nodes, k, (-d * m[0], -d * m[1], -d * m[2]))

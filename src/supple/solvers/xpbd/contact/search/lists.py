@@ -30,8 +30,6 @@ from supple.solvers.xpbd.contact.search.overlaps import Overlaps
 from supple.solvers.xpbd.contact.search.surface import RowSurface
 from supple.solvers.xpbd.contact.shapes import RowShapes
 
-# Of the gap: that from simple shapes.
-SKIN = 0.01
 # Of the mean edge: how far nodes may leave their expected places; and the share of it from which lists are renewed
 # before a substep rather than after it, and from which a node is searched together with those that must be.
 WIDE, NEAR = 0.13, 0.05
@@ -50,12 +48,12 @@ class Lists:
 
     Parameters
     ----------
-    gap : the distance that surfaces keep [m]; skin : the distance from shapes [m]
+    surface, shapes : what may touch
     """
 
-    def __init__(self, surface: RowSurface, shapes: RowShapes, gap: float) -> None:
-        self._surface, self._shapes, self._gap = surface, shapes, gap
-        self._edge = surface.edge_length
+    def __init__(self, surface: RowSurface, shapes: RowShapes) -> None:
+        self._surface, self._shapes, self._edge = surface, shapes, surface.edge_length
+        self._widest = float(surface.simplices.gaps[surface.simplices.nodes].max(initial=0.0))
         self._search = PatchSearch(surface.parts, surface.patches)
         self._every = np.ones(surface.count, dtype=np.bool_)
         self._collide, self._on_shapes = surface.simplices.collide.copy(), shapes.collide
@@ -105,6 +103,7 @@ class Lists:
             self.wide.age, self.wide.until = known.age, known.until
             self._on_walls = known.walls
             self._describe(None, known.points, known.edges)
+            self.pairs.reached[: len(known.reached)] = known.reached
             self._deviations = self._deviation(self.wide, x), np.inf
 
     def _is_of(self, known: ListMemory) -> bool:
@@ -115,6 +114,7 @@ class Lists:
             np.array_equal(known.collide, s.collide),
             np.array_equal(known.on_shapes, self._on_shapes),
             np.array_equal(known.shapes, self._fixed),
+            known.reached.shape == (len(known.points) + len(known.edges),),
         ]
         ends = (
             (known.points, (len(s.nodes), len(s.triangles))),
@@ -131,7 +131,9 @@ class Lists:
         k, wide = loaded_pairs(self.pairs.impulses), self.wide
         k = k[np.argsort(self.pairs.keys[k])]
         masks = self._surface.simplices.collide.copy(), self._on_shapes, self._fixed
-        pairs = self._points, self._edges, self._on_walls
+        first = len(self._deep.normals)
+        reached = self.pairs.reached[first : first + len(self._points) + len(self._edges)].copy()
+        pairs = self._points, self._edges, self._on_walls, reached
         lists = ListMemory(*pairs, wide.x + origin, wide.v.copy(), wide.age, wide.until, *masks)
         return ContactMemory(self.pairs.keys[k], self.pairs.impulses[k] / (h * h), self.pairs.normals[k], x, lists)
 
@@ -154,13 +156,16 @@ class Lists:
         else:
             self._choose_again(x, v)
 
+    def end_substep(self, h: float) -> None:
+        """Note that a substep of h [s] ends."""
+        self.wide.age += h
+        self.tight.age += h
+
     def cover(
         self, begin: NDArray[np.float64], end: NDArray[np.float64], h: float, frames: NDArray[np.float64]
     ) -> bool:
-        """Whether the lists held for the motion of a substep; otherwise they are made again for this motion."""
+        """Whether the lists hold for the motion of the substep that ends; otherwise they are made again for it."""
         wide, tight = self.wide, self.tight
-        wide.age += h
-        tight.age += h
         self._deviations = self._deviation(wide, end), self._deviation(tight, end)
         inside = [d <= margin * self._edge for d, margin in zip(self._deviations, (WIDE, NEAR), strict=True)]
         if all(inside):
@@ -201,7 +206,7 @@ class Lists:
             wide.correct(nodes, x, v)
             asked = _asked(nodes[self._surface.simplices.nodes], p.corners)
         at, way = wide.places, (wide.until - wide.age) * wide.v
-        found = self._search.find(at, way, self._gap + 2.0 * WIDE * self._edge, asked)
+        found = self._search.find(at, way, self._widest + 2.0 * WIDE * self._edge, asked)
         self._on_walls = np.column_stack(self._walls(at, way, frames))
         self._describe(asked, *found)
 
@@ -222,13 +227,13 @@ class Lists:
         first = d + len(self._points)
         new = Pairs.room(first + len(self._edges) + len(self._on_walls))
         nothing = deep.points[:0]
-        describe_pairs(0, deep.points, deep.edges, s, 2.0 * self._gap, new)
+        describe_pairs(0, deep.points, deep.edges, s, new)
         new.deep[:d], new.normals[:d] = True, deep.normals
         kept = np.concatenate([d + stays[0], d + listed + stays[1]])
         copy_pairs(old, kept[: len(stays[0])], new, d)
         copy_pairs(old, kept[len(stays[0]) :], new, first)
-        describe_pairs(d + len(stays[0]), points, nothing, s, 2.0 * self._gap, new)
-        describe_pairs(first + len(stays[1]), nothing, edges, s, 2.0 * self._gap, new)
+        describe_pairs(d + len(stays[0]), points, nothing, s, new)
+        describe_pairs(first + len(stays[1]), nothing, edges, s, new)
         self._describe_walls(new, first + len(self._edges), *self._on_walls.T)
         hand_on(old, kept, new)
         self.pairs = new
@@ -239,7 +244,7 @@ class Lists:
         """The nodes and shapes (k,) that may touch."""
         s = self._surface.simplices
         nodes = s.nodes[s.owner[s.nodes] < len(self._shapes.collide)]
-        reach = self._gap + WIDE * self._edge + np.sqrt(np.einsum("ij,ij->i", way[nodes], way[nodes]))
+        reach = s.gaps[nodes] + WIDE * self._edge + np.sqrt(np.einsum("ij,ij->i", way[nodes], way[nodes]))
         points, shapes = [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=np.int32)]
         for o in range(len(self._shapes)):
             every = np.full(len(nodes), o, dtype=np.int32)
@@ -254,7 +259,7 @@ class Lists:
         pairs.nodes[mine] = nodes[:, None]
         pairs.kinds[mine], pairs.shapes[mine], pairs.pushes[mine] = SHAPE, shapes, True
         pairs.keys[mine] = 1 << 62 | shapes.astype(np.int64) << 31 | self._number[nodes]
-        pairs.gaps[mine] = SKIN * self._gap
+        pairs.gaps[mine] = s.gaps[nodes]
         pairs.friction[mine] = self._shapes.friction[s.owner[nodes], shapes]
 
     def _choose(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
@@ -272,7 +277,7 @@ class Lists:
 
     def _choose_of(self, nodes: NDArray[np.bool_]) -> None:
         tight, room = self.tight, np.empty(len(self.pairs.keys) + 1, dtype=np.int64)
-        reach, time = self._gap + 2.0 * NEAR * self._edge, tight.until - tight.age
+        reach, time = 2.0 * NEAR * self._edge, tight.until - tight.age
         near = room[: near_pairs(tight.places, tight.v, self.pairs, time, reach, nodes, room)]
         # One order for any history of the lists, and whatever else is in the scene; those with shapes last.
         self.near = near[np.lexsort((self.pairs.keys[near], self.pairs.kinds[near]))]

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from supple.contact.search.distances import point_triangle_square
 from supple.numerics.geometry.closest_points import closest_on_segments, closest_on_triangle
+from supple.numerics.geometry.triangle_crossings import crossing_triangles
 from supple.numerics.geometry.winding_number import winding_number
 from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.contact.pairs import NIL, normal_at
 from supple.solvers.xpbd.contact.search.surface import Simplices
 
 
@@ -50,7 +52,8 @@ def find_overlaps(
 
     closed : (p,) which surfaces are closed
     """
-    pairs = {(min(pair), max(pair)) for pair in crossing} | _nested(s, closed, x)
+    pairs = {pair for pair in crossing if not _only_touches(s, x, *pair)} | _nested(s, closed, x)
+    pairs = {(min(pair), max(pair)) for pair in pairs}
     out = Overlaps.none(len(s.collide))
     if not pairs:
         return out
@@ -76,6 +79,20 @@ def find_overlaps(
             ways[1].append(normals)
     normals = np.concatenate([*ways[0], *ways[1]])
     return out._replace(points=np.concatenate(points), edges=np.concatenate(edges), normals=normals)
+
+
+def _only_touches(s: Simplices, x: NDArray[np.float64], a: int, b: int) -> bool:
+    """Whether two things cross by so little that they count as touching: not with one of them smaller by that."""
+    owner = s.owner[s.triangles[:, 0]]
+    if a == b:
+        return False
+    mine, places = s.triangles[owner == a], x[:, :3].copy()
+    nodes = np.unique(mine)
+    normals = np.array([normal_at(x, i, (s.around, s.triangles)) for i in nodes])
+    places[nodes] -= NIL * s.gaps[nodes, None] * normals
+    both, pair = (owner == a) | (owner == b), np.zeros_like(s.collide)
+    pair[a, b] = pair[b, a] = True
+    return not len(crossing_triangles(places, s.triangles[both], owner[both], pair, 1)[0])
 
 
 def _nested(s: Simplices, closed: NDArray[np.bool_], x: NDArray[np.float64]) -> set[tuple[int, int]]:

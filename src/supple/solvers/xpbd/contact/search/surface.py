@@ -17,17 +17,15 @@ from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
 from supple.contact.mesh.obstacles import ObstacleRange, with_obstacles
 from supple.contact.search.patches import Parts, Patches
 from supple.model.system import System
-from supple.numerics.adjacency import only
+from supple.numerics.adjacency import Adjacency, adjacency, only
 from supple.numerics.cross_rows import cross_rows
 from supple.scene.contact_pairs import pair_table
+from supple.solvers.xpbd.contact.search.gaps import point_gaps
 from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 
 # The sine of the angle of an edge that counts as flat: its way out of the face is far below the kept distances.
 FLAT = 1e-6
-# Of the gap between surfaces: that from obstacles that are given by a formula. It is small, so that a body on a table
-# does not appear to float. Rows may leave a fifth of it.
-ON_SOLIDS = 0.1
 
 
 class Simplices(NamedTuple):
@@ -37,8 +35,10 @@ class Simplices(NamedTuple):
     ----------
     nodes : (s,) the node of each point; triangles : (f, 3), edges : (e, 2) nodes
     owner : (N,) the body or obstacle of each node, -1 for nodes that are on no surface
-    collide : (p, p) which owners may touch; friction, gaps : (p, p), gaps that are kept [m]
+    collide : (p, p) which owners may touch; friction : (p, p)
+    gaps : (N,) the distances that are kept, of a pair the smallest of its nodes [m]
     rest : (N, 3) places at rest [m]
+    around : the triangles at each node
     first : (f, 6) whether a triangle is the first of those with its corner j, and with the side across from it
     """
 
@@ -50,6 +50,7 @@ class Simplices(NamedTuple):
     friction: NDArray[np.float64]
     gaps: NDArray[np.float64]
     rest: NDArray[np.float64]
+    around: Adjacency
     first: NDArray[np.bool_]
 
 
@@ -87,20 +88,19 @@ def row_surface(
     rigid: RigidBodies,
     anchors: int,
     settings: XPBDContact | None,
-    lengths: tuple[float, float],
 ) -> RowSurface:
     """The surfaces of a system in the solver's numbering, whose arrays have rows for `anchors` after the vertices.
 
-    lengths : the mean surface edge and the gap [m]
-    Stitched points and what is nearer to them than the gap at the start do not collide.
+    Stitched points and what touches them at the start do not collide.
     """
-    n, (edge_length, gap) = len(system.masses), lengths
+    n, edge_length = len(system.masses), mean_edge_length(system)
+    thickness = settings.thickness if settings is not None else None
     extended, ranges = with_obstacles(system)
     solid = tuple(part for part in ranges if part.obstacle.contact_mesh is not None)
     collide = colliding_pairs(system, settings, joined=True)
     placed = [part.body.place(system.rest_positions[part.vertices]) for part in system.bodies]
     rest = [system.rest_positions[sum(map(len, placed)) :], extended.rest_positions[len(system.rest_positions) :]]
-    mesh = contact_mesh(extended, solid, collide, np.concatenate([*placed, *rest]), gap)
+    mesh = contact_mesh(extended, solid, collide, np.concatenate([*placed, *rest]), thickness)
     single = mesh.points.single
     # The obstacles' nodes are numbered by their range; obstacles without triangles have none.
     node_of = np.full(len(extended.masses), -1, dtype=np.int32)
@@ -131,8 +131,9 @@ def row_surface(
         owner,
         np.ascontiguousarray(mesh.collide),
         np.ascontiguousarray(pair_table(system.scene).friction),
-        _gaps(system, gap),
+        _gaps(mesh, system, rest, nodes, thickness),
         rest,
+        adjacency(nodes[mesh.triangles].ravel(), np.repeat(np.arange(len(mesh.triangles)), 3), count),
         _is_first(mesh),
     )
     closed = np.ones(len(collide), dtype=np.bool_)
@@ -176,12 +177,27 @@ def _without_flat(mesh: ContactMesh, x: NDArray[np.float64], system: System) -> 
     return patches._replace(edges=only(patches.edges, ~flat), points=only(patches.points, kept))
 
 
-def _gaps(system: System, gap: float) -> NDArray[np.float64]:
-    """(p, p) the gaps between bodies and obstacles [m]; small ones from solids of a formula, on which bodies stand."""
-    factors = np.ones(len(system.bodies) + len(system.obstacles))
-    for k, obstacle in enumerate(system.obstacles):
-        factors[len(system.bodies) + k] = ON_SOLIDS if obstacle.surface_mesh is None else 1.0
-    return gap * np.minimum(factors[:, None], factors)
+def _gaps(
+    mesh: ContactMesh,
+    system: System,
+    rest: NDArray[np.float64],
+    nodes: NDArray[np.int32],
+    thickness: float | None,
+) -> NDArray[np.float64]:
+    """(N,) the gap of each node [m]; inside of a body the smallest of its surface."""
+    if thickness is not None:
+        return np.full(len(rest), thickness)
+    of_points, gaps = point_gaps(mesh, rest[nodes]), np.full(len(rest), np.inf)
+    for k, part in enumerate(system.bodies):
+        gaps[part.vertices] = of_points[mesh.owner == k].min(initial=np.inf)
+    gaps[nodes] = of_points
+    return gaps
+
+
+def mean_edge_length(system: System) -> float:
+    """Mean edge length of all the bodies' surfaces at rest [m]."""
+    a, b, c = system.rest_points[system.triangles].transpose(1, 0, 2)
+    return float(np.mean([np.linalg.norm(a - b, axis=1), np.linalg.norm(b - c, axis=1), np.linalg.norm(c - a, axis=1)]))
 
 
 def _is_first(mesh: ContactMesh) -> NDArray[np.bool_]:
