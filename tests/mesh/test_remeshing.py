@@ -90,3 +90,10 @@ def test_a_wall_around_a_cavity_is_filled_and_the_cavity_is_not():
     mesh = tetrahedralize(surface, tets=2000)
     assert len(mesh.tets) == pytest.approx(2000, rel=0.25)
     assert mesh.volume == pytest.approx(surface.volume, rel=1e-9)
+
+
+def test_the_sides_of_a_thin_wall_do_not_pass_each_other():
+    surface = cup()
+    mesh = tetrahedralize(surface, tets=2000)
+    assert not mesh.surface.check().self_intersecting
+    assert mesh.volume == pytest.approx(surface.volume, rel=0.02)

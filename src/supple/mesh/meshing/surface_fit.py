@@ -33,9 +33,21 @@ def fitted(mesh: TetMesh, surface: SurfaceMesh) -> TetMesh:
     """The mesh with its boundary moved along its normals, so that each part of it is on average on the surface.
 
     A coarse boundary cuts off what is convex and fills what is concave: without this, a ring of 2,000 tets lacks 8 % of
-    its mass. Flat sides stay where they are.
+    its mass. Flat sides stay where they are. Sides of a wall thinner than a tet can pass each other: what did stays.
     """
     tree = TriangleTree.of(surface.vertices, surface.triangles)
+    held = np.zeros(len(mesh.vertices), dtype=np.bool_)
+    for _ in range(_ROUNDS):
+        found = TetMesh(_moved(mesh, tree, held), mesh.tets)
+        crossing = found.surface.check().intersecting_triangles
+        if not len(crossing):
+            return found
+        held[found.surface.triangles[np.unique(crossing)]] = True
+    return mesh
+
+
+def _moved(mesh: TetMesh, tree: TriangleTree, held: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(n, 3) where vertices go that are not held [m]."""
     x, triangles = mesh.vertices.copy(), mesh.surface.triangles
     heights = _least_heights(x, mesh.tets)
     for _ in range(_ROUNDS):
@@ -50,18 +62,16 @@ def fitted(mesh: TetMesh, surface: SurfaceMesh) -> TetMesh:
             np.add.at(share, triangles[:, k], areas)
         length = np.maximum(np.linalg.norm(vertex_normals, axis=1), 1e-300)
         move = (total / np.maximum(share, 1e-300) / length)[:, None] * vertex_normals
-        for _ in range(_ROUNDS):
+        move[held] = 0.0
+        for halvings in range(_ROUNDS + 1):
             bad = _least_heights(x + move, mesh.tets) < _LEAST_HEIGHT * heights
             if not bad.any():
                 break
-            move[mesh.tets[bad]] *= 0.5
-        else:
-            bad = _least_heights(x + move, mesh.tets) < _LEAST_HEIGHT * heights
-            while bad.any():
-                move[mesh.tets[bad]] = 0.0
-                bad = _least_heights(x + move, mesh.tets) < _LEAST_HEIGHT * heights
+            move[mesh.tets[bad]] *= 0.5 if halvings < _ROUNDS else 0.0
+        while (bad := _least_heights(x + move, mesh.tets) < _LEAST_HEIGHT * heights).any():
+            move[mesh.tets[bad]] = 0.0
         x += move
-    return TetMesh(x, mesh.tets)
+    return x
 
 
 def _missing(tree: TriangleTree, points: NDArray[np.float64]) -> NDArray[np.float64]:
