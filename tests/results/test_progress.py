@@ -58,6 +58,7 @@ class Terminal(io.StringIO):
 def compiled(monkeypatch):
     """Compiles a kernel for so many seconds, and returns what was written meanwhile."""
     clock = [1.0]
+    monkeypatch.setattr(progress.multiprocessing, "parent_process", lambda: None)  # some tests run in a child
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setattr(kernel_count, "WATCHERS", [])

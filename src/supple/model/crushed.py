@@ -24,14 +24,16 @@ CRUSHED, HELD = 0.05, 0.25
 
 
 def crushed_tets(system: System, state: State) -> NDArray[np.int64]:
-    """The tets that are crushed and were not where the simulation began; the flattest one first."""
+    """The tets that are crushed, of bodies that had none where the simulation began; the flattest one first."""
     J, limits = _ratios(system, state), np.full(len(system.tets), CRUSHED)
     for part in system.bodies:
         if too_soft(system, part):
             limits[part.tets] = HELD
     found = (limits > J) & ~infinite_when_flat(system.laws_at(state.time).material)
     if found.any():
-        found &= _ratios(system, system.start_states[0]) >= limits
+        begun = _ratios(system, system.start_states[0]) < limits
+        for part in system.bodies:
+            found[part.tets] &= not begun[part.tets].any()
     rows = np.flatnonzero(found)
     return rows[np.argsort(J[rows])]
 

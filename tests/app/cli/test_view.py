@@ -117,7 +117,7 @@ def test_the_shell_serves_a_page_until_ctrl_c(scene):
         start_new_session=True,
         preexec_fn=heard,
     )
-    address = shell.stdout.readline().split()[0]
+    address = next(line.split()[0] for line in shell.stdout if line.startswith("http"))
     with urllib.request.urlopen(address, timeout=60) as response:
         assert response.status == 200
     os.killpg(shell.pid, signal.SIGINT)  # both processes receive it, as from a terminal

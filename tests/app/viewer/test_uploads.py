@@ -34,7 +34,7 @@ def test_a_surface_is_meshed_and_scaled_and_no_file_is_left(ball, tmp_path, monk
     seconds = []
     arrays = mesh_of_upload(Upload("../../etc/ball.stl", ".stl", ball[".stl"], 0.25), seconds.append)
     mesh = sp.TetMesh(*arrays)
-    assert np.ptp(mesh.vertices, axis=0).max() == pytest.approx(0.25)
+    assert np.ptp(mesh.vertices, axis=0).max() == pytest.approx(0.25, rel=0.04)
     np.testing.assert_allclose(mesh.vertices.min(axis=0), -mesh.vertices.max(axis=0), atol=0.01)
     assert seconds == sorted(seconds)
     assert list(tmp_path.iterdir()) == []
@@ -97,7 +97,7 @@ HOSTILE = {
     ),
     "a vertex that is not a number": (".off", open_box(b"nan 0 0"), ""),
     "an infinite vertex": (".off", open_box(b"0 inf 0"), ""),
-    "a triangle alone": (".obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "repair"),
+    "a triangle alone": (".obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "close its holes"),
     "a corner that is not there": (".obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", ""),
     "all in one place": (".obj", b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "degenerate"),
     "another file": (".obj", b"mtllib /etc/passwd\ncall ../../secret\n", ""),

@@ -115,7 +115,9 @@ def test_a_pin_that_lifts_a_cube_gives_it_its_height(solver):
     body = sp.Body("cube", CUBE, sp.StableNeoHookean(youngs=1e6, poisson=0.3, damping=0.01))
     held = np.flatnonzero(CUBE.vertices[:, 1] > 0.0)
     work, _, frames = totals(sp.Scene([body], pins=[sp.Pin("cube", held, motion=lifted)]), solver, 45)
-    assert work["pins"] + work["damping"] == pytest.approx(9.81 * 0.2, rel=0.02)
+    # What XPBD's damping takes as the pin drags the rest along, its substeps give back: both are among the works.
+    assert sum(work.values()) == pytest.approx(9.81 * 0.2, rel=0.02)
+    assert work["pins"] == pytest.approx(9.81 * 0.2, rel=0.05)
     assert frames[-1].report.kinetic_energy < 1e-3
 
 
