@@ -117,7 +117,8 @@ def _refuse_what_is_skipped(data: bytes) -> None:
 
 def _read_dae(path: Path) -> MeshFile:
     """All geometries of the scene, in metres."""
-    import collada  # pyright: ignore[reportMissingImports]
+    import collada
+    from collada.common import DaeError
 
     tree = ElementTree.parse(path)
     for parent in tree.iter():  # errors of materials would hide what is made of them
@@ -125,7 +126,7 @@ def _read_dae(path: Path) -> MeshFile:
             if child.tag.rpartition("}")[2] in _UNREAD:
                 parent.remove(child)
     data = io.BytesIO(ElementTree.tostring(tree.getroot()))
-    document = collada.Collada(data, ignore=[collada.common.DaeError])
+    document = collada.Collada(data, ignore=[DaeError])
     asset = document.assetInfo
     unit = 1.0 if asset is None or asset.unitmeter is None else float(asset.unitmeter)
     up = str((asset and asset.upaxis) or "Y_UP")[0].lower()
