@@ -58,7 +58,7 @@ class Terminal(io.StringIO):
 def compiled(monkeypatch):
     """Compiles a kernel for so many seconds, and returns what was written meanwhile."""
     clock = [1.0]
-    monkeypatch.setattr(progress.multiprocessing, "parent_process", lambda: None)  # some tests run in a child
+    progress.error_console.cache_clear()  # one that was made before this terminal does not know it
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setattr(kernel_count, "WATCHERS", [])
