@@ -69,10 +69,6 @@ class Input(ABC):
     def __call__(self, time: float) -> NDArray[np.float64]:
         """The value at `time` [s]."""
 
-    def copy(self) -> Input:
-        """Another input of the same kind, with the same name and value."""
-        return type(self)(self.name, self.value)
-
     def checked(self, value: ArrayLike) -> NDArray[np.float64]:
         """A value that may be set, as an array of the input's shape.
 

@@ -280,23 +280,6 @@ class Scene(Showable, metaclass=Described):
                 raise SceneError(f"scene: parts {key!r} do not exist; {suggestion(key, known)}")
         return replace(self, **{key: (*getattr(self, key), *added) for key, added in parts.items()})
 
-    def with_own_inputs(self) -> Scene:
-        """The same scene with copies of its inputs, or itself where it has none."""
-        if not self.inputs:
-            return self
-        own = {name: given.copy() for name, given in self.inputs.items()}
-
-        def owned(function: Any) -> Any:
-            return own[function.name] if isinstance(function, Input) else function
-
-        return replace(
-            self,
-            pins=[replace(pin, motion=owned(pin.motion)) for pin in self.pins],
-            obstacles=[replace(one, motion=owned(one.motion)) for one in self.obstacles],
-            forces=[replace(force, force=owned(force.force)) for force in self.forces],
-            soft_targets=[replace(target, motion=owned(target.motion)) for target in self.soft_targets],
-        ).with_motors({name: motor.scripted(owned(motor.script)) for name, motor in self.motors.items()})
-
     def with_motors(self, motors: Mapping[str, Motor | None]) -> Scene:
         """The same scene with other motors of hinges and sliders, by name of the joint; None: no motor.
 
