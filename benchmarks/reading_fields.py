@@ -19,7 +19,7 @@ from numba.np.ufunc.parallel import threading_layer
 import supple as sp
 from benchmarks.published import publish
 from benchmarks.table import circumstances
-from supple.app.demos.actuators.pneunet import bellows
+from supple.app.demos.pneunet import bellows
 from supple.results.readings.fields import FIELDS
 from supple.solvers.xpbd.details import XPBDDetails
 

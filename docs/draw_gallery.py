@@ -1,15 +1,19 @@
-"""Run demos, measure their claims and draw them for docs/gallery.json and docs/images/gallery.
+"""Run demos and examples and draw them, with what they measure, for docs/gallery.json and docs/images/gallery.
 
-`python docs/draw_gallery.py` draws all, `python docs/draw_gallery.py squash bears` some. It needs the extra `video`
+`python docs/draw_gallery.py` draws all, `python docs/draw_gallery.py squash ragdoll` some: the demos, and the examples
+whose `main` takes sinks. It needs the extra `video`
 and, on Debian, libegl1.
 """
 
 from __future__ import annotations
 
+import io
 import json
+import runpy
 import sys
 import tempfile
 import time
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -20,22 +24,57 @@ from supple.app.demos.registry import DEMOS
 from supple.results.export.video import Film
 from supple.results.export.video_worker import Studio, palette_of
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.simulate import NullSink
 
 FOLDER = Path(__file__).parent
 PICTURES = FOLDER / "images" / "gallery"
 LIST = FOLDER / "gallery.json"
+EXAMPLES = {
+    path.stem[3:]: path
+    for path in sorted((FOLDER.parent / "examples").glob("[0-9]*.py"))
+    if "sinks=()" in path.read_text(encoding="utf-8")
+}
 SIZE, SHARES = (400, 300), (0.0, 0.2, 0.5, 1.0)  # of each picture, and where in the film
 
 
-def draw_demo(name: str, folder: Path) -> dict[str, object]:
-    """Run one demo and save its picture; what the gallery says of it."""
-    demo = DEMOS[name]
-    measurement, path = demo.measurement(), folder / f"{name}.vtkhdf"
-    began = time.perf_counter()
-    scene = demo.scene()
-    for _ in sp.simulate(scene, demo.solver(), demo.dt, demo.steps, sinks=[measurement, sp.Recorder(path)]):
+class Sizes(NullSink):
+    """Notes what a simulation is made of."""
+
+    def begin(self, first, dt, steps):
+        self.tets = sum(len(body.mesh.tets) for body in first.system.scene.bodies)
+        self.dt, self.frames = dt, steps
+
+    def write(self, frame):
+        self.solver = type(frame.solver).__name__.lower()
+
+
+def run_demo(name: str, sinks: list) -> dict[str, object]:
+    """Run a demo; what the gallery says of it."""
+    demo, measurement = DEMOS[name], DEMOS[name].measurement()
+    for _ in sp.simulate(demo.scene(), demo.solver(), demo.dt, demo.steps, sinks=[measurement, *sinks]):
         pass
-    seconds = time.perf_counter() - began
+    claims = [{"text": c.text, "measured": c.measured, "holds": bool(c.holds)} for c in measurement.claims()]
+    command = f"supple demo {name}"
+    return {"summary": demo.summary, "explanation": demo.explanation, "command": command, "claims": claims}
+
+
+def run_example(path: Path, sinks: list) -> dict[str, object]:
+    """Run an example whose simulation takes sinks; what the gallery says of it."""
+    module = runpy.run_path(str(path))
+    with redirect_stdout(io.StringIO()) as printed:
+        module["main"](sinks=sinks)
+    summary, explanation, *_ = (part.replace("\n", " ") for part in module["__doc__"].split("\n\n"))
+    command = f"python examples/{path.name}"
+    return {"summary": summary, "explanation": explanation, "command": command, "prints": printed.getvalue()}
+
+
+def draw(name: str, folder: Path) -> dict[str, object]:
+    """Run a demo or an example and save its picture; what the gallery says of it."""
+    path, sizes = folder / f"{name}.vtkhdf", Sizes()
+    began = time.perf_counter()
+    sinks = [sizes, sp.Recorder(path)]
+    entry = run_demo(name, sinks) if name in DEMOS else run_example(EXAMPLES[name], sinks)
+    print(f"{name}: {time.perf_counter() - began:.0f} s", flush=True)
     with sp.read_recording(path) as recording:
         model = model_of_recording(recording)
         moments = [moment_of_frame(model, recording[round(share * (len(recording) - 1))]) for share in SHARES]
@@ -45,25 +84,16 @@ def draw_demo(name: str, folder: Path) -> dict[str, object]:
     image = picture.quantize(palette=palette_of(picture, dark=False), dither=Image.Dither.FLOYDSTEINBERG)
     PICTURES.mkdir(exist_ok=True)
     image.save(PICTURES / f"{name}.png", optimize=True)
-    claims = measurement.claims()
-    print(f"{name}: {seconds:.0f} s, {sum(c.holds for c in claims)} of {len(claims)} claims hold", flush=True)
-    return {
-        "summary": demo.summary,
-        "explanation": demo.explanation,
-        "solver": demo.kinds[0],
-        "tets": sum(len(body.mesh.tets) for body in scene.bodies),
-        "frames": demo.steps,
-        "dt": demo.dt,
-        "claims": [{"text": c.text, "measured": c.measured, "holds": bool(c.holds)} for c in claims],
-    }
+    return entry | {"solver": sizes.solver, "tets": sizes.tets, "frames": sizes.frames, "dt": sizes.dt}
 
 
 def main(names: list[str]) -> None:
     known = json.loads(LIST.read_text(encoding="utf-8")) if LIST.exists() else {}
+    everything = [*DEMOS, *EXAMPLES]
     with tempfile.TemporaryDirectory() as folder:
-        for name in names or list(DEMOS):
-            known[name] = draw_demo(name, Path(folder))
-            ordered = {name: known[name] for name in DEMOS if name in known}
+        for name in names or everything:
+            known[name] = draw(name, Path(folder))
+            ordered = {name: known[name] for name in everything if name in known}
             LIST.write_text(json.dumps(ordered, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 

@@ -5,6 +5,7 @@ lines of `supple`, which run in this process; a demo whose claim fails returns 1
 `examples`.
 """
 
+import ast
 import importlib.util
 import json
 import re
@@ -94,13 +95,19 @@ def test_the_page_on_reports_lists_every_status():
     assert set(listed) == {str(status) for status in Status}
 
 
-def test_the_gallery_has_every_demo_as_it_is():
-    """`python docs/draw_gallery.py NAME` draws a demo again."""
+def test_the_gallery_has_every_demo_and_example_as_it_is():
+    """`python docs/draw_gallery.py NAME` draws one again."""
     known = json.loads((DOCS / "gallery.json").read_text(encoding="utf-8"))
-    assert list(known) == list(DEMOS)
+    drawn = [path for path in sorted((DOCS.parent / "examples").glob("[0-9]*.py")) if "sinks=()" in path.read_text()]
+    examples = {path.stem[3:]: ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) for path in drawn}
+    assert list(known) == [*DEMOS, *examples]
     for name, entry in known.items():
         assert (DOCS / "images" / "gallery" / f"{name}.png").is_file()
-        assert (entry["summary"], entry["explanation"]) == (DEMOS[name].summary, DEMOS[name].explanation), name
+        said = (entry["summary"], entry["explanation"])
+        if name in DEMOS:
+            assert said == (DEMOS[name].summary, DEMOS[name].explanation), name
+        else:
+            assert said == tuple(part.replace("\n", " ") for part in examples[name].split("\n\n")[:2]), name
 
 
 def test_the_site_has_every_public_name_once():

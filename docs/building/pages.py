@@ -70,21 +70,22 @@ def examples() -> str:
 
 
 def gallery() -> str:
-    """Every demo with its picture and its claims, as docs/draw_gallery.py measured them."""
+    """Every demo and drawn example with its picture and what docs/draw_gallery.py measured."""
     parts = [
-        "# Gallery\n\nEvery demo measures what it claims. `supple demo NAME` runs one, `supple demo --list` lists "
-        "them. Pictures and figures are from one run of `docs/draw_gallery.py`: the start, a fifth, a half and the "
-        "end of each demo.\n"
+        "# Gallery\n\nEvery demo measures its claims; `supple demo NAME` runs one, `supple demo --list` lists them. "
+        "Tests compare what [examples](examples.md) print with theory. Pictures and figures are from one run of "
+        "`docs/draw_gallery.py`: the start, a fifth, a half and the end.\n"
     ]
     for name, demo in json.loads((ROOT / "docs" / "gallery.json").read_text(encoding="utf-8")).items():
         rows = [
             f"| {claim['text']} | {claim['measured']} | {'holds' if claim['holds'] else '**does not hold**'} |"
-            for claim in demo["claims"]
+            for claim in demo.get("claims", ())
         ]
+        measured = "| claim | measured | |\n|---|---|---|\n" + "\n".join(rows)
         parts.append(
             f"## {name}\n\n![{demo['summary']}](../images/gallery/{name}.png)\n\n{demo['explanation']}\n\n"
             f"{demo['tets']:,} tets, {demo['frames']} frames of {demo['dt']:.4g} s, solver `{demo['solver']}`: "
-            f"`supple demo {name}`\n\n| claim | measured | |\n|---|---|---|\n" + "\n".join(rows) + "\n"
+            f"`{demo['command']}`\n\n" + (measured if rows else f"``` text\n{demo['prints']}```") + "\n"
         )
     return "\n".join(parts)
 

@@ -64,5 +64,5 @@ def test_the_demos_of_the_readme_and_of_make_run_at_their_full_length():
     text = (root / "README.md").read_text(encoding="utf-8") + (root / "Makefile").read_text(encoding="utf-8")
     commands = re.findall(r"^.*supple demo [a-z].*$", text, flags=re.M)
     named = {name for command in commands for name in re.findall(r"supple demo ([a-z]\w*)", command)}
-    assert {"squash", "bears", "dzhanibekov"} <= named <= set(DEMOS)
+    assert {"squash", "bears", "stitch"} <= named <= set(DEMOS)
     assert not [command for command in commands if "--steps" in command or "||" in command]

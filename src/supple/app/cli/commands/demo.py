@@ -36,7 +36,7 @@ def demo(
     Parameters
     ----------
     name
-        Name of the demo, or a surface (.stl, .obj ...), which falls on a floor; without it, the demos are listed.
+        Name of the demo; without it, the demos are listed.
     list_
         List the demos.
     output
@@ -72,7 +72,6 @@ def demo(
 
     from supple.app.cli.console import shell_console
     from supple.app.demos.registry import DEMOS, find_demo
-    from supple.app.scene_file.entries.mesh_sources import MESH_FILES
 
     console = shell_console()
     if list_ or name is None:
@@ -81,26 +80,6 @@ def demo(
             console.print(f"[bold]{known.name:<{width}}[/]  {escape(known.summary)}")
         return ExitCode.OK
 
-    if Path(name).suffix.lower() in MESH_FILES:
-        if live:
-            from supple.app.cli.commands.view import view
-
-            view(Path(name), solver=solver, full=full, port=port, open_=open_)
-            return ExitCode.OK
-        from supple.app.cli.commands.run import run
-
-        return run(
-            Path(name),
-            output=Path("out") / Path(name).stem if output is None else output,
-            steps=steps,
-            solver=solver,
-            trace=trace,
-            page=page,
-            plot=plot,
-            checkpoint_every=checkpoint_every,
-            overwrite=overwrite,
-            quiet=quiet,
-        )
     chosen = find_demo(name)
     if solver is not None:
         chosen = chosen.on(solver)
