@@ -21,6 +21,7 @@ LAYERS = (
     ("app.scene_file",),
     ("simulate",),
     ("results",),
+    ("solvers.registry",),
     ("solvers.auto",),
     ("solvers.xpbd", "solvers.implicit"),
     ("solvers.solver",),

@@ -6,38 +6,44 @@ from collections.abc import Sequence
 from dataclasses import MISSING
 from typing import Any
 
-from supple.app.scene_file.document import KINDS_OF_LISTS
-from supple.app.scene_file.entries.families import MATERIALS, SOLVERS
+from supple.app.scene_file.document import scene_file_model as scene_file_model  # registers how values are written
 from supple.app.scene_file.entries.kinds import keys_of
 from supple.kinds.kind import Kind, declared, first_paragraph
+from supple.mesh.primitives.shape import SHAPES
 from supple.scene.joints.motors import MOTORS
+from supple.scene.materials import MATERIALS
+from supple.scene.registry import PARTS
+from supple.scene.rigid.rigid_body import RigidBody
+from supple.solvers.registry import SOLVERS
 
 HEAD = """\
 # Keys of scene files
 
 What a [scene file](scene_files.md) can contain, by the lists that the entries are in. Where there is more than one
-kind, an entry has its name as `kind`. Keys are called as the parameters in Python. Shapes and the keys of bodies are
-in the schema that `supple schema` prints.
+kind, an entry has its name as `kind`. Keys are called as the parameters in Python.
 """
 
 
 def kinds_page() -> str:
     """The text of the page."""
-    lists: dict[str, Sequence[type[Kind]]] = {
+    lists: dict[str, Sequence[Any]] = {
         "material": MATERIALS,
         "solver": SOLVERS,
-        **KINDS_OF_LISTS,
+        "shape": list(SHAPES.values()),
+        **{key: part.kinds for key, part in PARTS.items()},
         "motor": MOTORS,
     }
     parts = [HEAD]
     for name, kinds in lists.items():
         parts.append(f"## {name}\n")
-        if name != "loads" and set(kinds) <= set(KINDS_OF_LISTS["loads"]):
+        if name != "loads" and set(kinds) <= set(PARTS["loads"].kinds):
             parts.append(f"As `{kinds[0].kind}` among the [loads](#loads), without `kind`.\n")
             continue
         for kind in kinds:
             title = f"`kind: {kind.kind}` (`{kind.__name__}`)" if len(kinds) > 1 else f"`{kind.__name__}`"
             rows = [row for field in declared(kind).items() for row in _rows(*field)]
+            if name == "bodies":
+                title = f"`{kind.__name__}`" + ": its own keys are below `rigid`" * (kind is RigidBody)
             table = "\n".join(["| key | default | meaning |", "|---|---|---|", *rows])
             parts.append(f"### {title}\n\n{first_paragraph(kind)}\n\n{table}\n")
     return "\n".join(parts)

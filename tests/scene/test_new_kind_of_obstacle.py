@@ -23,7 +23,7 @@ from supple.results.view.layers.surfaces import ObstacleView
 from supple.results.view.surfaces import obstacle_surfaces
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.polyhedra import round_ball
-from supple.scene.registry import KINDS, register
+from supple.scene.registry import PARTS, register
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.01)
 
@@ -61,7 +61,7 @@ class RoundedCube(Obstacle):
 def registered():
     register(RoundedCube)
     yield
-    del KINDS["RoundedCube"]
+    PARTS["obstacles"].kinds.remove(RoundedCube)
 
 
 def falling_cube(**obstacle):
@@ -101,7 +101,7 @@ def test_a_recording_restores_it(recorded):
         np.testing.assert_allclose(recording[20].obstacle_poses[0, :, 3], [0, 0.1 / 3, 0], atol=1e-12)
         (drawn,) = obstacle_surfaces(model_of_recording(recording))
         assert drawn.vertices[:, 0].max() == pytest.approx(0.5, abs=2e-3)
-    del KINDS["RoundedCube"]
+    PARTS["obstacles"].kinds.remove(RoundedCube)
     with pytest.raises(sp.OutputError, match="'RoundedCube 1' is of an unknown kind, 'RoundedCube'; register"):
         sp.read_recording(path)
     register(RoundedCube)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import supple as sp
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.obstacles.shape import PARAMETERS
-from supple.scene.registry import KINDS
+from supple.scene.registry import PARTS
 
 SOLIDS = {
     "HalfSpace": sp.HalfSpace(point=(0.1, 0.2, 0.3), normal=(1, 2, 0.5)),
@@ -40,7 +40,7 @@ def sampled(points, triangles, spacing):
 
 
 def test_every_registered_kind_is_tested():
-    assert set(SOLIDS) <= set(KINDS)
+    assert set(SOLIDS) <= {kind.__name__ for kind in PARTS["obstacles"].kinds}
     assert {"HalfSpace", "Box", "Sphere", "Capsule", "Cylinder", "Torus", "TriangleObstacle"} == set(SOLIDS)
 
 

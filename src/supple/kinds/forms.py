@@ -259,6 +259,19 @@ NUMBERS, VECTORS = ListOf(), ListOf(("vectors",))
 
 
 @dataclass(frozen=True)
+class Instance(Form):
+    """An object of one of several classes, for each of which scene files have keys of their own; give : the remedy."""
+
+    classes: tuple[type, ...]
+    give: str
+
+    def checked(self, value: Any, what: str) -> Any:
+        if not isinstance(value, self.classes):
+            raise SceneError(f"{what} is a {type(value).__name__}; give {self.give}")
+        return value
+
+
+@dataclass(frozen=True)
 class OneOf(Form):
     """An object of one of several classes; a scene file names them by their `kind`, or one alone without.
 

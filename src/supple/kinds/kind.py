@@ -5,17 +5,18 @@
         stiffness: Annotated[float, POSITIVE]
 
 The form beside the type checks the field and says how a scene file writes it. The text under "Parameters" in the
-docstring describes it in the schema of scene files, in `supple info` and in the tables of the documentation.
+docstring describes it in the schema of scene files, in `supple info` and in the tables of the documentation. A function
+whose parameters have forms is a kind as well, such as a shape that it makes.
 """
 
 from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
-from typing import Annotated, Any, ClassVar, get_args, get_origin
+from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -27,16 +28,22 @@ _HEADING = re.compile(r"^(Parameters|Attributes|Raises|Returns|Yields)\n-+\n", f
 _ITEM = re.compile(r"(?:^|; )((?:[a-zA-Z_]\w*(?:, )?)+) : (.*?)(?=(?:; [a-z_]\w*(?:, \w+)* : )|^\S|\Z)", re.S | re.M)
 
 
-def first_paragraph(kind: type) -> str:
-    """The beginning of the class's docstring, on one line."""
-    return " ".join(inspect.cleandoc(kind.__dict__.get("__doc__") or "").partition("\n\n")[0].split())
+def first_paragraph(kind: type | Callable[..., Any]) -> str:
+    """The beginning of the docstring, on one line."""
+    return " ".join(_docstring(kind).partition("\n\n")[0].split())
 
 
-def descriptions(kind: type) -> dict[str, str]:
+def _docstring(kind: type | Callable[..., Any]) -> str:
+    """Its own, not that of a base class."""
+    text = kind.__dict__.get("__doc__") if isinstance(kind, type) else kind.__doc__
+    return inspect.cleandoc(text or "")
+
+
+def descriptions(kind: type | Callable[..., Any]) -> dict[str, str]:
     """By name of the parameter, its text on one line; a class's own docstring comes before those of its bases."""
     found: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        _, *parts = _HEADING.split(inspect.cleandoc(base.__dict__.get("__doc__") or ""))
+    for base in reversed(kind.__mro__) if isinstance(kind, type) else (kind,):
+        _, *parts = _HEADING.split(_docstring(base))
         for heading, body in zip(parts[::2], parts[1::2], strict=True):
             if heading == "Parameters":
                 for match in _ITEM.finditer(body):
@@ -61,19 +68,31 @@ class Declared:
 
 
 @cache
-def declared(kind: type) -> Mapping[str, Declared]:
-    """The declared fields of a class by name, in their order."""
-    hints, texts, found = written_types(kind), descriptions(kind), {}
-    for field in fields(kind):
-        hint = hints[field.name]
+def declared(kind: type | Callable[..., Any]) -> Mapping[str, Declared]:
+    """The declared fields of a class, or parameters of a function, by name, in their order."""
+    texts, found = descriptions(kind), {}
+    for name, hint, default in _fields(kind) if isinstance(kind, type) else _parameters(kind):
         forms = [one for one in get_args(hint) if isinstance(one, Form)] if get_origin(hint) is Annotated else []
-        if forms and field.init:
-            default = field.default if field.default_factory is MISSING else field.default_factory()
-            required = field.name in getattr(kind, "required", ())
+        if forms:
+            required = name in getattr(kind, "required", ())
             optional = not required and (default is None or type(None) in get_args(get_args(hint)[0]))
             default = MISSING if required else default
-            found[field.name] = Declared(forms[0], default, texts.get(field.name, ""), optional)
+            found[name] = Declared(forms[0], default, texts.get(name, ""), optional)
     return found
+
+
+def _fields(kind: type) -> Iterator[tuple[str, Any, Any]]:
+    hints = written_types(kind)
+    for field in fields(kind):
+        if field.init:
+            default = field.default if field.default_factory is MISSING else field.default_factory()
+            yield field.name, hints[field.name], default
+
+
+def _parameters(function: Callable[..., Any]) -> Iterator[tuple[str, Any, Any]]:
+    hints = get_type_hints(function, include_extras=True)
+    for name, parameter in inspect.signature(function).parameters.items():
+        yield name, hints[name], MISSING if parameter.default is parameter.empty else parameter.default
 
 
 class Kind(metaclass=Described):

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
+from supple.kinds.forms import POSITIVE, Counts, Extents
 from supple.mesh.primitives import gummy_bear as bear
 from supple.mesh.primitives.filling import of_order, tets_between_layers
 from supple.mesh.primitives.gummy_bear import gummy_bear_surface
 from supple.mesh.primitives.isosurface_stuffing import stuff
-from supple.mesh.primitives.sizes import check_torus, counts, fits, lengths, not_too_many, positive
+from supple.mesh.primitives.shape import shape
+from supple.mesh.primitives.sizes import counts, edge_of_torus, edge_or_share, fits, lengths, not_too_many, positive
 from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
@@ -32,7 +35,12 @@ __all__ = [
 ]
 
 
-def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4), order: int = 1) -> TetMesh:
+@shape
+def box(
+    size: Annotated[Sequence[float], Extents()] = (1.0, 1.0, 1.0),
+    divisions: Annotated[Sequence[int], Counts(3)] = (4, 4, 4),
+    order: int = 1,
+) -> TetMesh:
     """A box cut into a grid of cells, each of six tets around its diagonal (Kuhn 1960).
 
     Vertices are in the order of `numpy.mgrid`: z runs fastest, then y, then x.
@@ -59,40 +67,57 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 
     return of_order(TetMesh(points * extent, tets), order)
 
 
-def box_surface(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> SurfaceMesh:
-    """The surface of `box`, with the same parameters."""
+@shape
+def box_surface(
+    size: Annotated[Sequence[float], Extents()] = (1.0, 1.0, 1.0),
+    divisions: Annotated[Sequence[int], Counts(3)] = (4, 4, 4),
+) -> SurfaceMesh:
+    """The surface of `box`.
+
+    Parameters
+    ----------
+    size : (3,) full edge lengths [m]; divisions : (3,) number of cells along x, y and z
+    """
     return box(size, divisions).surface.compact()
 
 
-def sphere(radius: float = 0.5, edge_length: float = 0.1, order: int = 1) -> TetMesh:
+@shape
+def sphere(
+    radius: Annotated[float, POSITIVE] = 0.5, edge_length: Annotated[float | None, POSITIVE] = None, order: int = 1
+) -> TetMesh:
     """A ball of well-shaped tets, with its surface vertices exactly on the sphere.
 
     Parameters
     ----------
     radius : [m]
-    edge_length : mean edge [m], at most `radius`
+    edge_length : mean edge [m], at most `radius`; None: a fifth of it
     order : 1, or 2 for quadratic tets (see `TetMesh`); their surface nodes are on the sphere
 
     Raises
     ------
     MeshError : where a length is not positive, or the edge is too long or too short for the radius.
     """
-    positive("sphere", radius=radius, edge_length=edge_length)
+    edge_length = edge_or_share("sphere", edge_length, 0.2, radius=radius)
     fits("sphere", edge_length, "radius", radius)
     reach = np.full(3, float(radius))
     mesh = stuff("sphere", lambda x: np.linalg.norm(x, axis=1) - radius, (-reach, reach), edge_length)
     return of_order(mesh, order, lambda x: x * (radius / np.linalg.norm(x, axis=1))[:, None])
 
 
+@shape
 def spherical_shell(
-    inner_radius: float = 0.3, outer_radius: float = 0.5, edge_length: float = 0.1, order: int = 1
+    inner_radius: Annotated[float, POSITIVE] = 0.3,
+    outer_radius: Annotated[float, POSITIVE] = 0.5,
+    edge_length: Annotated[float | None, POSITIVE] = None,
+    order: int = 1,
 ) -> TetMesh:
     """A hollow ball: layers of prisms over the triangles of a sphere, each of three tets.
 
     Parameters
     ----------
     inner_radius, outer_radius : [m]
-    edge_length : approximate length of edges on the outer surface and across the wall [m], at most `inner_radius`
+    edge_length : approximate length of edges on the outer surface and across the wall [m], at most `inner_radius`;
+        None: half of the wall
     order : 1 for linear tets, 2 for quadratic ones with curved sides on both surfaces
 
     Raises
@@ -100,9 +125,10 @@ def spherical_shell(
     MeshError : where a length is not positive, the inner radius is not the smaller one, or the edge is too long.
     """
     owner = "spherical_shell"
-    positive(owner, inner_radius=inner_radius, outer_radius=outer_radius, edge_length=edge_length)
+    positive(owner, inner_radius=inner_radius, outer_radius=outer_radius)
     if inner_radius >= outer_radius:
         raise MeshError(f"{owner}: inner_radius = {inner_radius:g} m is not below outer_radius = {outer_radius:g} m")
+    edge_length = edge_or_share(owner, edge_length, 0.5, wall=outer_radius - inner_radius)
     fits(owner, edge_length, "inner_radius", inner_radius)
     surface = sphere_surface(1.0, edge_length / outer_radius)
     layers = max(1, round((outer_radius - inner_radius) / edge_length))
@@ -119,21 +145,27 @@ def spherical_shell(
     return of_order(mesh, order, onto)
 
 
-def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.1, order: int = 1) -> TetMesh:
+@shape
+def torus(
+    radius: Annotated[float, POSITIVE] = 0.5,
+    tube_radius: Annotated[float, POSITIVE] = 0.2,
+    edge_length: Annotated[float | None, POSITIVE] = None,
+    order: int = 1,
+) -> TetMesh:
     """A ring around the y axis, of well-shaped tets.
 
     Parameters
     ----------
     radius : of the circle in the middle of the tube [m]
     tube_radius : of the tube [m], less than `radius`
-    edge_length : mean edge [m], at most `tube_radius`
+    edge_length : mean edge [m], at most `tube_radius`; None: 0.4 of that
     order : 1, or 2 for quadratic tets (see `TetMesh`); their surface nodes are on the torus
 
     Raises
     ------
     MeshError : where a length is not positive, the tube closes the ring, or the edge is too long or too short.
     """
-    check_torus("torus", radius, tube_radius, edge_length)
+    edge_length = edge_of_torus("torus", radius, tube_radius, edge_length)
     reach = np.array([radius + tube_radius, tube_radius, radius + tube_radius])
 
     def inside(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -147,20 +179,26 @@ def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.
     return of_order(stuff("torus", inside, (-reach, reach), edge_length), order, onto)
 
 
-def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1, order: int = 1) -> TetMesh:
+@shape
+def cylinder(
+    radius: Annotated[float, POSITIVE] = 0.5,
+    height: Annotated[float, POSITIVE] = 1.0,
+    edge_length: Annotated[float | None, POSITIVE] = None,
+    order: int = 1,
+) -> TetMesh:
     """A cylinder along the y axis: rings of triangles, in layers of prisms, each of three tets.
 
     Parameters
     ----------
     radius, height : [m]
-    edge_length : approximate length of edges [m], at most `radius` and `height`
+    edge_length : approximate length of edges [m], at most `radius` and `height`; None: a fifth of the smaller
     order : 1, or 2 for quadratic tets (see `TetMesh`); the nodes of the side are on the cylinder
 
     Raises
     ------
     MeshError : where a length is not positive, or the edge is too long or too short.
     """
-    positive("cylinder", radius=radius, height=height, edge_length=edge_length)
+    edge_length = edge_or_share("cylinder", edge_length, 0.2, radius=radius, height=height)
     fits("cylinder", edge_length, "radius", radius)
     fits("cylinder", edge_length, "height", height)
     rings, layers = max(2, round(radius / edge_length)), max(1, round(height / edge_length))
@@ -181,13 +219,33 @@ def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1,
     return of_order(TetMesh(points.reshape(-1, 3), tets_between_layers(triangles, n, layers)), order, onto)
 
 
-def gummy_bear(height: float = 1.0, edge_length: float = 0.08, order: int = 1) -> TetMesh:
-    """The gummy bear, see `supple.mesh.primitives.gummy_bear`; quadratic tets with `order=2` have straight sides."""
-    return of_order(bear.gummy_bear(height, edge_length), order)
+@shape
+def gummy_bear(
+    height: Annotated[float, POSITIVE] = 1.0, edge_length: Annotated[float | None, POSITIVE] = None, order: int = 1
+) -> TetMesh:
+    """The gummy bear; quadratic tets with `order=2` have straight sides.
+
+    Parameters
+    ----------
+    height : [m]
+    edge_length : mean edge [m], at most a seventh of the height; None: 0.08 of the height
+    order : 1, or 2 for quadratic tets (see `TetMesh`)
+    """
+    return of_order(bear.gummy_bear(height, edge_or_share("gummy_bear", edge_length, 0.08, height=height)), order)
 
 
-def cylinder_surface(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> SurfaceMesh:
-    """The surface of `cylinder`, with the same parameters."""
+@shape
+def cylinder_surface(
+    radius: Annotated[float, POSITIVE] = 0.5,
+    height: Annotated[float, POSITIVE] = 1.0,
+    edge_length: Annotated[float | None, POSITIVE] = None,
+) -> SurfaceMesh:
+    """The surface of `cylinder`.
+
+    Parameters
+    ----------
+    radius, height : [m]; edge_length : approximate length of edges [m]; None: a fifth of the smaller
+    """
     return cylinder(radius, height, edge_length).surface.compact()
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.checks import check_name, finite_vector, float_array, non_negative
-from supple.kinds.described import Described
+from supple.kinds.checks import float_array
+from supple.kinds.forms import NON_NEGATIVE, Choice, Instance, Name, OneOf, Vector
+from supple.kinds.kind import Kind
 from supple.materials.material import Material
 from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.quadratic import node_volumes
@@ -19,30 +20,45 @@ from supple.mesh.skin import Embedding
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.scene.materials import MATERIALS
 from supple.scene.rotation import rotation_matrix
 
+LOOKS = ("rubber", "gummy", "foam", "steel")
+_FOAM = 250.0  # what is lighter looks like foam [kg/m^3]
 
-class PlacedBody(metaclass=Described):
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlacedBody(Kind):
     """What every body of a scene has: vertices that move, and points on them that touch, are drawn and measured.
+
+    Parameters
+    ----------
+    name : unique in its scene; frames and recordings are indexed by it.
+    position : (3,) of the mesh's or shape's origin [m].
+    rotation : (3,) rotation vector that turns it about that origin before it is placed [rad].
+    velocity : (3,) initial velocity of the center of mass [m/s].
+    angular_velocity : (3,) initial spin about the center of mass [rad/s].
+    friction : Coulomb coefficient against other bodies, and of a soft one against itself; a pair uses the geometric
+        mean of its two.
+    look : how it is drawn, "rubber", "gummy", "foam" or "steel"; None: "foam" where its material is light, otherwise
+        "rubber".
 
     Attributes
     ----------
-    name, position, rotation, velocity, angular_velocity, friction : see `Body`
     mesh : the tets whose vertices move; material : of these tets
     skin : the surface that is drawn instead of the mesh's own; None where that is drawn
-    look : how it is drawn; None: see `drawn_look`
     """
 
-    name: str
-    position: ArrayLike
-    rotation: ArrayLike
-    velocity: ArrayLike
-    angular_velocity: ArrayLike
-    friction: float
-    mesh: TetMesh
-    material: Material
-    skin: SurfaceMesh | None
-    look: str | None
+    name: Annotated[str, Name()] = field(kw_only=False)
+    position: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    rotation: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    velocity: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    angular_velocity: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
+    friction: Annotated[float, NON_NEGATIVE] = 0.0
+    look: Annotated[str | None, Choice(LOOKS)] = None
+    mesh: TetMesh = field(init=False, repr=False)
+    material: Material = field(init=False, repr=False)
+    skin: SurfaceMesh | None = field(init=False, repr=False)
 
     @property
     def drawn_look(self) -> str:
@@ -124,92 +140,55 @@ class PlacedBody(metaclass=Described):
         """`vertex_values` of values that are as they should be."""
         return values
 
-    def _check_placement(self, owner: str, edges: NDArray[np.int32]) -> None:
-        """Make vectors of the placement and the velocities; edges (e, 2) : rows of `points`.
-
-        Raises
-        ------
-        SceneError : where a value is wrong, or the body is so far away that double precision cannot tell the ends of an
-            edge from each other.
-        """
-        for key in ("position", "rotation", "velocity", "angular_velocity"):
-            object.__setattr__(self, key, finite_vector(getattr(self, key), f"{owner}: {key}"))
-        object.__setattr__(self, "friction", non_negative(self.friction, f"{owner}: friction"))
+    def _check_placement(self, edges: NDArray[np.int32]) -> None:
+        """Raise `SceneError` where it is so far away that double precision cannot tell the ends of an edge from each
+        other; edges (e, 2) : rows of `points`."""
         ends = self.points[edges]
         shortest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
         reach = float(np.abs(np.asarray(self.position)).max())
         if np.spacing(reach) > 1e-6 * shortest:
             raise SceneError(
-                f"{owner}: position is {reach:g} m from the origin, too far for edges of {shortest:.3g} m in double "
-                "precision; move the scene nearer to the origin"
+                f"{self.label}: position is {reach:g} m from the origin, too far for edges of {shortest:.3g} m in "
+                "double precision; move the scene nearer to the origin"
             )
 
 
-LOOKS = ("rubber", "gummy", "foam", "steel")
-_FOAM = 250.0  # what is lighter looks like foam [kg/m^3]
-
-
-def check_look(look: str | None, owner: str) -> None:
-    """Raise `SceneError` unless it is one of `LOOKS`, or None."""
-    if look is not None and look not in LOOKS:
-        raise SceneError(f"{owner}: look is {look!r}; give one of {', '.join(LOOKS)}")
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Body(PlacedBody):
-    """One soft body of a scene.
+    """One soft body of a scene; `PlacedBody` has its other parameters.
 
     Parameters
     ----------
-    name : unique in its scene; frames and recordings are indexed by it.
     mesh : rest shape, in the body's own coordinates [m].
     material : one material, or `Regions`.
-    position : (3,) of the mesh's origin [m].
-    rotation : (3,) rotation vector that turns the mesh about its origin before it is placed [rad].
-    velocity : (3,) initial velocity of the center of mass [m/s].
-    angular_velocity : (3,) initial spin about the center of mass [rad/s].
-    friction : Coulomb coefficient against other bodies and itself; a pair uses the geometric mean of its two.
     skin : a finer surface, in the mesh's coordinates, that follows the body in pages and exports.
     collide : what touches other things: the surface of the "tets", or the "skin", closed and outward, which then may
         reach out of the tets. Pins, forces and loads act on the tets in both cases.
-    look : how it is drawn, "rubber", "gummy", "foam" or "steel"; None for that of its material.
 
     Raises
     ------
     SceneError : where a value is of the wrong kind, not finite or out of range; the text names the body.
     """
 
-    name: str
-    mesh: TetMesh
-    material: Material
-    position: ArrayLike = (0.0, 0.0, 0.0)
-    rotation: ArrayLike = (0.0, 0.0, 0.0)
-    velocity: ArrayLike = (0.0, 0.0, 0.0)
-    angular_velocity: ArrayLike = (0.0, 0.0, 0.0)
-    friction: float = 0.0
-    skin: SurfaceMesh | None = field(default=None)
-    collide: Literal["tets", "skin"] = "tets"
-    look: str | None = None
+    kind: ClassVar[str] = "body"
+
+    mesh: Annotated[TetMesh, Instance((TetMesh,), "a TetMesh (see tetrahedralize)")] = field(kw_only=False)
+    material: Annotated[Material, OneOf(MATERIALS, "a material such as StableNeoHookean(...)", Material)] = field(
+        kw_only=False
+    )
+    skin: Annotated[SurfaceMesh | None, Instance((SurfaceMesh,), "a SurfaceMesh")] = None
+    collide: Annotated[Literal["tets", "skin"], Choice(("tets", "skin"))] = "tets"
 
     def __post_init__(self) -> None:
-        check_name(self.name, "body")
-        owner = f"body {self.name!r}"
-        if not isinstance(self.mesh, TetMesh):
-            raise SceneError(f"{owner}: mesh is a {type(self.mesh).__name__}; give a TetMesh (see tetrahedralize)")
-        if not isinstance(self.material, Material):
-            raise SceneError(f"{owner}: material is {self.material!r}; give a material such as StableNeoHookean(...)")
-        if self.skin is not None and not isinstance(self.skin, SurfaceMesh):
-            raise SceneError(f"{owner}: skin is a {type(self.skin).__name__}; give a SurfaceMesh")
-        if self.collide not in ("tets", "skin"):
-            raise SceneError(f"{owner}: collide is {self.collide!r}; give 'tets' or 'skin'")
+        super().__post_init__()
+        owner = self.label
         if self.collide == "skin" and self.skin is None:
             raise SceneError(f"{owner}: collide is 'skin', and it has no skin; give skin=SurfaceMesh(...)")
         if self.collide == "skin" and self.skin is not None:
             require_closed(self.skin, f"{owner}: skin")
             if self.skin.volume <= 0.0:
                 raise SceneError(f"{owner}: skin: its surface is inside out; give surface.flipped()")
-        check_look(self.look, owner)
-        self._check_placement(owner, self.mesh.edges)
+        self._check_placement(self.mesh.edges)
         self._require_one_value_per_tet(owner)
 
     @property

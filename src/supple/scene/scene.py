@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +32,7 @@ from supple.scene.loads.load import Load
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
+from supple.scene.registry import PARTS
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rigid.stiffness import with_stiffness
 from supple.scene.selection import InBox
@@ -40,22 +41,6 @@ from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
 
 Named = TypeVar("Named", Obstacle, Joint, Weld)
-
-_PARTS = (
-    ("bodies", PlacedBody),
-    ("obstacles", Obstacle),
-    ("pins", Pin),
-    ("forces", Force),
-    ("soft_targets", SoftTarget),
-    ("stitches", Stitch),
-    ("contact_pairs", ContactPair),
-    ("loads", Load | Force | SoftTarget),
-    ("sensors", Sensor),
-    ("joints", Joint),
-    ("welds", Weld),
-    ("cavities", Cavity),
-    ("cables", Cable),
-)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,14 +85,14 @@ class Scene(Showable, metaclass=Described):
     cables: Sequence[Cable] = ()
 
     def __post_init__(self) -> None:
-        for key, kind in _PARTS:
+        for key, part in PARTS.items():
             try:
                 items = tuple(getattr(self, key))
             except TypeError:
                 raise SceneError(f"scene: {key} is {getattr(self, key)!r}; give a list") from None
             for i, item in enumerate(items):
-                if not isinstance(item, kind):
-                    raise SceneError(f"scene: {key}[{i}] is a {type(item).__name__}; give a {_name(kind)}")
+                if not isinstance(item, part.bases):
+                    raise SceneError(f"scene: {key}[{i}] is a {type(item).__name__}; give a {_name(part.bases)}")
             object.__setattr__(self, key, items)
         # Where a part was given, for errors; unless it is among `loads`, its number is that in its own list.
         given = {id(load): ("loads", i) for i, load in enumerate(self.loads)}
@@ -161,7 +146,7 @@ class Scene(Showable, metaclass=Described):
         facts = {"bodies": short_list(body.name for body in self.bodies)}
         facts["tets"] = str(sum(len(body.mesh.tets) for body in self.bodies))
         facts["obstacles"] = short_list(obstacle.name for obstacle in self.obstacles)
-        facts |= {key: str(len(getattr(self, key))) for key, _ in _PARTS[2:]}
+        facts |= {key: str(len(getattr(self, key))) for key in PARTS if key not in facts}
         return {name: value for name, value in facts.items() if value not in ("", "0")}
 
     def _check_skins(self) -> None:
@@ -274,10 +259,9 @@ class Scene(Showable, metaclass=Described):
         ------
         SceneError : where the scene has no such parts, or they contradict each other.
         """
-        known = [key for key, _ in _PARTS]
         for key in parts:
-            if key not in known:
-                raise SceneError(f"scene: parts {key!r} do not exist; {suggestion(key, known)}")
+            if key not in PARTS:
+                raise SceneError(f"scene: parts {key!r} do not exist; {suggestion(key, list(PARTS))}")
         return replace(self, **{key: (*getattr(self, key), *added) for key, added in parts.items()})
 
     def with_motors(self, motors: Mapping[str, Motor | None]) -> Scene:
@@ -338,10 +322,8 @@ def _check_own_name(kind: str, item: Cavity | Cable | Sensor, others: Sequence[C
         raise SceneError(f"{item.label}: another {kind} has this name; give each a different name")
 
 
-def _name(kind: Any) -> str:
-    if kind is PlacedBody:
-        return "Body or RigidBody"
-    return " or ".join(one.__name__ for one in get_args(kind) or (kind,))
+def _name(bases: Sequence[type]) -> str:
+    return "Body or RigidBody" if bases == (PlacedBody,) else " or ".join(one.__name__ for one in bases)
 
 
 def _all_named(things: Sequence[Named], bodies: Sequence[str]) -> tuple[Named, ...]:

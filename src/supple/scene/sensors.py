@@ -213,6 +213,3 @@ class DistanceSensor(Sensor):
     def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
         for key in ("first", "second"):
             point_corners(getattr(self, key), bodies, f"{self.label}: {key}")
-
-
-SENSORS: tuple[type[Sensor], ...] = (ForceSensor, Taxels, AngleSensor, DistanceSensor)

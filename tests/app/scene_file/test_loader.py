@@ -11,13 +11,14 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import supple as sp
-from supple.app.scene_file.document import KINDS_OF_LISTS, SceneFileModel, json_schema
-from supple.app.scene_file.entries.families import solver_of_kind
+from supple.app.scene_file.document import json_schema, scene_file_model
 from supple.app.scene_file.loader import load_scene
 from supple.app.scene_file.yaml_files import read_yaml
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
+from supple.scene.registry import PARTS
 from supple.solvers.auto import Auto
+from supple.solvers.registry import solver_of_kind
 
 ROOT = Path(__file__).parents[3]
 RUBBER = "{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}"
@@ -254,7 +255,7 @@ def test_the_schema_rejects_what_the_loader_rejects(case):
     }
     validator = Draft202012Validator(json_schema())
     assert validator.is_valid(data)
-    SceneFileModel.model_validate(data)
+    scene_file_model().model_validate(data)
     body = data["bodies"][0]
     if case == "unknown":
         body["colour"] = "red"
@@ -268,7 +269,7 @@ def test_the_schema_rejects_what_the_loader_rejects(case):
         body["material"]["poisson"] = 0.7
     assert not validator.is_valid(data)
     with pytest.raises(ValueError):
-        SceneFileModel.model_validate(data)
+        scene_file_model().model_validate(data)
 
 
 def test_the_scene_of_the_manual_is_valid(load, tmp_path):
@@ -306,9 +307,9 @@ def test_the_manual_lists_every_kind(kinds):
 
 def _family(name):
     for family in ("obstacles", "stitches", "loads", "sensors", "joints"):
-        if name.removesuffix("Model") in {kind.__name__ for kind in KINDS_OF_LISTS[family]}:
+        if name.removesuffix("Model") in {kind.__name__ for kind in PARTS[family].kinds}:
             return {"stitches": "stitch"}.get(family, family[:-1])
-    if name.endswith("ShapeModel") or name == "GummyBearSurfaceModel":
+    if name.endswith("ShapeModel"):
         return "shape"
     if name in ("XPBDModel", "ImplicitModel", "AutoModel"):
         return "solver"
@@ -371,9 +372,13 @@ def test_the_table_of_the_documentation_has_every_key_of_every_kind():
     spec.loader.exec_module(page)
     text = page.kinds_page()
     definitions = json_schema()["$defs"]
-    for kind in {kind for kinds in KINDS_OF_LISTS.values() for kind in kinds}:
+    for kind in {kind for part in PARTS.values() for kind in part.kinds} - {sp.Body, sp.RigidBody}:
         (section,) = re.findall(rf"^### [^\n]*`{kind.__name__}`\)?\n(.*?)(?=^##|\Z)", text, flags=re.S | re.M)
         model = definitions.get(f"{kind.__name__}Model") or definitions[f"{kind.__name__}EntryModel"]
         keys = set(model["properties"]) - {"kind"}
         assert {row.split("`")[1] for row in section.splitlines() if row.startswith("| `")} == keys
         assert not re.search(r"\| *\|$", section, flags=re.M), "a key has no description"
+    bodies = text.partition("## bodies\n")[2].partition("\n## ")[0]
+    keys = {*definitions["BodyModel"]["properties"], *definitions["RigidModel"]["properties"]}
+    of_files = {"regions", "order", "copies", "initial", "rigid"}
+    assert {row.split("`")[1] for row in bodies.splitlines() if row.startswith("| `")} == keys - of_files

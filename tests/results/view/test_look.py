@@ -38,7 +38,7 @@ def test_looks_reach_recordings_and_glb(tmp_path):
 
 def test_an_unknown_look_is_refused():
     assert set(NAMES) == set(LOOKS)
-    with pytest.raises(sp.SceneError, match="body 'a': look is 'chrome'; give one of rubber, gummy, foam, steel"):
+    with pytest.raises(sp.SceneError, match="body 'a': look is 'chrome'; give 'rubber', 'gummy', 'foam' or 'steel'"):
         sp.Body("a", sp.shapes.box(divisions=(1, 1, 1)), sp.StableNeoHookean(youngs=1.0, poisson=0.3), look="chrome")
 
 

@@ -189,8 +189,8 @@ PIN = sp.Pin("palm")
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: body(density=None), "rigid body 'palm': give its density .* or its mass"),
-        (lambda: body(mass=1.0), "rigid body 'palm': give its density .* or its mass .*, one of the two"),
+        (lambda: body(density=None), "rigid body 'palm': none of them given; give exactly one of density and mass"),
+        (lambda: body(mass=1.0), "rigid body 'palm': density and mass given; give exactly one of density and mass"),
         (lambda: body(density=0.0), "rigid body 'palm': density is 0; it must be above zero"),
         (lambda: body(density=None, mass=0.0), "rigid body 'palm': mass is 0; it must be above zero"),
         (

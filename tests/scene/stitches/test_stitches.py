@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.model.system import build_system, initial_state
-from supple.scene.registry import STITCHES
+from supple.scene.registry import PARTS
 from supple.scene.rotation import rotation_matrix
 from supple.scene.stitches.stitch import Stitch
 
@@ -275,5 +275,5 @@ def test_every_kind_is_registered_and_public():
         return {sub for direct in base.__subclasses__() for sub in ({direct} | kinds(direct))}
 
     concrete = {kind for kind in kinds(Stitch) if not getattr(kind, "__abstractmethods__", None)}
-    assert concrete == set(STITCHES)
+    assert concrete == set(PARTS["stitches"].kinds)
     assert all(getattr(sp, kind.__name__) is kind for kind in concrete)

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from functools import lru_cache
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
 
 from supple.app.scene_file.entries import spelling as spelling  # registers how values are written
-from supple.app.scene_file.entries.bodies import BodyModel
-from supple.app.scene_file.entries.families import SOLVERS, model_of_kind
-from supple.app.scene_file.entries.kinds import KindModel, entry_of
+from supple.app.scene_file.entries.body import BodyEntry, body_model
+from supple.app.scene_file.entries.kinds import KindModel, entry_of, model_of
+from supple.app.scene_file.entries.mesh_sources import surface_model
 from supple.app.scene_file.model import Model, Name, Number, Vector, number_or_fraction
-from supple.kinds.kind import Kind
-from supple.model.loads.build import LOADS
+from supple.mesh.primitives.shape import SHAPES, SURFACES
 from supple.results.readings.fields import FIELDS
-from supple.scene.contact_pairs import ContactPair
-from supple.scene.forces import Force, SoftTarget
-from supple.scene.joints.weld import Weld
-from supple.scene.loads.cable import Cable
-from supple.scene.loads.cavity import Cavity
-from supple.scene.pins import Pin
-from supple.scene.registry import JOINTS, STITCHES
-from supple.scene.registry import KINDS as OBSTACLES
-from supple.scene.sensors import SENSORS
+from supple.scene.joints.motors import MOTORS
+from supple.scene.materials import MATERIALS
+from supple.scene.registry import PARTS
 from supple.simulate import DT_RANGE
+from supple.solvers.auto import Auto
+from supple.solvers.registry import SOLVERS
 
 MAX_STEPS = 10_000_000
 
@@ -68,28 +63,11 @@ class OutputModel(Model):
     plot: bool = Field(default=True, description="plot.png: energies, momentum, volume ratio and smallest J over time")
 
 
-# The lists of a scene file and the kinds of their entries; the scene has a parameter of each name.
-KINDS_OF_LISTS: dict[str, Sequence[type[Kind]]] = {
-    "obstacles": tuple(OBSTACLES.values()),
-    "pins": (Pin,),
-    "forces": (Force,),
-    "loads": (*LOADS, Force, SoftTarget),
-    "cavities": (Cavity,),
-    "cables": (Cable,),
-    "sensors": SENSORS,
-    "soft_targets": (SoftTarget,),
-    "contact_pairs": (ContactPair,),
-    "stitches": STITCHES,
-    "joints": JOINTS,
-    "welds": (Weld,),
-}
-
-
-class _SceneFileModel(Model):
+class SceneFileModel(Model):
     """Bodies, obstacles and pins under gravity, the solver, and the timing of a run. SI units; y is up."""
 
     supple: Literal[1] = Field(default=1, description="version of this format")
-    bodies: list[BodyModel] = Field(min_length=1, max_length=10_000)
+    bodies: list[BodyEntry]
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
     joint_positions: dict[Name, Number] = Field(
         default={},
@@ -106,24 +84,30 @@ class _SceneFileModel(Model):
         return getattr(self, key)
 
 
-if TYPE_CHECKING:
-    SceneFileModel = _SceneFileModel
-else:
-    _LISTS = {
-        key: (list[entry_of(kinds)], Field(default=[], max_length=10_000)) for key, kinds in KINDS_OF_LISTS.items()
+def scene_file_model() -> type[SceneFileModel]:
+    """`SceneFileModel` with the keys of all kinds that are known now."""
+    lists = (*(part.kinds for part in PARTS.values()), MATERIALS, SOLVERS, MOTORS)
+    return _of_kinds(tuple(map(tuple, (*lists, SHAPES.values(), SURFACES.values()))))
+
+
+@lru_cache(maxsize=1)
+def _of_kinds(known: tuple[tuple[Any, ...], ...]) -> type[SceneFileModel]:
+    for cached in (model_of, surface_model, body_model):
+        cached.cache_clear()  # kinds contain others: a material that relaxes has one of the known materials
+    keys: dict[str, Any] = {
+        key: (list[entry_of(part.kinds)], Field(default=[], max_length=10_000))
+        for key, part in PARTS.items()
+        if key != "bodies"
     }
-    _SOLVER = entry_of(SOLVERS), Field(default_factory=lambda: model_of_kind("auto"))
-    SceneFileModel = create_model(
-        "SceneFileModel",
-        __base__=_SceneFileModel,
-        __doc__=_SceneFileModel.__doc__,
-        __module__=__name__,
-        solver=_SOLVER,
-        **_LISTS,
+    keys["bodies"] = list[body_model()], Field(min_length=1, max_length=10_000)
+    keys["solver"] = (
+        entry_of(SOLVERS),
+        Field(default_factory=lambda: model_of(Auto, True).model_validate({"kind": "auto"})),
     )
+    return create_model("SceneFileModel", __base__=SceneFileModel, __doc__=SceneFileModel.__doc__, **keys)
 
 
 def json_schema() -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of scene files, for editors and other programs."""
-    schema = SceneFileModel.model_json_schema()
+    schema = scene_file_model().model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "Supple scene"}

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from supple.app.scene_file.document import KINDS_OF_LISTS, OutputModel, SceneFileModel
-from supple.app.scene_file.entries.bodies import BodyModel
+from supple.app.scene_file.document import OutputModel, SceneFileModel, scene_file_model
 from supple.app.scene_file.entries.kinds import built
 from supple.app.scene_file.entries.mesh_sources import MESH_FILES, ConfinedMeshStore, MeshStore
 from supple.app.scene_file.new_scenes import read_surface_scene
@@ -24,73 +23,16 @@ from supple.app.scene_file.validation_errors import scene_error
 from supple.app.scene_file.yaml_files import Key, YamlDocument, read_yaml
 from supple.errors import SceneError
 from supple.mesh.meshing.spelling import spelled_for
-from supple.mesh.sets import MeshSets
 from supple.model.system import build_system, initial_state
 from supple.scene.body import PlacedBody
 from supple.scene.inputs import MotorInput
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.joint import Joint
 from supple.scene.located import LocatedError, at
+from supple.scene.registry import PARTS
 from supple.scene.scene import Scene
 from supple.solvers.auto import Auto, solver_for
 from supple.solvers.solver import Solver
-
-_SELECTIONS = ("pins", "forces", "soft_targets", "loads", "welds")
-
-
-def with_numbers(model: SceneFileModel, meshes: MeshStore) -> SceneFileModel:
-    """The scene file with vertices and tets instead of their sets; itself where it names no set.
-
-    Raises
-    ------
-    LocatedError : where a body has no mesh file, or its file has no such set.
-    """
-    changes: dict[str, Any] = {}
-    for key in _SELECTIONS:
-        entries = getattr(model, key)
-        if any(_set(entry) is not None for entry in entries):
-            changes[key] = [_selected(entry, model, meshes, (key, i)) for i, entry in enumerate(entries)]
-    if any(region.set is not None for body in model.bodies for region in body.regions or ()):
-        changes["bodies"] = [_body(body, meshes, i) for i, body in enumerate(model.bodies)]
-    return model.model_copy(update=changes) if changes else model
-
-
-def _set(entry: Any) -> str | None:
-    return getattr(entry, "set", None)  # some loads have no vertices
-
-
-def _selected(entry: Any, model: SceneFileModel, meshes: MeshStore, place: tuple[str, int]) -> Any:
-    if _set(entry) is None:
-        return entry
-    with at(*place, "set"):
-        body = next((body for body in model.bodies if _is_of(entry.body, body)), None)
-        if body is None:
-            raise SceneError(f"body {entry.body!r} does not exist")
-        return entry.model_copy(update={"set": None, "vertices": _sets(body, meshes).vertices_of(entry.set).tolist()})
-
-
-def _is_of(name: str, body: BodyModel) -> bool:
-    """Whether a body of that name is made by an entry: it, or one of its copies."""
-    return name == body.name if body.copies is None else re.fullmatch(re.escape(body.name) + r"\d+", name) is not None
-
-
-def _body(body: BodyModel, meshes: MeshStore, number: int) -> BodyModel:
-    regions = []
-    for k, region in enumerate(body.regions or ()):
-        if region.set is None:
-            regions.append(region)
-            continue
-        with at("bodies", number, "regions", k, "set"):
-            tets = _sets(body, meshes).tets_of(region.set).tolist()
-            regions.append(region.model_copy(update={"set": None, "tets": tets}))
-    return body.model_copy(update={"regions": regions or None})
-
-
-def _sets(body: BodyModel, meshes: MeshStore) -> MeshSets:
-    if body.mesh is None or not meshes.holds_tets(body.mesh):
-        raise SceneError(f"body {body.name!r} has no file of tets with named sets (.inp or .msh)")
-    return meshes.tets(body.mesh).sets
-
 
 logger = logging.getLogger(__name__)
 
@@ -211,13 +153,12 @@ def validated(document: YamlDocument) -> SceneFileModel:
     SceneError : where a value is missing, unknown or not allowed; one line that begins with `file:line:`.
     """
     try:
-        return SceneFileModel.model_validate(document.data)
+        return scene_file_model().model_validate(document.data)
     except ValidationError as error:
         raise scene_error(document, error) from None
 
 
 def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
-    model = with_numbers(model, meshes)
     bodies: dict[str, PlacedBody] = {}
     starts: dict[str, NDArray[np.float64]] = {}
     for i, described in enumerate(model.bodies):
@@ -226,12 +167,14 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
                 if made.body.name in bodies:
                     raise SceneError(f"another body has the name {made.body.name!r}; give each a different name")
                 bodies[made.body.name] = made.body
+                meshes.sources[made.body.name] = described.mesh
                 if made.initial_positions is not None:
                     starts[made.body.name] = made.initial_positions
     parts: dict[str, list[Any]] = {}
-    for key in KINDS_OF_LISTS:
-        with at(key):
-            parts[key] = built(model.entries(key), meshes)
+    for key in PARTS:
+        if key != "bodies":
+            with at(key):
+                parts[key] = built(getattr(model, key), meshes)
     parts["joints"] = with_shared_inputs(parts["joints"])
     with at("solver"):
         solver = built(model.solver, meshes)

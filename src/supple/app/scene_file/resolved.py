@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from supple.app.scene_file.entries.families import model_of_kind
+from supple.app.scene_file.entries.kinds import model_of
 from supple.app.scene_file.loader import Run
 from supple.app.scene_file.yaml_files import yaml_text
 from supple.mesh.io.tetgen_family import SUFFIXES
+from supple.solvers.registry import solver_of_kind
 
 SCENE_NAME, INPUTS = "scene.yaml", "inputs"
 
@@ -24,7 +25,7 @@ def resolved_scene(run: Run, *, solver: str | None, dt: float, steps: int) -> di
     """
     changes: dict[str, Any] = {"dt": dt, "steps": steps}
     if solver is not None:
-        changes["solver"] = model_of_kind(solver)
+        changes["solver"] = model_of(type(solver_of_kind(solver)), True).model_validate({"kind": solver})
     assert run.description is not None
     data = run.description.model_copy(update=changes).model_dump(mode="json")
     copies: dict[str, Path] = {}

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
+from supple.kinds.forms import POSITIVE, Whole
 from supple.mesh.primitives.isosurface_stuffing import stuff
+from supple.mesh.primitives.shape import shape
 from supple.mesh.primitives.sizes import fits, not_too_many, positive
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
@@ -50,7 +54,10 @@ def gummy_bear(height: float = 1.0, edge_length: float = 0.08) -> TetMesh:
     return TetMesh(mesh.vertices * height, mesh.tets)
 
 
-def gummy_bear_surface(height: float = 1.0, resolution: int = 64) -> SurfaceMesh:
+@shape
+def gummy_bear_surface(
+    height: Annotated[float, POSITIVE] = 1.0, resolution: Annotated[int, Whole(16, 1_000_000)] = 64
+) -> SurfaceMesh:
     """The bear's surface, watertight: that of its tets.
 
     Parameters

@@ -29,6 +29,14 @@ def positive(owner: str, **sizes: Any) -> None:
             raise MeshError(f"{owner}: {name} is {value!r}; give a positive length in metres, of 1e90 at most")
 
 
+def edge_or_share(owner: str, edge_length: float | None, share: float, **sizes: Any) -> float:
+    """The length of edges, or without one a share of the smallest of the sizes; all are checked."""
+    positive(owner, **sizes)
+    edge = share * min(sizes.values()) if edge_length is None else edge_length
+    positive(owner, edge_length=edge)
+    return float(edge)
+
+
 def lengths(owner: str, name: str, value: Sequence[float]) -> NDArray[np.float64]:
     """Three positive lengths."""
     try:
@@ -64,11 +72,13 @@ def fits(owner: str, edge_length: float, name: str, length: float) -> None:
         )
 
 
-def check_torus(owner: str, radius: float, tube_radius: float, edge_length: float) -> None:
-    """Raise for tori without a hole, and for edges longer than the tube's radius."""
-    positive(owner, radius=radius, tube_radius=tube_radius, edge_length=edge_length)
+def edge_of_torus(owner: str, radius: float, tube_radius: float, edge_length: float | None) -> float:
+    """The length of edges; raises for tori without a hole, and for edges longer than the tube's radius."""
+    positive(owner, radius=radius)
+    edge = edge_or_share(owner, edge_length, 0.4, tube_radius=tube_radius)
     if tube_radius >= radius:
         raise MeshError(
             f"{owner}: tube_radius = {tube_radius:g} m closes the ring of radius {radius:g} m; make it smaller"
         )
-    fits(owner, edge_length, "tube_radius", tube_radius)
+    fits(owner, edge, "tube_radius", tube_radius)
+    return edge

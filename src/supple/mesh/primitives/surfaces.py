@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
 
+from supple.kinds.forms import POSITIVE
 from supple.mesh.merge import merge_map
-from supple.mesh.primitives.sizes import check_torus, fits, not_too_many, positive
+from supple.mesh.primitives.shape import shape
+from supple.mesh.primitives.sizes import edge_of_torus, edge_or_share, fits, not_too_many
 from supple.mesh.surface import SurfaceMesh
 
 
-def sphere_surface(radius: float = 0.5, edge_length: float = 0.1) -> SurfaceMesh:
+@shape
+def sphere_surface(
+    radius: Annotated[float, POSITIVE] = 0.5, edge_length: Annotated[float | None, POSITIVE] = None
+) -> SurfaceMesh:
     """A sphere of nearly equal triangles: an icosahedron with its faces cut into smaller ones.
 
     Parameters
     ----------
     radius : [m]
-    edge_length : approximate length of edges [m], at most `radius`
+    edge_length : approximate length of edges [m], at most `radius`; None: a fifth of the radius
 
     Raises
     ------
     MeshError : where a length is not positive, or the edge is too long or too short for the radius.
     """
-    positive("sphere_surface", radius=radius, edge_length=edge_length)
+    edge_length = edge_or_share("sphere_surface", edge_length, 0.2, radius=radius)
     fits("sphere_surface", edge_length, "radius", radius)
     # An edge of the icosahedron spans the angle arctan 2.
     n = max(1, math.ceil(radius * math.atan(2.0) / edge_length))
@@ -55,20 +61,25 @@ def sphere_surface(radius: float = 0.5, edge_length: float = 0.1) -> SurfaceMesh
     return SurfaceMesh(every[keep], index[np.concatenate(triangles)])
 
 
-def torus_surface(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.1) -> SurfaceMesh:
+@shape
+def torus_surface(
+    radius: Annotated[float, POSITIVE] = 0.5,
+    tube_radius: Annotated[float, POSITIVE] = 0.2,
+    edge_length: Annotated[float | None, POSITIVE] = None,
+) -> SurfaceMesh:
     """A ring around the y axis as a grid of triangles.
 
     Parameters
     ----------
     radius : of the circle in the middle of the tube [m]
     tube_radius : of the tube [m], less than `radius`
-    edge_length : of edges along the middle of the tube and around it [m], at most `tube_radius`
+    edge_length : of edges along the middle of the tube and around it [m], at most `tube_radius`; None: 0.4 of that
 
     Raises
     ------
     MeshError : as `torus`.
     """
-    check_torus("torus_surface", radius, tube_radius, edge_length)
+    edge_length = edge_of_torus("torus_surface", radius, tube_radius, edge_length)
     n = math.ceil(2.0 * math.pi * radius / edge_length)
     m = math.ceil(2.0 * math.pi * tube_radius / edge_length)
     not_too_many("torus_surface", 2.0 * n * m, "make edge_length longer")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from functools import singledispatch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,20 +26,22 @@ from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction, Wind
 
 
+@singledispatch
 def applied(load: Load, setting: Setting) -> list[AppliedLoad]:
-    """A load of a scene on the vertices of all bodies, as one or several.
+    """A load of a scene on the vertices of all bodies, as one or several; a new kind registers its own.
 
     Raises
     ------
     SceneError : where the load is of an unknown kind.
     """
-    for kind, build in LOADS.items():
-        if isinstance(load, kind):
-            return build(load, setting)
     raise SceneError(f"{load.label}: a {type(load).__name__} is not a load that solvers know")
 
 
-def _traction(load: Traction, setting: Setting) -> list[AppliedLoad]:
+applied.register(Wind, wind_drag)
+
+
+@applied.register
+def _(load: Traction, setting: Setting) -> list[AppliedLoad]:
     body = setting.body(load.body)
     shares, parts = np.zeros(len(body.points)), _weighted_triangles(body, load.triangles(body))
     for triangles, weight in parts:
@@ -53,7 +54,8 @@ def _traction(load: Traction, setting: Setting) -> list[AppliedLoad]:
     return [UniformLoad.of(vertices, own, script_of(load, "traction"), "tractions")]
 
 
-def _pressure(load: Pressure, setting: Setting) -> list[AppliedLoad]:
+@applied.register
+def _(load: Pressure, setting: Setting) -> list[AppliedLoad]:
     body, at, begin = setting.body(load.body), script_of(load, "pressure"), setting.begins[load.body]
     return [
         FollowerPressure((triangles + begin).astype(np.int32), lambda time, weight=weight: weight * float(at(time)))
@@ -61,7 +63,8 @@ def _pressure(load: Pressure, setting: Setting) -> list[AppliedLoad]:
     ]
 
 
-def _body_force(load: BodyForce, setting: Setting) -> list[AppliedLoad]:
+@applied.register
+def _(load: BodyForce, setting: Setting) -> list[AppliedLoad]:
     chosen = setting.bodies if load.body is None else [setting.body(load.body)]
     parts = [np.arange(len(body.mesh.vertices)) + setting.begins[body.name] for body in chosen]
     vertices = np.concatenate(parts).astype(np.int32)
@@ -114,7 +117,8 @@ def _vertices_of(
     return (vertices + begin).astype(np.int32), weights
 
 
-def _growth(load: Growth, setting: Setting) -> list[AppliedLoad]:
+@applied.register
+def _(load: Growth, setting: Setting) -> list[AppliedLoad]:
     body = setting.body(load.body)
     rows, directions = load.growing(body)
     vertices, stretch = np.unique(body.mesh.nodes[rows]) + setting.begins[load.body], script_of(load, "stretch")
@@ -122,7 +126,8 @@ def _growth(load: Growth, setting: Setting) -> list[AppliedLoad]:
     return [GrownTets(tets, vertices, lambda time: float(stretch(time)))]
 
 
-def _muscle(load: Muscle, setting: Setting) -> list[AppliedLoad]:
+@applied.register
+def _(load: Muscle, setting: Setting) -> list[AppliedLoad]:
     body, activation = setting.body(load.body), script_of(load, "activation")
     rows, directions = load.fibres(body)
     inner = np.einsum("mki,mi->mk", body.mesh.rest_shape_inverse[rows], directions)
@@ -141,7 +146,8 @@ def _muscle(load: Muscle, setting: Setting) -> list[AppliedLoad]:
     return [tension]
 
 
-def _spring(load: Spring, setting: Setting) -> list[AppliedLoad]:
+@applied.register
+def _(load: Spring, setting: Setting) -> list[AppliedLoad]:
     vertices, coefficients, offset = [], [], np.zeros(3)
     for key, sign in (("first", 1.0), ("second", -1.0)):
         name, corners, weights, fixed = load.corners(key, setting.bodies)
@@ -158,15 +164,3 @@ def _spring(load: Spring, setting: Setting) -> list[AppliedLoad]:
         return [replace(made, rest_length=lambda time: length)]
     rest_length = script_of(load, "rest_length")
     return [replace(made, rest_length=lambda time: float(rest_length(time)))]
-
-
-# All kinds of loads. A new kind is one file of its class, one of its mathematics, and one line here.
-LOADS: dict[type[Load], Callable[[Any, Setting], list[AppliedLoad]]] = {
-    Traction: _traction,
-    Pressure: _pressure,
-    BodyForce: _body_force,
-    Spring: _spring,
-    Muscle: _muscle,
-    Growth: _growth,
-    Wind: wind_drag,
-}

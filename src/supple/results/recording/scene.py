@@ -36,7 +36,7 @@ from supple.results.recording.physics import RecordedLaw, RecordedPhysics, Recor
 from supple.scene.body import LOOKS
 from supple.scene.joints.joint import Conditions, Function
 from supple.scene.obstacles.obstacle import Obstacle
-from supple.scene.registry import KINDS, restored_obstacle
+from supple.scene.registry import PARTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,11 @@ class RecordedObstacle:
         values = {"name": self.name, **self.parameters}
         if len(self.triangles):
             values["surface"] = SurfaceMesh(self.vertices, self.triangles)
-        return restored_obstacle(self.kind, values)
+        return _obstacles()[self.kind](**values)
+
+
+def _obstacles() -> dict[str, type[Obstacle]]:
+    return {kind.__name__: kind for kind in PARTS["obstacles"].kinds}
 
 
 class QuadraticRows(NamedTuple):
@@ -286,7 +290,7 @@ def _check_consistency(scene: RecordedScene) -> None:
         if body.skin is not None and body.skin.corners.shape[1] not in (4, 10):
             raise ValueError(f"the skin of {body.name!r} is not carried by 4 corners or 10 nodes")
     for obstacle in scene.obstacles:
-        if obstacle.kind not in KINDS:
+        if obstacle.kind not in _obstacles():
             raise ValueError(f"obstacle {obstacle.name!r} is of an unknown kind, {obstacle.kind!r}; register the kind")
         _ = obstacle.obstacle
     curved = np.zeros(m, dtype=bool)

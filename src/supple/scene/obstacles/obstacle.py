@@ -14,22 +14,11 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, Form, Name
+from supple.kinds.forms import NON_NEGATIVE, Instance, Name
 from supple.kinds.kind import Declared, Kind, declared
 from supple.mesh.surface import SurfaceMesh
 from supple.scene.motion import Motion, MotionForm, rigid_pose
 from supple.scene.obstacles.shape import Shape
-
-
-@dataclass(frozen=True)
-class Surface(Form):
-    """Triangles."""
-
-    def checked(self, value: Any, what: str) -> SurfaceMesh:
-        if not isinstance(value, SurfaceMesh):
-            raise SceneError(f"{what} is {value!r}; give a SurfaceMesh")
-        return value
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,7 +55,7 @@ class Obstacle(Kind, ABC):
 
     def values(self) -> dict[str, Any]:
         """The parameters as plain numbers and lists, without surfaces; a recording keeps them."""
-        own = {key: getattr(self, key) for key, one in self.parameters().items() if not isinstance(one.form, Surface)}
+        own = {key: getattr(self, key) for key, one in self.parameters().items() if not isinstance(one.form, Instance)}
         return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in own.items()}
 
     def pose(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

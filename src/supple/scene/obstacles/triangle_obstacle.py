@@ -9,9 +9,10 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.kinds.forms import Instance
 from supple.mesh.surface import SurfaceMesh
 from supple.numerics.geometry.triangle_tree import TriangleTree, closest_places
-from supple.scene.obstacles.obstacle import Obstacle, Surface, lengths_and_directions
+from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,7 @@ class TriangleObstacle(Obstacle):
     surface : the triangles, where they are at time 0 [m].
     """
 
-    surface: Annotated[SurfaceMesh | None, Surface()] = None
+    surface: Annotated[SurfaceMesh | None, Instance((SurfaceMesh,), "a SurfaceMesh")] = None
 
     kind: ClassVar[str] = "triangles"
     required: ClassVar[tuple[str, ...]] = ("surface",)

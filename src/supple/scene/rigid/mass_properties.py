@@ -13,12 +13,14 @@ Source: Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor" 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
+from supple.kinds.forms import Form
 from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
@@ -32,6 +34,18 @@ _SMALLEST, _LARGEST = 1e-90, 1e90
 
 # Round-off in numbers that a user has computed, such as a rotated inertia tensor.
 _ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class Inertia(Form):
+    """An inertia tensor (3, 3), or its diagonal (3,)."""
+
+    def checked(self, value: Any, what: str) -> NDArray[np.float64]:
+        given = float_array(value, what)
+        given = np.diag(given) if given.shape == (3,) else given
+        if given.shape != (3, 3) or not np.isfinite(given).all():
+            raise SceneError(f"{what} must be finite, (3, 3) or its diagonal (3,) [kg m^2]")
+        return given
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +112,7 @@ def with_inertia(properties: MassProperties, mass: float, inertia: ArrayLike, ow
     ------
     SceneError : where no body has this inertia tensor.
     """
-    given = float_array(inertia, f"{owner}: inertia")
-    if given.shape == (3,):
-        given = np.diag(given)
-    if given.shape != (3, 3) or not np.isfinite(given).all():
-        raise SceneError(f"{owner}: inertia must be finite, (3, 3) or its diagonal (3,) [kg m^2]")
+    given = Inertia().checked(inertia, f"{owner}: inertia")
     size = float(np.abs(given).max())
     _within_range(size, f"{owner}: inertia", "kg m^2")
     if np.abs(given - given.T).max() > _ROUND_OFF * size:

@@ -15,20 +15,20 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.checks import check_name, finite_vector, positive
+from supple.kinds.forms import POSITIVE, Instance, Vector
 from supple.materials.elastic import StVenantKirchhoff
 from supple.materials.material import Material
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
-from supple.scene.body import PlacedBody, check_look
-from supple.scene.rigid.mass_properties import MassProperties, of_solid, with_inertia, with_mass
+from supple.scene.body import PlacedBody
+from supple.scene.rigid.mass_properties import Inertia, MassProperties, of_solid, with_inertia, with_mass
 from supple.scene.rigid.pose import deformation_of
 
 _CORNERS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0]])
@@ -73,25 +73,19 @@ _MISFIT = 1e-6
 _STRAIN = 1e-2
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RigidBody(PlacedBody):
-    """One rigid body of a scene.
+    """One rigid body of a scene; `PlacedBody` has its other parameters.
 
     Parameters
     ----------
-    name : unique in its scene; frames and recordings are indexed by it.
     shape : a closed surface that faces outwards, or a tet mesh, whose surface is then used; in the body's own
         coordinates [m].
-    density, mass : one of the two [kg/m^3], [kg]; above zero.
+    density : [kg/m^3].
+    mass : instead of `density` [kg].
     inertia : about the center of mass, in the body's own coordinates, (3, 3) or its diagonal (3,) [kg m^2]; needs
         `mass`. None: that of a homogeneous solid, exact for the given triangles or tets.
     center : (3,) of mass, in the body's own coordinates [m]; needs `inertia`. None: that of a homogeneous solid.
-    position : (3,) of the shape's origin [m].
-    rotation : (3,) rotation vector that turns the shape about its origin before it is placed [rad].
-    velocity : (3,) initial velocity of the center of mass [m/s].
-    angular_velocity : (3,) initial spin about the center of mass [rad/s].
-    friction : Coulomb coefficient against other bodies; a pair uses the geometric mean of its two.
-    look : how it is drawn: "rubber" (where it is not given), "gummy", "foam" or "steel".
     stiffness : kappa [Pa] of the energy that keeps the body rigid in `Implicit`; in `XPBD` it is exactly rigid. None:
         from the heaviest load of the scene, see `supple.scene.rigid.stiffness` and docs/theory/rigid_bodies.md.
 
@@ -108,19 +102,17 @@ class RigidBody(PlacedBody):
         has the inertia; the text names the body.
     """
 
-    name: str
-    shape: SurfaceMesh | TetMesh
-    density: float | None = None
-    mass: float | None = None
-    inertia: ArrayLike | None = None
-    position: ArrayLike = (0.0, 0.0, 0.0)
-    rotation: ArrayLike = (0.0, 0.0, 0.0)
-    velocity: ArrayLike = (0.0, 0.0, 0.0)
-    angular_velocity: ArrayLike = (0.0, 0.0, 0.0)
-    friction: float = 0.0
-    stiffness: float | None = None
-    center: ArrayLike | None = None
-    look: str | None = None
+    kind: ClassVar[str] = "rigid_body"
+    exactly_one: ClassVar[tuple[str, ...]] = ("density", "mass")
+
+    shape: Annotated[SurfaceMesh | TetMesh, Instance((SurfaceMesh, TetMesh), "a SurfaceMesh or a TetMesh")] = field(
+        kw_only=False
+    )
+    density: Annotated[float | None, POSITIVE] = None
+    mass: Annotated[float | None, POSITIVE] = None
+    inertia: Annotated[ArrayLike | None, Inertia()] = None
+    center: Annotated[ArrayLike | None, Vector()] = None
+    stiffness: Annotated[float | None, POSITIVE] = None
     kappa: float = field(init=False, repr=False)
     surface: SurfaceMesh = field(init=False, repr=False)
     properties: MassProperties = field(init=False, repr=False)
@@ -130,10 +122,8 @@ class RigidBody(PlacedBody):
     weights: NDArray[np.float64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        check_name(self.name, "rigid body")
+        super().__post_init__()
         owner = self.label
-        if not isinstance(self.shape, (SurfaceMesh, TetMesh)):
-            raise SceneError(f"{owner}: shape is a {type(self.shape).__name__}; give a SurfaceMesh or a TetMesh")
         properties = self._properties(owner)
         if isinstance(self.shape, TetMesh) and self.shape.order == 2:
             raise SceneError(f"{owner}: shape has quadratic tets; give its surface or mesh.to_order(1)")
@@ -143,17 +133,8 @@ class RigidBody(PlacedBody):
         derived = {"surface": surface, "skin": surface, "properties": properties}
         for key, value in (derived | {"mesh": control.mesh, "weights": control.weights}).items():
             object.__setattr__(self, key, value)
-        check_look(self.look, owner)
-        self._check_placement(owner, surface.edges)
-        if self.stiffness is not None:
-            self._set_stiffness(positive(self.stiffness, f"{owner}: stiffness"))
-        else:
-            self._set_stiffness(1.0)  # a scene sets it, from its heaviest load
-
-    @property
-    def label(self) -> str:
-        """The name of this body in messages."""
-        return f"rigid body {self.name!r}"
+        self._check_placement(surface.edges)
+        self._set_stiffness(self.stiffness or 1.0)  # without one, a scene sets it, from its heaviest load
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -206,25 +187,22 @@ class RigidBody(PlacedBody):
         return found
 
     def _properties(self, owner: str) -> MassProperties:
-        if (self.density is None) == (self.mass is None):
-            raise SceneError(f"{owner}: give its density [kg/m^3] or its mass [kg], one of the two")
         solid = of_solid(self.shape, owner)
         if self.mass is None:
             if self.inertia is not None:
                 raise SceneError(f"{owner}: inertia needs a mass [kg] instead of the density; give mass=...")
             if self.center is not None:
                 raise SceneError(f"{owner}: center needs a mass and an inertia; give both")
-            return with_mass(solid, solid.volume * positive(self.density, f"{owner}: density"), owner)
-        mass = positive(self.mass, f"{owner}: mass")
+            return with_mass(solid, solid.volume * (self.density or 0.0), owner)
         if self.inertia is None and self.center is not None:
             raise SceneError(f"{owner}: center needs an inertia [kg m^2] about it; give inertia=...")
-        homogeneous = with_mass(solid, mass, owner)
+        homogeneous = with_mass(solid, self.mass, owner)
         if self.inertia is None:
             return homogeneous
-        properties = with_inertia(homogeneous, mass, self.inertia, owner)
+        properties = with_inertia(homogeneous, self.mass, self.inertia, owner)
         if self.center is None:
             return properties
-        return replace(properties, center=finite_vector(self.center, f"{owner}: center"))
+        return replace(properties, center=self.center)
 
     def _set_stiffness(self, kappa: float) -> None:
         object.__setattr__(self, "kappa", kappa)

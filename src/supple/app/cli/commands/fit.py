@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from supple.materials.by_law import ByLaw
 
 _UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "psi": 6894.757293168361, "kg/cm2": 98066.5}
 
@@ -49,15 +52,15 @@ def fit(
     output
         Picture of the tests and the fit (.png, .pdf or .svg).
     """
-    from supple.app.scene_file.entries.families import BY_LAW_KINDS, scene_file_line
     from supple.materials.fit import fit_material
+    from supple.materials.rubber import MooneyRivlin, Ogden, Yeoh
     from supple.runtime.replacing import refuse_to_replace
 
     if output is not None:
         for path in (*(uniaxial or ()), *(equibiaxial or ()), *(pure_shear or ())):
             refuse_to_replace(path, output)
     found = fit_material(
-        BY_LAW_KINDS[kind],
+        {one.kind: one for one in (MooneyRivlin, Yeoh, Ogden)}[kind],
         uniaxial,
         equibiaxial=equibiaxial,
         pure_shear=pure_shear,
@@ -68,6 +71,19 @@ def fit(
         length=length,
     )
     print(found)
-    print(f"material: {scene_file_line(found.material)}")
+    print(f"material: {_scene_file_line(found.material)}")
     if output is not None:
         print(found.plot(output))
+
+
+def _scene_file_line(material: ByLaw) -> str:
+    """A rubber as a scene file has it, with the parameters of its class; density and damping are left out."""
+    from dataclasses import fields
+
+    from supple.kinds.kind import declared
+    from supple.materials.material import Material
+
+    skipped = {field.name for field in fields(Material)}
+    values = {key: getattr(material, key) for key in declared(type(material)) if key not in skipped}
+    texts = [f"{key}: {list(value) if isinstance(value, tuple) else float(value)}" for key, value in values.items()]
+    return f"{{kind: {material.kind}, {', '.join(texts)}}}"

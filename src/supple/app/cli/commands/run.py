@@ -81,9 +81,9 @@ def run(
     from supple.app.cli.session import Products, run_session
     from supple.app.cli.trace import traces
     from supple.app.runs.run_folder import SceneSource
-    from supple.app.scene_file.entries.families import solver_of_kind
     from supple.app.scene_file.loader import load_run
     from supple.app.scene_file.resolved import resolved_scene
+    from supple.solvers.registry import solver_of_kind
 
     products = Products(output, quiet=quiet, checkpoints=checkpoint_every, overwrite=overwrite)
     products.refuse_a_run()

@@ -67,9 +67,9 @@ def view(
         return
 
     from supple.app.cli.console import reading
-    from supple.app.scene_file.entries.families import solver_of_kind
     from supple.app.scene_file.loader import load_run
     from supple.app.viewer.protocol.live_source import LiveSource
+    from supple.solvers.registry import solver_of_kind
 
     with reading(yes):
         run = load_run(found, confine=confine)

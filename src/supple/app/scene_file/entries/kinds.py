@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import MISSING
 from functools import cache, singledispatch
-from typing import Annotated, Any, ClassVar, Literal, Self, Union
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, Union
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, create_model, model_validator
 
-from supple.app.scene_file.entries.mesh_sources import MeshStore
 from supple.app.scene_file.model import Model
 from supple.kinds.forms import Form
 from supple.kinds.kind import Kind, declared, first_paragraph
 from supple.scene.located import at
+
+
+class Meshes(Protocol):
+    """What the keys of kinds need of the meshes of a scene file."""
+
+    def vertices_of(self, body: str, name: str) -> NDArray[np.integer]:
+        """Numbers (k,) of the vertices of a body that are in a set of its mesh file."""
+        ...
 
 
 class KindModel(Model):
@@ -22,21 +30,19 @@ class KindModel(Model):
 
     Attributes
     ----------
-    made : the kind; choices : keys of which at most one may be given, for each selection
+    made : the kind, a class or a function; choices : keys of which at most one may be given, for each selection
     """
 
-    made: ClassVar[type[Kind]]
+    made: ClassVar[Callable[..., Any]]
     choices: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
-    def build(self, meshes: MeshStore) -> Any:
+    def build(self, meshes: Any) -> Any:
         """The object; errors get the key that is wrong."""
-        values = {}
-        for name, one in declared(self.made).items():
-            keys = list(keys_of(one.form, name))
-            key = next((key for key in keys if getattr(self, key) is not None), keys[0])
-            with at(key):
-                values[name] = built(getattr(self, key), meshes)
-        return self.made(**values)
+        return self.made(**self.built_values(meshes))
+
+    def built_values(self, meshes: Any) -> dict[str, Any]:
+        """Its parameters, by name."""
+        return values_of(self, declared(self.made), meshes)
 
     @model_validator(mode="after")
     def _one_of_the_choices(self) -> Self:
@@ -44,6 +50,18 @@ class KindModel(Model):
             if sum(getattr(self, key) is not None for key in (*others, last)) > 1:
                 raise ValueError(f"give the {last if last != 'set' else others[0]} by either {_listed(others, last)}")
         return self
+
+
+def values_of(model: Any, fields: Any, meshes: Meshes) -> dict[str, Any]:
+    """The values of declared fields of a part of a scene file; errors get the key that is wrong."""
+    values = {}
+    for name, one in fields.items():
+        keys = list(keys_of(one.form, name))
+        key = next((key for key in keys if getattr(model, key) is not None), keys[0])
+        with at(key):
+            value = getattr(model, key)
+            values[name] = meshes.vertices_of(model.body, value) if key == "set" else built(value, meshes)
+    return values
 
 
 def _listed(others: Sequence[str], last: str) -> str:
@@ -62,36 +80,44 @@ def keys_of(form: Form, name: str) -> dict[str, tuple[Any, str]]:
     return {name: (spelled(form), "")}
 
 
-@cache
-def model_of(kind: type[Kind], tagged: bool) -> type[KindModel]:
-    """The part of a scene file that describes an object of a kind; tagged : whether it has a key `kind`."""
-    keys: dict[str, Any] = {"kind": (Literal[kind.kind], ...)} if tagged else {}
-    choices = []
+def typed_keys(kind: Callable[..., Any], names: Collection[str], *, null: bool = False) -> dict[str, tuple[Any, Any]]:
+    """The keys of some declared fields as fields of a model; null : whether all have that as their default."""
+    keys: dict[str, tuple[Any, Any]] = {}
     for name, one in declared(kind).items():
+        if name not in names:
+            continue
         own = keys_of(one.form, name)
         text = one.description.replace("None", "null")
         for key, (spelled, words) in own.items():
             description = words or text
-            if one.default is MISSING and len(own) == 1:
+            if one.default is MISSING and len(own) == 1 and not null:
                 keys[key] = (spelled, Field(description=description))
                 continue
-            default = None if len(own) > 1 else _default(one.default)
+            default = None if len(own) > 1 or null else _default(one.default)
             optional = default is None or one.optional
-            spelled = spelled | None if optional else spelled
-            keys[key] = (spelled, Field(default=default, description=description))
-        if len(own) > 1:
-            choices.append(tuple(own))
+            keys[key] = (spelled | None if optional else spelled, Field(default=default, description=description))
+    return keys
+
+
+@cache
+def model_of(kind: Any, tagged: bool) -> type[KindModel]:
+    """The part of a scene file that describes an object of a kind; tagged : whether it has a key `kind`."""
+    keys: dict[str, Any] = {"kind": (Literal[kind.kind], ...)} if tagged else {}
+    keys |= typed_keys(kind, declared(kind).keys())
     # The names in the schema differ where a kind is one of several in one list, and alone in another.
     name = f"{kind.__name__}{'' if tagged else 'Entry'}Model"
+    if not isinstance(kind, type):
+        name = "".join(word.capitalize() for word in kind.__name__.split("_")) + "ShapeModel"
     model = create_model(name, __base__=KindModel, __doc__=first_paragraph(kind), __module__=__name__, **keys)
-    model.made, model.choices = kind, tuple(choices)
+    several = (tuple(keys_of(one.form, name)) for name, one in declared(kind).items())
+    model.made, model.choices = staticmethod(kind), tuple(own for own in several if len(own) > 1)
     return model
 
 
-def entry_of(kinds: Sequence[type[Kind]]) -> Any:
+def entry_of(kinds: Collection[Any]) -> Any:
     """The type of an entry that is of one of several kinds: distinguished by their key `kind`, or of one alone."""
     if len(kinds) == 1:
-        return model_of(kinds[0], False)
+        return model_of(*kinds, False)
     return Annotated[Union[tuple(model_of(kind, True) for kind in kinds)], Field(discriminator="kind")]  # noqa: UP007
 
 
@@ -102,7 +128,7 @@ def _default(value: Any) -> Any:
     return list(value) if isinstance(value, (tuple, np.ndarray)) else value
 
 
-def built(value: Any, meshes: MeshStore) -> Any:
+def built(value: Any, meshes: Any) -> Any:
     """What a part of a scene file describes: a value as it is, or the object that it builds."""
     if isinstance(value, list):
         found = []

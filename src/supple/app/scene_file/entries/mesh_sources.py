@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import glob
 import logging
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, create_model
 
-from supple.app.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, SurfaceShapeModel
+from supple.app.scene_file.entries.kinds import KindModel, entry_of
 from supple.app.scene_file.model import FilePath, Model, Positive, Vector
 from supple.app.scene_file.yaml_files import printable
 from supple.errors import MeshError, SceneError
@@ -18,6 +20,8 @@ from supple.mesh.io.mesh_files import READERS
 from supple.mesh.io.tetgen_family import SUFFIXES
 from supple.mesh.mesh_file import load_mesh
 from supple.mesh.meshing.units import warn_of_millimetres
+from supple.mesh.primitives.shape import SURFACES, surface_of
+from supple.mesh.sets import MeshSets
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.convex_hull import convex_hull
@@ -81,7 +85,7 @@ class SurfaceModel(Model):
     alternatives = ("file", "shape", "a surface needs either `file` or `shape`; give one of them")
 
     file: FilePath | None = Field(default=None, description="relative to the scene file")
-    shape: SurfaceShapeModel | None = Field(default=None, description="instead of `file`")
+    shape: KindModel | None = None
     scale: Positive | Vector = Field(
         default=1.0, description="of all coordinates, or of x, y and z; a negative one mirrors"
     )
@@ -94,16 +98,28 @@ class SurfaceModel(Model):
         return meshes.surface(self)
 
 
+@cache
+def surface_model() -> type[SurfaceModel]:
+    """`SurfaceModel` with all kinds of shapes."""
+    shape: Any = entry_of(SURFACES.values()) | None, Field(default=None, description="instead of `file`")
+    return create_model("SurfaceModel", __base__=SurfaceModel, __doc__=SurfaceModel.__doc__, shape=shape)
+
+
 class MeshStore:
     """Reads and makes meshes; equal descriptions share one mesh.
 
     Parameters
     ----------
     folder : the folder of relative paths.
+
+    Attributes
+    ----------
+    sources : by name of a body, the file of its mesh, or None
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self.sources: dict[str, MeshFileModel | None] = {}
         self._made: dict[str, Any] = {}
 
     def _once(self, description: BaseModel, make: Any, kind: str = "") -> Any:
@@ -120,23 +136,39 @@ class MeshStore:
         """The surface in a file, which was reduced before it was filled; None where it was not."""
         return self._once(source, lambda: self._read(source))[1]
 
-    def shape(self, shape: ShapeModel, order: int = 1) -> TetMesh:
+    def shape(self, shape: KindModel, order: int = 1) -> TetMesh:
         """The tet mesh of a shape."""
-        return self._once(shape, lambda: shape.build(order), f"order {order} ")
+        return self._once(shape, lambda: shape.made(**shape.built_values(self), order=order), f"order {order} ")
 
     def solid(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
         """The surface in a file as it is, without meshing options; otherwise its tet mesh."""
         return self.tets(source) if source.meshing else self._loaded(source)
 
-    def holds_tets(self, source: MeshFileModel) -> bool:
-        """Whether a file holds tets, or other solid cells, and not a surface to be filled."""
-        return isinstance(self._loaded(source), TetMesh)
+    def sets(self, body: str, source: MeshFileModel | None) -> MeshSets:
+        """The named sets of the mesh file of a body.
 
-    def solid_shape(self, shape: ShapeModel) -> SurfaceMesh | TetMesh:
-        """The surface of a shape, or its tet mesh where the surface has no other description."""
-        if isinstance(shape, GummyBearShapeModel):
-            return self.shape(shape)
-        return self._once(shape, shape.build_surface, "solid ")
+        Raises
+        ------
+        SceneError : where it has none.
+        """
+        if source is None or not isinstance(self._loaded(source), TetMesh):
+            raise SceneError(f"body {body!r} has no file of tets with named sets (.inp or .msh)")
+        return self.tets(source).sets
+
+    def vertices_of(self, body: str, name: str) -> NDArray[np.integer]:
+        """Numbers (k,) of the vertices of a body that are in a set of its mesh file.
+
+        Raises
+        ------
+        SceneError : where the body does not exist, or has no such set.
+        """
+        if body not in self.sources:
+            raise SceneError(f"body {body!r} does not exist")
+        return self.sets(body, self.sources[body]).vertices_of(name)
+
+    def solid_shape(self, shape: KindModel) -> SurfaceMesh | TetMesh:
+        """The surface of a shape, or its tet mesh where the surface has other parameters."""
+        return self._once(shape, lambda: surface_of(getattr(shape, "kind"), shape.built_values(self)), "solid ")  # noqa: B009
 
     def surface(self, source: SurfaceModel) -> SurfaceMesh:
         """The surface of a file or a shape, placed."""
@@ -197,7 +229,7 @@ class MeshStore:
         else:
             assert source.shape is not None
             with at("shape"):
-                surface = source.shape.build_surface()
+                surface = source.shape.build(self)
         if source.hull:
             try:
                 surface = SurfaceMesh(*convex_hull(surface.vertices))

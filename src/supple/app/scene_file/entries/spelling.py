@@ -7,10 +7,13 @@ from typing import Annotated, Any, Literal, Union
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from supple.app.scene_file.entries.kinds import entry_of, keys_of, model_of, spelled
-from supple.app.scene_file.entries.mesh_sources import MeshStore, SurfaceModel
+from supple.app.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, surface_model
 from supple.app.scene_file.model import Count, Extents, Index, Model, Name, NonNegative, Number, Positive, Vector
 from supple.kinds import forms
 from supple.materials.own.energy_material import FormulaText, NamedNumbers
+from supple.mesh.primitives.shape import SHAPES
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
 from supple.scene.contact_pairs import NameList
 from supple.scene.forces import ForceForm
 from supple.scene.inputs import MotorInput
@@ -20,7 +23,7 @@ from supple.scene.loads.over_time import Curve, OverTimeOf
 from supple.scene.loads.points import Point, PointForm, PointList
 from supple.scene.loads.tet_region import Directions
 from supple.scene.motion import Keyframes, MotionForm
-from supple.scene.obstacles.obstacle import Surface
+from supple.scene.rigid.mass_properties import Inertia
 from supple.scene.selection import InBox, Vertices
 from supple.scene.stitches.stitch import PairList, PerPair
 
@@ -95,7 +98,7 @@ _plain(NameList, Names)
 _plain(PointForm, PointModel)
 _plain(PointList, Annotated[list[PointModel], Field(min_length=2)])
 _plain(PairList, Annotated[list[Annotated[list[Index], Field(min_length=2, max_length=2)]], Field(min_length=1)])
-_plain(Surface, SurfaceModel)
+_plain(Inertia, Annotated[list[Vector], Field(min_length=3, max_length=3)])
 _plain(FormulaText, Annotated[str, Field(max_length=4000)])
 _plain(NamedNumbers, dict[Name, Number])
 
@@ -158,6 +161,20 @@ def _(form: forms.NumberPerTet) -> Any:
 def _(form: PerPair) -> Any:
     number = spelled(form.bounds)
     return number | Annotated[list[number], Field(min_length=1)]
+
+
+@keys_of.register
+def _(form: forms.Instance, name: str) -> dict[str, tuple[Any, str]]:
+    if TetMesh not in form.classes:
+        return {name: (surface_model(), "")}
+    keys: dict[str, tuple[Any, str]] = {
+        "mesh": (MeshFileModel, "of tetrahedra, or a surface to fill with them"),
+        "shape": (entry_of(SHAPES.values()), "instead of `mesh`: a ready-made shape"),
+    }
+    if SurfaceMesh in form.classes:
+        text = "instead of `mesh`, of a rigid body: closed surfaces that are its shape together, and may overlap"
+        keys["surfaces"] = Annotated[list[surface_model()], Field(min_length=1, max_length=1000)], text
+    return keys
 
 
 _ROWS = Annotated[list[Index], Field(min_length=1)]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.scene_file.entries.mesh_sources import MeshStore, SurfaceModel
+from supple.app.scene_file.entries.mesh_sources import MeshStore, surface_model
 from supple.app.scene_file.urdf.elements import Problem
 from supple.app.scene_file.urdf.notes import Notes
 from supple.app.scene_file.urdf.robot import Geometry, Link, Placement, Robot
@@ -55,7 +55,7 @@ class Shapes:
 
     def surface(self, entries: list[dict[str, Any]]) -> SurfaceMesh:
         """The surfaces of entries as one."""
-        return self.meshes.joined([SurfaceModel.model_validate(one) for one in entries])
+        return self.meshes.joined([surface_model().model_validate(one) for one in entries])
 
     def _usable(self, geometry: Geometry, link: Link) -> Geometry | None:
         if geometry.kind != "mesh":
