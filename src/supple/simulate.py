@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError, SolverError, SuppleError, SuppleWarning
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.materials.laws.internal import checked
+from supple.model.breaking import after_breaks
 from supple.model.crushed import too_soft
-from supple.model.state import Problems, State, StepReport
+from supple.model.state import Problems, State, Status, StepReport
 from supple.model.system import System, build_system, initial_state
 from supple.results.frame import Frame, completed_report, start_frame, with_applied_values
 from supple.runtime.displayed import supplied
@@ -185,6 +186,8 @@ def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None =
         raise SceneError(
             f"simulate: start has {len(state.positions)} vertices, the scene has {count}; give one of this scene"
         )
+    if len(state.broken_stitches) and state.broken_stitches.max() >= len(scene.stitching):
+        raise SceneError("simulate: start has broken stitches that the scene does not have; give one of this scene")
     state = _with_inputs(scene, _with_internal(scene, state))
     # A frame of this scene has the pins' anchors; computing them again would give them only up to round-off.
     if isinstance(start, Frame) and start.system.scene is scene:
@@ -226,6 +229,19 @@ def advance(
     return replace(after, inputs={name: given(after.time) for name, given in inputs.items()}), step
 
 
+def prepared_after_breaks(
+    solver: Solver, system: System, state: State, step: StepReport, workspace: Any
+) -> tuple[System, State, StepReport, Any]:
+    """What a step has led to, with the pairs broken that carry too much, and the workspace for what is left."""
+    left, state, step = after_breaks(system, state, step)
+    if left is not system:
+        try:
+            workspace = solver.prepare(left)
+        except SolverError as error:  # nothing holds a body any more, and its equilibrium is asked for
+            step = replace(step, status=Status.LINE_SEARCH_FAILED, message=str(error))
+    return left, state, step, workspace
+
+
 def _steps(
     first: Frame,
     dt: float,
@@ -251,6 +267,7 @@ def _steps(
                 wanted |= checked_values(inputs, control(frame))
             began = time.perf_counter()
             state, step = advance(solver, system, state, dt, workspace, wanted)
+            system, state, step, workspace = prepared_after_breaks(solver, system, state, step, workspace)
             seconds = time.perf_counter() - began
             report = completed_report(system, state, step, seconds, frame.report.energy)
             frame = Frame(index, state, system, report, step.contacts, solver)

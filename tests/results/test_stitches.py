@@ -7,6 +7,7 @@ import pytest
 import supple as sp
 from supple.model.system import initial_state
 from supple.results.plots import plot_recording
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.results.view.layers.connections import StitchView
 from supple.results.view.page import write_page
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
@@ -74,6 +75,24 @@ def test_reports_and_recordings_agree(recorded):
             assert np.allclose(np.abs(segments[:4, 1, [0, 2]]), 0.05)
         first = recording.stitches.segments(recording[0].state.positions, recording[0].obstacle_poses)
         assert np.allclose(np.linalg.norm(first[:, 0] - first[:, 1], axis=1), [0.01] * 4 + [0.02] * 4)
+
+
+def test_broken_stitches_are_not_drawn(tmp_path):
+    one = scene()
+    weak = sp.VertexEdgeStitch("high", "low", max_distance=0.0201, stiffness=10.0, strength=0.01)
+    path = tmp_path / "r.vtkhdf"
+    torn = sp.Scene(one.bodies, one.obstacles, stitches=[one.stitches[0], weak])
+    *_, last = sp.simulate(torn, sp.XPBD(substeps=20), 1 / 30, 8, sinks=[sp.Recorder(path)])
+    broken = np.isin(np.arange(8), last.state.broken_stitches)
+    assert broken.any()
+    assert not broken[:4].any()
+    with sp.read_recording(path) as recording:
+        model = model_of_recording(recording)
+        first, end = (moment_of_frame(model, recording[k]).stitch_segments for k in (0, -1))
+        lengths = [np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) for ends in (first, end)]
+    assert first.shape == end.shape == (8, 2, 3)
+    assert (lengths[0] > 0.0).all()
+    assert np.array_equal(lengths[1] == 0.0, broken)
 
 
 def test_the_page_draws_stitches_as_moving_segments(recorded, tmp_path, monkeypatch):

@@ -25,6 +25,7 @@ from supple.model.state import State
 from supple.model.system import System
 
 NUMERICAL = "numerical"
+BREAKING = "breaking"
 # Of the change of growth in a step, for its rate of work.
 _DIFFERENCE = 5e-3
 
@@ -37,6 +38,7 @@ def no_works(system: System) -> dict[str, float]:
     names += [each.work for each in system.actuators]
     names += ["joints"] if system.scene.joints else []
     names += ["anchors"] if len(system.stitching.anchors) else []
+    names += [BREAKING] if system.scene.stitching.names.breakable else []
     names += ["contact", "friction", "damping"]
     names += ["flow"] if system.laws.material.flowing_laws else []
     return dict.fromkeys([*names, NUMERICAL], 0.0)

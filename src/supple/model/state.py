@@ -148,6 +148,7 @@ class State:
         and the energy dissipated per rest volume [J/m^3]. (0, 11) where nothing flows, or has flowed.
     hinge_angles : angles of hinges over all turns [rad], by name; those that are missing are as at a start, see
         `HingeJoint`
+    broken_stitches : (b,) numbers of the pairs that have broken, ascending; see `Stitching`
     """
 
     time: float
@@ -157,6 +158,7 @@ class State:
     inputs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     internal: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 11)))
     hinge_angles: Mapping[str, float] = field(default_factory=dict)
+    broken_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +235,8 @@ class StepReport:
         included [m]; None where the solver does not compute it (`XPBD`), or found nothing in the range of its contact.
     details : what only this solver reports.
     contacts : makes the list of all contacts, for solvers that know them one by one.
+    broken_stitches : pairs that broke in the step, by the name of their stitch, or what messages call it: (k, 2) vertex
+        of its first body, number of the partner in the second one
     """
 
     status: Status
@@ -241,6 +245,7 @@ class StepReport:
     min_distance: float | None = None
     details: SolverDetails = field(default_factory=SolverDetails)
     contacts: Callable[[], ContactPoints] | None = None
+    broken_stitches: Mapping[str, NDArray[np.int32]] = field(default_factory=dict)
 
 
 # What helps against a status where its message does not say it.

@@ -34,6 +34,7 @@ class Report(DisplayedReport, Diagnostics):
     ----------
     status, iterations, message, min_distance, details : see `StepReport`
     wall_seconds : time the step took [s]
+    broken_stitches : pairs that broke in this frame, see `StepReport`
     """
 
     status: Status
@@ -42,6 +43,7 @@ class Report(DisplayedReport, Diagnostics):
     message: str = ""
     min_distance: float | None = None
     details: SolverDetails = field(default_factory=SolverDetails)
+    broken_stitches: Mapping[str, NDArray[np.int32]] = field(default_factory=dict)
 
     @property
     def softening(self) -> Mapping[str, float]:

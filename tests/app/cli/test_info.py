@@ -126,12 +126,14 @@ def test_stitches_of_a_scene(rows_of, tmp_path):
         "stitches:\n"
         "  - {kind: soft_vertex_triangle, first: b, second: a, max_distance: 0.3, youngs: 1, poisson: 0.3,"
         " min_separate_distance: 0.5}\n"
-        "  - {kind: vertex_vertex, name: thread, first: b, second: a, pairs: [[0, 0], [0, 1]], stiffness: 1}\n"
+        "  - {kind: vertex_vertex, name: thread, first: b, second: a, pairs: [[0, 0], [0, 1]], stiffness: 1,"
+        " strength: [2, 3]}\n"
     )
     rows = rows_of("scene.yaml")
     soft, thread = rows["stitch of 'b' to 'a'"], rows["stitch 'thread'"]
     assert soft == "SoftVertexTriangleStitch, 4 pairs, 0.25 to 0.25 m apart, 4 rest vertices offset"
     assert thread.startswith("VertexVertexStitch, 2 pairs, 1.25 to ")
+    assert thread.endswith(", breaks at 2 to 3 N")
 
 
 def scene_of(divisions, poisson, order=1):

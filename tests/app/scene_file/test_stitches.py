@@ -24,6 +24,7 @@ STITCH_LINES = {
     "kind: soft_vertex_triangle, first: high, second: low, pairs: [[0, 1], [2, 3]], mu: [1, 2], lam: 3": 2,
     "kind: soft_vertex_triangle, first: high, second: roof, max_distance: 0.3, youngs: 1e5, poisson: 0.3": 4,
     "kind: vertex_vertex, first: high, second: low, max_distance: 0.3, pairing: all, stiffness: 10": 4,
+    "kind: vertex_vertex, first: high, second: low, max_distance: 0.3, stiffness: 10, strength: [1, 2, 3, 4]": 4,
     "kind: vertex_edge, name: seam, first: high, second: low, pairs: [[0, 1]], stiffness: 10, rest_length: 0": 1,
 }
 
@@ -48,6 +49,12 @@ def test_stitches(load, tmp_path, line):
             "body or obstacle 'law' does not exist",
         ),
         ("kind: vertex_edge, first: high, second: low, max_distance: 0.1, stiffness: 0", "stiffness"),
+        ("kind: vertex_edge, first: high, second: low, max_distance: 1, stiffness: 1, strength: 0", "strength"),
+        ("kind: vertex_edge, first: high, second: low, max_distance: 1, stiffness: 1, strength: -1", "above 0"),
+        (
+            "kind: vertex_edge, first: high, second: low, max_distance: 0.3, stiffness: 1, strength: [1, 2]",
+            "strength has 2 values for 4 pairs",
+        ),
         ("kind: vertex_face, first: high, second: low, max_distance: 0.1", "vertex_face"),
         ("kind: soft_vertex_triangle, first: high, second: low, max_distance: 1, youngs: 1", "youngs and poisson"),
     ],

@@ -15,6 +15,7 @@ import numpy as np
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal, Session, now, versions, write_journal
 from supple.errors import OutputError
+from supple.model.breaking import without_broken
 from supple.model.system import System, rebuilt_system
 from supple.results.checkpoint.file import Checkpoint, RunFacts, write_checkpoint
 from supple.results.checkpoint.scene_hash import scene_hash
@@ -51,6 +52,7 @@ def frame_of(checkpoint: Checkpoint, scene: Scene, solver: Solver) -> Frame | No
     system = rebuilt_system(scene, checkpoint.start_states, checkpoint.anchors)
     if scene_hash(system, *checkpoint.run.span) != checkpoint.run.scene:
         return None
+    system = without_broken(system, checkpoint.state.broken_stitches)
     return start_frame(system, checkpoint.state, checkpoint.index, solver)
 
 

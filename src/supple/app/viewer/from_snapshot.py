@@ -52,6 +52,7 @@ class MomentBuilder:
             springs={grab.grab: (np.array(grab.point), np.array(grab.target)) for grab in snapshot.grabs},
             pusher=None if pusher is None else (np.array(pusher[0]), pusher[1]),
             tet_values=values,
+            broken_stitches=snapshot.broken_stitches,
         )
 
     def _model_of(self, scene: SceneDescription) -> Model:

@@ -103,7 +103,7 @@ def contact_mesh(
         body_count=len(system.bodies),
         names=tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles),
         collide=collide,
-        stitches=(of_vertex[system.stitching.nodes()], surface.positions(start)),
+        stitches=(of_vertex[system.stitching.seams()], surface.positions(start)),
         welded=_welded_points(system, of_vertex),
         touching=touching,
         rows=np.where(used < len(system.points), used, -1).astype(np.int32),

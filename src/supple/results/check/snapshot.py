@@ -19,7 +19,7 @@ from supple.results.check.geometry.orientation import volume_signs
 from supple.results.check.geometry.surface_pairs import meeting_pairs
 from supple.results.check.load_forces import ActuatorState, actuator_states, add_muscle_forces, load_forces
 from supple.results.check.series_recording import SeriesRecording
-from supple.results.check.stored_energies import elastic_energy, stitch_energy
+from supple.results.check.stored_energies import elastic_energy, stitch_energies
 from supple.results.check.surfaces import Surfaces, seam_keys
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
@@ -102,6 +102,7 @@ class Snapshot:
     internal : (k, 11) internal variables of materials that flow, see `State`; active : growths and muscles
     load_values : vectors and numbers of the recorded loads, by name
     pressures, tensions : of cavities [Pa], and of spans of cables [N], by name
+    broken, latest : (b,) pairs of stitches that have broken, and those of them that broke since the frame before
     other : why it cannot be compared with the other frames of a series, or None
     """
 
@@ -117,6 +118,8 @@ class Snapshot:
     load_values: Mapping[str, NDArray[np.float64] | float] = field(default_factory=dict)
     pressures: Mapping[str, float] = field(default_factory=dict)
     tensions: Mapping[str, float] = field(default_factory=dict)
+    broken: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    latest: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     other: str | None = None
 
     @classmethod
@@ -129,7 +132,8 @@ class Snapshot:
     @classmethod
     def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
         x, v = frame.state.positions, frame.state.velocities
-        details = frame.report.details
+        details, recording = frame.report.details, frame.recording
+        broken = recording.broken_stitches(frame.number)
         return cls(
             scene,
             frame.number,
@@ -143,6 +147,8 @@ class Snapshot:
             {**details.load_vectors, **details.load_values},
             details.cavity_pressure,
             details.cable_tension,
+            broken,
+            np.setdiff1d(broken, recording.broken_stitches(max(frame.number - 1, 0))),
         )
 
     @cached_property
@@ -227,7 +233,16 @@ class Snapshot:
     @cached_property
     def stitch_energy(self) -> float | None:
         """[J], zero at rest; None where the recording does not contain the laws of its stitches."""
-        return stitch_energy(self.scene.recording, self.positions, self.poses)
+        return float(np.delete(self._pair_energies, self.broken).sum())
+
+    @cached_property
+    def energy_of_latest(self) -> float:
+        """What the pairs store here that broke since the frame before [J]."""
+        return float(self._pair_energies[self.latest].sum())
+
+    @cached_property
+    def _pair_energies(self) -> NDArray[np.float64]:
+        return stitch_energies(self.scene.recording, self.positions, self.poses)
 
     @cached_property
     def load_forces(self) -> dict[str, NDArray[np.float64]]:

@@ -156,8 +156,8 @@ def stiffness_scale(recording: Recording) -> float:
     return 1e-3 * float((np.abs(physics.mu) + np.abs(physics.lam)) @ recording.rest_volumes)
 
 
-def stitch_energy(recording: Recording, x: NDArray[np.float64], poses: NDArray[np.float64]) -> float:
-    """[J], zero at rest.
+def stitch_energies(recording: Recording, x: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) of each pair, as if it held [J], zero at rest.
 
     Parameters
     ----------
@@ -175,7 +175,8 @@ def stitch_energy(recording: Recording, x: NDArray[np.float64], poses: NDArray[n
     places = np.einsum("kc,kci->ki", stitches.weights[count:], corners[count:, 1:])
     stiffness, rest = laws.springs.T
     extension = np.linalg.norm(corners[count:, 0] - places, axis=1) - rest
-    return float(density @ _volumes(laws.rest_shape_inverse)) + 0.5 * float(stiffness @ (extension * extension))
+    of_tets = density * _volumes(laws.rest_shape_inverse)
+    return np.concatenate([of_tets, 0.5 * stiffness * extension * extension])
 
 
 def stitch_scale(recording: Recording) -> float:

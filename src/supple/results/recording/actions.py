@@ -19,7 +19,9 @@ from supple.results.checkpoint.values import Rows
 from supple.scene.joints.joint import Conditions, Function
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
+from supple.scene.stitches.elements import PairNames
 from supple.scene.stitches.measures import attachments
+from supple.scene.stitches.stitching import no_stitching
 
 RecordedFunction = Function
 
@@ -124,6 +126,7 @@ class RecordedStitches:
     weights : (k, 3) of the corners
     rigid_control, rigid_weights : (r, 4) vertices, and the combination of these that each point of a rigid body is
     anchor_owners : (a,) which obstacle those vertices belong to; anchors : (a, 3) at time 0, before its pose [m]
+    names : of the pairs, with their strength; frames of breakable ones tell which have broken
     """
 
     nodes: Annotated[NDArray[np.int32], Rows("k", 4)]
@@ -133,6 +136,7 @@ class RecordedStitches:
     anchor_owners: Annotated[NDArray[np.int32], Rows("a", below="obstacles")]
     anchors: Annotated[NDArray[np.float64], Rows("a", 3)]
     laws: StitchLaws
+    names: PairNames
 
     def check(self, n: int) -> None:
         """Raise `ValueError` where a node is none of a scene with n vertices, or a stitch has no law."""
@@ -141,6 +145,11 @@ class RecordedStitches:
             raise ValueError(f"a stitch joins node {self.nodes.max()} of {count}")
         if len(self.laws.moduli) + len(self.laws.springs) != len(self.nodes):
             raise ValueError("there is another number of laws of stitches than of stitches")
+        names, count = self.names, len(self.nodes)
+        if names.pairs.shape != (count, 2) or not len(names.owner) == len(names.strength) == count:
+            raise ValueError("there is another number of names of stitches than of stitches")
+        if count and not 0 <= names.owner.min() <= names.owner.max() < len(names.labels):
+            raise ValueError("a pair is of a stitch that does not exist")
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -157,15 +166,20 @@ class RecordedStitches:
         on_rigid = np.einsum("rk,rki->ri", self.rigid_weights, x[self.rigid_control])
         return np.concatenate([x, on_rigid, there])[self.nodes]
 
-    def segments(self, x: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(k, 2, 3) ends of the stitches [m]; parameters as of `corners`."""
+    def segments(
+        self, x: NDArray[np.float64], poses: NDArray[np.float64], broken: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64]:
+        """(k, 2, 3) ends of the stitches [m], of broken ones (b,) the same point twice; parameters as of `corners`."""
         corners = self.corners(x, poses)
-        return np.stack([corners[:, 0], np.einsum("kc,kci->ki", self.weights, corners[:, 1:])], axis=1)
+        ends = np.stack([corners[:, 0], np.einsum("kc,kci->ki", self.weights, corners[:, 1:])], axis=1)
+        if broken is not None:
+            ends[broken, 1] = ends[broken, 0]
+        return ends
 
 
 def recorded_stitches(system: System) -> RecordedStitches:
-    """The stitches of a system."""
-    stitching = system.stitching
+    """The stitches of a system, those that have broken too."""
+    stitching = system.scene.stitching
     nodes, weights = attachments(stitching, stitching.points(initial_state(system.scene).positions, 0.0))
     rigid, anchors, tets, springs = stitching.apart, stitching.anchors, stitching.tets, stitching.springs
     laws = StitchLaws(
@@ -173,14 +187,17 @@ def recorded_stitches(system: System) -> RecordedStitches:
         np.column_stack([tets.mu, tets.lam]),
         np.column_stack([springs.stiffness, springs.rest_lengths]),
     )
-    return RecordedStitches(nodes, weights, rigid.control, rigid.weights, anchors.owner, anchors.points, laws)
+    return RecordedStitches(
+        nodes, weights, rigid.control, rigid.weights, anchors.owner, anchors.points, laws, stitching.names
+    )
 
 
 def no_stitches() -> RecordedStitches:
     """Of a scene without stitches."""
     nothing, rows = np.zeros(0, dtype=np.int32), np.zeros((0, 4), dtype=np.int32)
     laws = StitchLaws(np.zeros((0, 3, 3)), np.zeros((0, 2)), np.zeros((0, 2)))
-    return RecordedStitches(rows, np.zeros((0, 3)), rows, np.zeros((0, 4)), nothing, np.zeros((0, 3)), laws)
+    names = no_stitching(0).names
+    return RecordedStitches(rows, np.zeros((0, 3)), rows, np.zeros((0, 4)), nothing, np.zeros((0, 3)), laws, names)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,14 @@ from supple.results.readings.fields import FIELDS, Field
 from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.file import WRITTEN
 from supple.results.recording.physics import RecordedPhysics
-from supple.results.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
+from supple.results.recording.recorder import (
+    BROKEN_STITCHES,
+    INTERNAL,
+    REPORT_NUMBERS,
+    REPORT_VECTORS,
+    field_series,
+    frame_layout,
+)
 from supple.results.recording.scene import RecordedBody, RecordedScene, read_scene
 
 
@@ -94,10 +101,12 @@ class RecordedContents(RecordedScene):
             raise file.of_another_version("it has an unknown field")
         self.fields: tuple[Field, ...] = tuple(FIELDS[name] for name in self.field_names)
         n, m = len(self.rest_positions), len(self.tets)
-        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors, flowing)
+        breakable = len(self.stitches) if self.stitches.names.breakable else 0
+        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors, flowing, breakable)
         self._series = {series.path: series for series in layout.series}
         own = [field_series(field, n, m).path for field in self.fields]
-        for path in (*_READ_BY_FRAME, *own, _MESSAGE, *([INTERNAL] if flowing else [])):
+        more = [*([INTERNAL] if flowing else []), *([BROKEN_STITCHES] if breakable else [])]
+        for path in (*_READ_BY_FRAME, *own, _MESSAGE, *more):
             file.check_series(self._series[path], self._count)
         self.times: NDArray[np.float64] = self._values("supple/frames/time")
         if not np.isfinite(self.times).all():
@@ -167,6 +176,12 @@ class RecordedContents(RecordedScene):
     def close(self) -> None:
         """Close the file; frames that were not read before can then not be read."""
         self._file.close()
+
+    def broken_stitches(self, number: int) -> NDArray[np.int64]:
+        """(b,) numbers of the pairs of stitches that have broken until a frame, ascending; see `State`."""
+        if BROKEN_STITCHES not in self._series:
+            return np.zeros(0, dtype=np.int64)
+        return np.flatnonzero(self._values(BROKEN_STITCHES)[number])
 
     def _values(self, path: str) -> NDArray[Any]:
         """All frames' rows of a series; read once."""

@@ -55,7 +55,8 @@ class RecordedFrame(TetReadings):
         joints = {name for name, measure in measures.items() if measure is not None and measure.form == "angle"}
         known = self.report.joints.items()
         angles = {name: one.coordinate for name, one in known if name in joints and one.coordinate is not None}
-        return State(self.time, *vertices, internal=internal, hinge_angles=angles)
+        broken = self.recording.broken_stitches(self.number)
+        return State(self.time, *vertices, internal=internal, hinge_angles=angles, broken_stitches=broken)
 
     @cached_property
     def positions(self) -> dict[str, NDArray[np.float64]]:
@@ -149,6 +150,9 @@ class RecordedFrame(TetReadings):
         """
         values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
         vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}
+        broken = self.recording.broken_stitches(self.number)
+        if self.number > 0:
+            broken = np.setdiff1d(broken, self.recording.broken_stitches(self.number - 1))
         distance, stretch = values.pop("min_distance"), values.pop("largest_stitch_stretch")
         return Report(
             **values,
@@ -159,6 +163,7 @@ class RecordedFrame(TetReadings):
             largest_stitch_stretch=None if np.isnan(stretch) else stretch,
             message=self.recording._messages(self.number, self.number + 1)[0],
             details=self.recording.details.of_frame(self.number, self.recording._values),
+            broken_stitches=self.recording.stitches.names.named(broken if self.number > 0 else broken[:0]),
         )
 
     def _rows(self, path: str) -> NDArray[Any]:

@@ -41,6 +41,7 @@ REPORT_NUMBERS = (
 )
 REPORT_VECTORS = ("linear_momentum", "angular_momentum")
 INTERNAL = "supple/frames/internal"
+BROKEN_STITCHES = "supple/frames/broken_stitches"
 MESSAGE_BYTES = 512  # longer messages are cut
 # Frames, and bytes of frames, for which there is room at first; the file grows when more are needed.
 _FIRST_FRAMES, _FIRST_ROOM = 1 << 16, 1 << 30
@@ -54,8 +55,9 @@ def frame_layout(
     fields: Sequence[Field] = (),
     sensors: Sequence[RecordedSensor] = (),
     internal: int = 0,
+    breakable: int = 0,
 ) -> Layout:
-    """The series of a recording with these details, chosen fields, sensors and rows of internal variables."""
+    """The series of a recording with these details, chosen fields, sensors, rows of internal variables and stitches."""
     numbers = (Series(f"supple/frames/{name}", 1) for name in REPORT_NUMBERS)
     vectors = (Series(f"supple/frames/{name}", 1, (3,)) for name in REPORT_VECTORS)
     series = (
@@ -74,6 +76,7 @@ def frame_layout(
         *(field_series(field, points, tets) for field in fields),
         *(sensor.series for sensor in sensors),
         *([Series(INTERNAL, internal, (COLUMNS,))] if internal else []),
+        *([Series(BROKEN_STITCHES, 1, (breakable,), "|u1")] if breakable else []),
     )
     return Layout(points, tets, series)
 
@@ -160,8 +163,9 @@ class Recorder:
 
     def _layout(self, system: System) -> Layout:
         sizes = len(system.rest_positions), len(system.tets), len(system.obstacles)
-        flowing = count_of(system.laws.material)
-        return frame_layout(*sizes, self._details, self._fields, recorded_sensors(system.scene), flowing)
+        names = system.scene.stitching.names
+        counts = count_of(system.laws.material), len(names) if names.breakable else 0
+        return frame_layout(*sizes, self._details, self._fields, recorded_sensors(system.scene), *counts)
 
     def write(self, frame: Frame) -> None:
         """Add one frame."""
@@ -253,6 +257,9 @@ class Recorder:
             file.put(field.series.path, field.stored(getattr(report.details, field.name)))
         if len(frame.state.internal):
             file.put(INTERNAL, frame.state.internal)
+        names = frame.system.scene.stitching.names
+        if names.breakable:
+            file.put(BROKEN_STITCHES, np.isin(np.arange(len(names)), frame.state.broken_stitches))
         readings = frame.sensors
         for sensor in recorded_sensors(frame.system.scene):
             file.put(sensor.series.path, readings[sensor.name].numbers())

@@ -37,6 +37,7 @@ from supple.scene.body import LOOKS
 from supple.scene.joints.joint import Conditions, Function
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.registry import PARTS
+from supple.scene.stitches.elements import PairNames
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,7 @@ class SkinnedSurface:
 
 
 RecordedLoad = LoadPattern
-FORMAT_VERSION = 5
+FORMAT_VERSION = 6
 _GROUP, _HEADER = "supple", "supple/header"
 
 
@@ -213,7 +214,7 @@ _CLASSES: dict[str, type] = {
     kind.__name__: kind
     for kind in (
         ActiveTets, Conditions, Formula, Function,
-        LoadPattern, QuadraticRows, RecordedBody, RecordedCable, RecordedCavity, RecordedDetails,
+        LoadPattern, PairNames, QuadraticRows, RecordedBody, RecordedCable, RecordedCavity, RecordedDetails,
         RecordedField, RecordedJoint, RecordedLaw, RecordedObstacle, RecordedPhysics, RecordedScene, RecordedSensor,
         RecordedStitches, RecordedWeld, SkinnedSurface, StitchLaws,
     )

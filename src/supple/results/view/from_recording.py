@@ -49,6 +49,7 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
         frame.state.velocities,
         frame.obstacle_poses,
         internal=frame.state.internal,
+        broken_stitches=frame.state.broken_stitches,
         laws=replace(frame.recording.laws, active=frame.active),
         pinned=frame.recording.pinned_vertices.astype(np.int64),
     )

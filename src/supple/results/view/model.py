@@ -153,6 +153,7 @@ class Moment:
     pusher : center (3,) and radius of a ball [m], or None
     tet_values : values of tets (m,) that the simulation sent, by the key of their field
     internal : (k, 11) internal variables of a recorded frame, see `State`
+    broken_stitches : (b,) numbers of the pairs of stitches that have broken
     laws : the elastic laws of a recorded frame's tets; None of a live simulation, which sends what follows from them
     """
 
@@ -168,6 +169,7 @@ class Moment:
     pusher: tuple[NDArray[np.float64], float] | None = None
     tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     internal: NDArray[np.float64] = field(default_factory=lambda: NEVER_FLOWED)
+    broken_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     laws: TetLaws | None = None
 
     @cached_property
@@ -179,8 +181,8 @@ class Moment:
 
     @cached_property
     def stitch_segments(self) -> NDArray[np.float64]:
-        """(k, 2, 3) the two ends of every stitch [m]."""
-        return self.model.stitches.segments(self.finite_positions, self.poses)
+        """(k, 2, 3) the two ends of every stitch [m], of broken ones the same point twice."""
+        return self.model.stitches.segments(self.finite_positions, self.poses, self.broken_stitches)
 
     @cached_property
     def finite_positions(self) -> NDArray[np.float64]:

@@ -25,6 +25,36 @@ class Pairs:
 
 
 @dataclass(frozen=True, eq=False)
+class PairNames:
+    """Which pairs all stitches of a scene have: those of tets, then those of springs.
+
+    Attributes
+    ----------
+    labels : names of the stitches, or what messages call them; owner : (k,) which stitch a pair is of
+    pairs : (k, 2) vertex of its first side, number of the partner in the second; strength : (k,) [N], inf: never breaks
+    """
+
+    labels: tuple[str, ...]
+    owner: NDArray[np.int32]
+    pairs: NDArray[np.int32]
+    strength: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.owner)
+
+    @property
+    def breakable(self) -> bool:
+        """Whether one of them can break."""
+        return bool(np.isfinite(self.strength).any())
+
+    def named(self, rows: NDArray[np.integer]) -> dict[str, NDArray[np.int32]]:
+        """Some pairs (b, 2), by the name of their stitch, or what messages call it."""
+        owner, pairs = self.owner[rows], self.pairs[rows]
+        labels = np.array(self.labels, dtype=object)[owner]
+        return {label: pairs[labels == label] for label in dict.fromkeys(labels.tolist())}
+
+
+@dataclass(frozen=True, eq=False)
 class _Elements:
     """Arrays with one row per stitch. The first of its `vertices` is of the first side, the others of the second."""
 
@@ -37,6 +67,10 @@ class _Elements:
         """The same in other numbers: each side's by its table."""
         vertices = np.column_stack([first[self.vertices[:, 0]], second[self.vertices[:, 1:]]])
         return replace(self, vertices=vertices.astype(np.int32))
+
+    def chosen(self, rows: NDArray[np.bool_]) -> Self:
+        """Some of them."""
+        return type(self)(**{key: getattr(self, key)[rows] for key in self.__dataclass_fields__})
 
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:

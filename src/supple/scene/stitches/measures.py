@@ -11,13 +11,44 @@ from supple.scene.stitches.stitching import Stitching
 
 def stitch_energy(stitching: Stitching, points: NDArray[np.float64]) -> float:
     """Energy of all stitches, zero at rest [J]; points (n + a, 3) as of `Stitching.points` [m]."""
+    return float(stitch_energies(stitching, points).sum())
+
+
+def stitch_energies(stitching: Stitching, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) of each pair, tets first, zero at rest [J]; points as of `stitch_energy`."""
     tets, springs = stitching.tets, stitching.springs
     F = _deformation_gradients(stitching, points)
     grown = np.linalg.det(F) - 1.0
     shape = 0.5 * (np.einsum("tij,tij->t", F, F) - 3.0) - grown
-    energy = float((tets.mu * shape + 0.5 * tets.lam * grown * grown) @ tets.rest_volumes)
     longer = np.linalg.norm(springs.extensions(points), axis=1) - springs.rest_lengths
-    return energy + 0.5 * float(springs.stiffness @ (longer * longer))
+    of_tets = (tets.mu * shape + 0.5 * tets.lam * grown * grown) * tets.rest_volumes
+    return np.concatenate([of_tets, 0.5 * springs.stiffness * longer * longer])
+
+
+def stitch_loads(stitching: Stitching, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) what each pair carries, tets first [N]; points as of `stitch_energy`.
+
+    Of a spring, how hard it pulls, 0 where it is shorter than at rest. Of a tet, the size of the elastic force on its
+    vertex, without what presses the vertex away from the triangle. A seam does not break where its sides are pressed
+    onto each other; a tet that starts flat presses them apart.
+
+    Source: Camanho and Dávila, "Mixed-Mode Decohesion Finite Elements" (2002): traction that closes a seam counts as 0.
+    """
+    tets, springs = stitching.tets, stitching.springs
+    F = _deformation_gradients(stitching, points)
+    a, b, c = np.moveaxis(F, 2, 0)
+    cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+    beyond = tets.lam * (np.einsum("ti,ti->t", a, cofactor[:, :, 0]) - 1.0) - tets.mu
+    stress = tets.mu[:, None, None] * F + beyond[:, None, None] * cofactor
+    force = np.einsum("tij,tj,t->ti", stress, tets.rest_shape_inverse.sum(axis=1), tets.rest_volumes)
+    x1, x2, x3 = points[tets.vertices[:, 1:]].transpose(1, 0, 2)
+    # At rest the vertex is on the other side of the triangle than this normal.
+    normal = np.cross(x2 - x1, x3 - x1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(np.float64).tiny)[:, None]
+    pressing = np.minimum(np.einsum("ti,ti->t", force, normal), 0.0)
+    of_tets = np.linalg.norm(force - pressing[:, None] * normal, axis=1)
+    longer = np.linalg.norm(springs.extensions(points), axis=1) - springs.rest_lengths
+    return np.concatenate([of_tets, springs.stiffness * np.maximum(longer, 0.0)])
 
 
 def largest_stitch_stretch(stitching: Stitching, points: NDArray[np.float64]) -> float | None:

@@ -71,6 +71,8 @@ class Stitch(Kind, ABC):
         the vertex from its plane; of several with the same (0, where surfaces touch), the one whose normal is most
         opposed to that of the vertex's own surface; and of these the one of lowest number; or "all" in reach
     damping : Kelvin-Voigt time of the stitches [s]
+    strength : a pair that is pulled or sheared by more at the end of a frame breaks, and is gone from then on (see
+        docs/reference/stitches.md). One number, or one for each pair [N]; None: never
     name : used in messages
 
     Raises
@@ -90,6 +92,7 @@ class Stitch(Kind, ABC):
     max_distance: Annotated[float | None, POSITIVE] = field(default=None, kw_only=True)
     pairing: Annotated[str, Choice(("closest", "all"))] = field(default="closest", kw_only=True)
     damping: Annotated[float, NON_NEGATIVE] = field(default=0.0, kw_only=True)
+    strength: Annotated[float | NDArray[np.float64] | None, PerPair(POSITIVE)] = field(default=None, kw_only=True)
     name: Annotated[str | None, Name()] = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:

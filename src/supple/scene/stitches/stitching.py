@@ -7,8 +7,9 @@ have no effect.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,17 +22,18 @@ from supple.scene.body import PlacedBody
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.stitches.elements import Pairs, Springs, StitchTets
+from supple.scene.stitches.elements import PairNames, Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side, side_of
 from supple.scene.stitches.stitch import Stitch
 
 
 @dataclass(frozen=True, eq=False)
 class StitchRange:
-    """One stitch of the scene, its pairs, and the rows of its tets or springs."""
+    """One stitch of the scene, its pairs with their strength (k,) [N], and the rows of its tets or springs."""
 
     stitch: Stitch
     pairs: Pairs
+    strength: NDArray[np.float64]
     tets: slice
     springs: slice
 
@@ -96,9 +98,10 @@ class Stitching:
     ----------
     body_vertices : n, how many vertices the bodies have; in a solver, whose system has the points of rigid bodies as
         vertices too (see `supple.model.stitched_points`), also these
-    ranges : of each stitch of the scene
-    tets, springs : of all of them
+    ranges : of each stitch of the scene, before any pair has broken
+    tets, springs : of all pairs that hold
     rigid : points of rigid bodies; anchors : vertices of obstacles, whose numbers are the last ones
+    broken : (b,) numbers of the pairs that have broken, of all of the scene, ascending; parted : (b, 4) their `nodes`
     """
 
     body_vertices: int
@@ -107,9 +110,42 @@ class Stitching:
     springs: Springs
     rigid: RigidNodes
     anchors: Anchors
+    broken: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    parted: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
 
     def __len__(self) -> int:
         return len(self.tets) + len(self.springs)
+
+    @cached_property
+    def names(self) -> PairNames:
+        """Of all pairs of the scene, broken or not."""
+        numbers = [np.concatenate([_rows(part.tets), self._tet_count + _rows(part.springs)]) for part in self.ranges]
+        order = np.argsort(np.concatenate([np.zeros(0, dtype=np.int64), *numbers]))
+
+        def every(parts: Iterable[NDArray], empty: NDArray) -> NDArray:
+            return np.concatenate([empty, *parts])[order]
+
+        pairs = (np.column_stack([part.pairs.vertices, part.pairs.rows]) for part in self.ranges)
+        return PairNames(
+            tuple(part.stitch.name or part.stitch.label for part in self.ranges),
+            every((np.full(len(rows), k, np.int32) for k, rows in enumerate(numbers)), np.zeros(0, np.int32)),
+            every(pairs, np.zeros((0, 2), np.int32)),
+            every((part.strength for part in self.ranges), np.zeros(0)),
+        )
+
+    @property
+    def _tet_count(self) -> int:
+        """Of the scene, before any has broken."""
+        return max((part.tets.stop for part in self.ranges), default=0)
+
+    def without(self, broken: NDArray[np.int64]) -> Stitching:
+        """All stitches of a scene but the pairs that have broken, (b,) numbers in ascending order."""
+        if not len(broken):
+            return self
+        holds = np.ones(len(self), dtype=np.bool_)
+        holds[broken] = False
+        tets, springs = self.tets.chosen(holds[: len(self.tets)]), self.springs.chosen(holds[len(self.tets) :])
+        return replace(self, tets=tets, springs=springs, broken=broken, parted=self.nodes()[broken])
 
     @property
     def apart(self) -> RigidNodes:
@@ -133,6 +169,10 @@ class Stitching:
         alone = springs[:, 1] == springs[:, 2]
         springs[alone, 2] = -1
         return np.concatenate([self.tets.vertices, springs]).astype(np.int32)
+
+    def seams(self) -> NDArray[np.int32]:
+        """(k + b, 4) as `nodes`, of broken ones too: what they joined does not collide."""
+        return np.concatenate([self.nodes(), self.parted])
 
     def elements(self) -> NDArray[np.int32]:
         """(k, 4) the nodes as solvers assemble them; -1 also for nodes that are not vertices of bodies."""
@@ -164,7 +204,8 @@ class Stitching:
         tets = replace(self.tets, vertices=np.ascontiguousarray(numbers[self.tets.vertices]))
         springs = replace(self.springs, vertices=np.ascontiguousarray(numbers[self.springs.vertices]))
         rigid = replace(self.rigid, numbers=numbers[self.rigid.numbers], control=numbers[self.rigid.control])
-        return replace(self, tets=tets, springs=springs, rigid=rigid)
+        parted = np.append(numbers, -1)[self.parted].astype(np.int32)
+        return replace(self, tets=tets, springs=springs, rigid=rigid, parted=parted)
 
     def joins(self) -> NDArray[np.int32]:
         """(q, 2) each stitch's first vertex with each of the others, anchors included.
@@ -222,7 +263,7 @@ def stitch_together(
         **{body.name: body for body in bodies},
     }
     sides: dict[str, Side] = {}
-    made: list[tuple[Pairs, StitchTets | Springs]] = []
+    made: list[tuple[Pairs, NDArray[np.float64], StitchTets | Springs]] = []
     stitched: dict[str, list[NDArray[np.int32]]] = {}
     for number, stitch in enumerate(stitches):
         with at("stitches", number):
@@ -232,7 +273,9 @@ def stitch_together(
             first, second = sides[stitch.first], sides[stitch.second]
             pairs = stitch.find(first, second)
             part = stitch.join(first, second, pairs)
-        made.append((pairs, part))
+            limit = np.inf if stitch.strength is None else stitch.strength
+            strength = stitch.per_pair(limit, len(pairs.vertices), "strength")
+        made.append((pairs, strength, part))
         stitched.setdefault(stitch.first, []).append(part.vertices[:, 0])
         stitched.setdefault(stitch.second, []).append(part.vertices[:, 1:].ravel())
     used = {name: np.unique(np.concatenate(parts)) for name, parts in stitched.items()}
@@ -258,14 +301,18 @@ def stitch_together(
             places += [(owner, vertex) for vertex in rows.tolist()]
     ranges: list[StitchRange] = []
     tets, springs = [StitchTets.none()], [Springs.none()]
-    for stitch, (pairs, part) in zip(stitches, made, strict=True):
+    for stitch, (pairs, strength, part) in zip(stitches, made, strict=True):
         part = part.numbered(tables[stitch.first], tables[stitch.second])
         begin = sum(map(len, tets)), sum(map(len, springs))
         (tets if isinstance(part, StitchTets) else springs).append(part)  # pyright: ignore[reportArgumentType]
         end = sum(map(len, tets)), sum(map(len, springs))
-        ranges.append(StitchRange(stitch, pairs, slice(begin[0], end[0]), slice(begin[1], end[1])))
+        ranges.append(StitchRange(stitch, pairs, strength, slice(begin[0], end[0]), slice(begin[1], end[1])))
     others = _rigid_nodes(nodes), _anchors(obstacles, places)
     return Stitching(n, tuple(ranges), StitchTets.joined(tets), Springs.joined(springs), *others)
+
+
+def _rows(part: slice) -> NDArray[np.int64]:
+    return np.arange(part.start, part.stop)
 
 
 def _table(rows: NDArray[np.integer], first: int) -> NDArray[np.int32]:

@@ -74,7 +74,8 @@ class WeldedMasses:
         bodies = [heavy.get(part.name, part.body) for part in system.bodies]
         scene = replace(system.scene, bodies=bodies, joints=joints)
         anchors = [self._anchors(pin) for pin in system.pins]
-        return rebuilt_system(scene, tuple(self._heavy(state) for state in system.start_states), anchors)
+        built = rebuilt_system(scene, tuple(self._heavy(state) for state in system.start_states), anchors)
+        return replace(built, stitching=system.stitching)
 
     def inner(self, state: State) -> State:
         """A state of the scene as one of the solver."""

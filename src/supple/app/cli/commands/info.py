@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -189,7 +190,7 @@ def _scene(file: Path, timed: bool, confine: bool) -> None:
     for each in system.actuators:
         unit = "m^3" if each.kind == "cavity" else "m"
         rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} {unit} at the start"))
-    rows += _stitch_rows(system.stitching)
+    rows += _stitch_rows(scene.stitching)
     rows += [(each.label, each.summary()) for each in (*scene.loads, *scene.sensors)]
     for joint in scene.joints:
         text = f"{type(joint).__name__} of {joint.first} and {joint.second or 'the world'}"
@@ -294,13 +295,16 @@ def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
 
 
 def _stitch_rows(stitching: Stitching) -> list[tuple[str, str]]:
-    """How many pairs each stitch has, how far they are apart, and how many rest vertices had to be moved."""
+    """How many pairs each stitch has, how far they are apart, how many rest vertices had to be moved, and strengths."""
     rows = []
     for part in stitching.ranges:
         near, far = part.pairs.distances.min(), part.pairs.distances.max()
         text = f"{type(part.stitch).__name__}, {len(part.pairs.vertices)} pairs, {near:.6g} to {far:.6g} m apart"
         if part.tets.stop > part.tets.start:
             text += f", {int(stitching.tets.offset[part.tets].sum())} rest vertices offset"
+        low, high = float(part.strength.min()), float(part.strength.max())
+        if math.isfinite(low):
+            text += f", breaks at {low:g}" + (f" to {high:g} N" if high > low else " N")
         rows.append((part.stitch.label, text))
     return rows
 
@@ -329,6 +333,9 @@ def _recording(file: Path) -> None:
             ("scene file", "inside" if recording.scene_text else "none"),
             ("written by", f"supple {recording.supple_version}"),
         ]
+        if recording.stitches.names.breakable:
+            broken = len(recording.broken_stitches(len(recording) - 1))
+            rows.append(("stitches", f"{broken} of {len(recording.stitches)} pairs have broken at the end"))
         problems = [*(["a tetrahedron is inverted or flat (J <= 0)"] if J.min() <= 0.0 else [])]
         problems += [recording.unfinished] if recording.unfinished else []
         rows.append(("problems", "; ".join(problems) or "none"))

@@ -22,6 +22,7 @@ def between(before: State, after: State, share: float) -> State:
         before.positions + share * (after.positions - before.positions),
         before.velocities + share * (after.velocities - before.velocities),
         internal=after.internal,
+        broken_stitches=before.broken_stitches,
     )
 
 

@@ -235,6 +235,7 @@ class SimulationLoop:
             contact_points=contacts,
             contact_forces=forces,
             readings=readings(live),
+            broken_stitches=state.broken_stitches,
         )
 
     def _requested(self, name: str, compute: Callable[[], Any]) -> Any | None:

@@ -195,6 +195,7 @@ class Snapshot:
         bodies, where `SetView` requests contacts and the solver knows them
     readings : of sensors, cavities and cables
     tet_quantity : the quantity of `tet_values`: "J", "von_mises", "energy" or None
+    broken_stitches : see `State`
     """
 
     description: SceneDescription
@@ -217,6 +218,7 @@ class Snapshot:
     contact_points: NDArray[np.float64] | None = None
     contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     readings: tuple[Reading, ...] = ()
+    broken_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def body_positions(self, name: str) -> NDArray[np.float64]:
         """(n, 3) of one body [m]."""

@@ -188,10 +188,12 @@ class Balance(FrameCheck):
             self.why_not = "the recording does not contain works"
         self._first: Snapshot | None = None
         self._rows: list[tuple[int, float, float]] = []
+        self._breaking: list[float] = []
 
     def see(self, at: Snapshot) -> None:
         self._first = self._first or at
         self._rows.append((at.number, *moved_and_height(at, self._first)))
+        self._breaking.append(at.energy_of_latest)
 
     def result(self) -> CheckResult:
         if self.why_not is not None or self._works is None:
@@ -211,6 +213,12 @@ class Balance(FrameCheck):
             self.tally.see(at, float(miss), not miss <= _CLOSED)
             if not rest <= self.settings.max_energy_gain:
                 self.tally.see(at, float(rest), True, "forces that are not balanced")
+        if "breaking" in self._works:
+            apart = np.abs(self._works["breaking"][rows] + self._breaking) / scale
+            worst = int(np.argmax(apart))
+            self.tally.see(
+                recording[int(rows[worst])], float(apart[worst]), not apart[worst] <= _CLOSED, "work of breaking"
+            )
         for kind, names in (("cavities", "cavity_work"), ("cables", "cable_work")):
             if kind in self._works:
                 apart = np.abs(recording.frame_values(f"details/{names}").sum(axis=1) - self._works[kind])

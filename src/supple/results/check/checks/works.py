@@ -32,7 +32,7 @@ _STEP = 1e-6
 # J below which a barrier against inversion may act, where the recording does not say it.
 _BARRIER_ONSET = 0.1
 # What else may act on pinned vertices, up to a bound that is known.
-_BESIDE_PINS = {"contact", "friction", "damping", "flow", "growth"}
+_BESIDE_PINS = {"contact", "friction", "damping", "flow", "growth", "breaking"}
 # Round-off, as a share of the energies.
 _CLOSED = 1e-9
 # Contact forces are recorded in single precision.
@@ -223,7 +223,9 @@ class Works(FrameCheck):
         m = recording.masses[rows]
         speeds = [np.einsum("ij,ij->i", of.velocities[rows], of.velocities[rows]) for of in (last, at)]
         kinetic = 0.5 * float(m @ (speeds[1] - speeds[0]))
-        before, after = (_slope(each, along) for each in (last, at))
+        # Until its end, the step had the stitches that broke then.
+        whole = replace(at, broken=last.broken) if len(at.latest) else at
+        before, after = (_slope(each, along) for each in (last, whole))
         work = 0.5 * (before + after) + kinetic - float(m @ moved[rows] @ recording.gravity)
         # An implicit step takes m (v' - v) v', which differs from the change of kinetic energy by the second term.
         change = at.velocities[rows] - last.velocities[rows]

@@ -111,7 +111,7 @@ class ContactModel:
         ------
         SceneError, SolverError : where they are not apart; names the pair and the place.
         """
-        held_together = len(self.system.stitching) > 0 or len(self.system.welding) > 0
+        held_together = len(self.system.stitching.seams()) > 0 or len(self.system.welding) > 0
         apart = self.allows(x) and not self.collisions.intersect(x)
         if held_together and apart:
             return

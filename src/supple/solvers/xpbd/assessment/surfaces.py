@@ -44,7 +44,7 @@ class Seams:
 
 def _stitched(system: System, owner: NDArray[np.int32]) -> NDArray[np.int64]:
     """(k, 2) triangles around stitches of bodies to bodies."""
-    nodes, triangles, points = system.stitching.nodes(), system.triangles, system.points
+    nodes, triangles, points = system.stitching.seams(), system.triangles, system.points
     # Anchors on obstacles are not points of bodies.
     nodes = np.append(system.stitching.points_of_nodes(points), -1)[nodes].astype(np.int32)
     nodes = nodes[(nodes[:, 0] >= 0) & (nodes[:, 1] >= 0)]
@@ -126,7 +126,7 @@ class SurfaceCheck:
         self._solid = tuple(part for part in ranges if part.index not in self._formulas)
         self._points, self._triangles, owner = joined_surfaces(self._extended, self._solid)
         self._owner = owner[self._triangles[:, 0]]
-        joins = len(system.stitching) or len(system.welding)
+        joins = len(system.stitching.seams()) or len(system.welding)
         self._seams = Seams(system, self._owner[: len(system.triangles)]) if joins else None
         pairs = self._collide[np.ix_(owned := np.unique(self._owner), owned)]
         self._may_cross = bool(pairs.any())

@@ -279,6 +279,7 @@ def _add(live: LiveScene, body: PlacedBody) -> None:
         np.concatenate([live.state.velocities, alone.velocities]),
         internal=np.concatenate([_internal(live), at_rest(count_of(laws))]),
         hinge_angles=live.state.hinge_angles,
+        broken_stitches=live.state.broken_stitches,
     )
     live.adopt_checked(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
 
@@ -298,7 +299,12 @@ def _(command: commands.RemoveBody, live: LiveScene) -> None:
     owners = tets_of(live.system.laws.material)
     internal = _internal(live)[(owners < part.tets.start) | (owners >= part.tets.stop)]
     x, v, angles = live.state.positions[keep], live.state.velocities[keep], live.state.hinge_angles
-    state = State(live.state.time, x, v, internal=internal, hinge_angles=angles)
+    stitches = live.system.scene.stitching.names
+    others = ~np.isin(
+        stitches.owner, [k for k, one in enumerate(setup.scene.stitches) if part.name in (one.first, one.second)]
+    )
+    broken = np.flatnonzero(np.isin(np.flatnonzero(others), live.state.broken_stitches))
+    state = State(live.state.time, x, v, internal=internal, hinge_angles=angles, broken_stitches=broken)
     smaller = replace(
         setup,
         scene=without_body(setup.scene, part.name),

@@ -23,7 +23,7 @@ from supple.model.system import BodyRange, System, initial_state
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
-from supple.simulate import first_frame
+from supple.simulate import first_frame, prepared_after_breaks
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
@@ -233,7 +233,12 @@ class LiveScene:
         spring.begin_step(self.system, self.state, self.setup.dt, anchors)
 
     def _stepped(self) -> tuple[State, StepReport]:
-        state, report = self._frame_solver().step(self.system, self.state, self.setup.dt, self.workspace)
+        solver = self._frame_solver()
+        state, report = solver.step(self.system, self.state, self.setup.dt, self.workspace)
+        stepped = prepared_after_breaks(solver, self.system, state, report, self.workspace)
+        _, state, report, _ = stepped
+        if report.status.can_go_on:
+            self.system, _, _, self.workspace = stepped
         if self._usual is None or self._usual[0] != self.revision:
             self._usual = self.revision, report.iterations
         finite = np.isfinite(state.positions).all() and np.isfinite(state.velocities).all()
