@@ -50,8 +50,16 @@ COMMANDS = {
     "info": "supple.app.cli.commands.info:info",
     "warm": "supple.app.cli.commands.warm:warm",
 }
-for _order, (_name, _path) in enumerate(COMMANDS.items()):
-    app.command(_path, name=_name, sort_key=_order)
+
+
+def register(name: str, path: str) -> None:
+    """Make a command known by its name; path : "module:function", imported when the command is used."""
+    COMMANDS[name] = path
+    app.command(path, name=name, sort_key=list(COMMANDS).index(name))
+
+
+for _name, _path in COMMANDS.items():
+    register(_name, _path)
 
 
 def _flush(stream: TextIO | None) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.model.joints.functions import values
-from supple.model.joints.geometry import COSINE, PRODUCT, TWIST, JointGeometry
+from supple.model.joints.functions import COSINE, TWIST, turns, values
+from supple.model.joints.geometry import JointGeometry
 from supple.model.joints.laws import followed
 from supple.model.state import State
 from supple.model.system import System
@@ -87,7 +87,7 @@ def refuse_apart(geometry: JointGeometry, state: State) -> None:
             if geometry.functions[row] == COSINE:
                 here, low, high = np.arccos(np.clip(here, -1.0, 1.0)), 0.0, np.arccos(low)
             what = "its twist is" if geometry.functions[row] == TWIST else "it is at"
-            unit = "m" if geometry.functions[row] == PRODUCT else "rad"
+            unit = "rad" if geometry.functions[row] == COSINE or turns(geometry.functions)[row] else "m"
             raise SceneError(
                 f"{joint.label}: at the start {what} {here:.4g} {unit}, outside of its limits ({low:g}, {high:g}); "
                 "give limits that contain it"

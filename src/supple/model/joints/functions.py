@@ -5,16 +5,17 @@ and c = a . b + f . d; with n = s^2 + c^2 their derivatives are
 
     (c ds - s dc) / n,
     (c dds - s ddc) / n + ((s^2 - c^2) (ds dc + dc ds) + 2 s c (dc dc - ds ds)) / n^2.
+
+A further function brings its own derivatives: `FORMS["name"] = Form(2, of=derivatives_of_it)`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from supple.model.joints.geometry import ANGLE, TWIST
 
 _I = np.eye(3)
 
@@ -27,15 +28,43 @@ class Values(NamedTuple):
     hessian: NDArray[np.float64]
 
 
+class Form(NamedTuple):
+    """One of the functions.
+
+    Attributes
+    ----------
+    vectors : how many it has, of a, b, d and f; turns : whether it is an angle, within one turn
+    of : its values and derivatives at vectors (s, 4, 3); None for those above
+    """
+
+    vectors: int
+    turns: bool = False
+    of: Callable[[NDArray[np.float64]], Values] | None = None
+
+
+# By the name that `Joint.conditions` has; numbers of functions are places in it.
+FORMS: dict[str, Form] = {"angle": Form(3, True), "product": Form(2), "cosine": Form(2), "twist": Form(4, True)}
+ANGLE, PRODUCT, COSINE, TWIST = range(4)
+
+
 def values(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """(s,) of vectors (s, 4, 3), those of one function in each row."""
     c, s = _cosine_and_sine(functions, vectors)
-    return np.where(turns(functions), np.arctan2(s, c), c)
+    found = np.where(turns(functions), np.arctan2(s, c), c)
+    for rows, own in _others(functions, vectors):
+        found[rows] = own.value
+    return found
 
 
 def turns(functions: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(s,) which functions are angles, in one turn."""
-    return (functions == ANGLE) | (functions == TWIST)
+    return np.array([form.turns for form in FORMS.values()])[functions]
+
+
+def _others(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> list[tuple[NDArray[np.bool_], Values]]:
+    """Rows of functions that bring their own derivatives, and these."""
+    own = [(functions == k, form.of) for k, form in enumerate(FORMS.values()) if form.of is not None]
+    return [(rows, of(vectors[rows])) for rows, of in own if rows.any()]
 
 
 def _cosine_and_sine(
@@ -71,7 +100,11 @@ def derivatives(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> V
     turned = _scaled(s * s - c * c, twist) + _scaled(2.0 * s * c, _outer(dc, dc) - _outer(ds, ds))
     curved = _scaled(1.0 / n, bent) + _scaled(1.0 / n**2, turned)
     hessian = np.where(angle[:, None, None, None, None], curved, ddc)
-    return Values(np.where(angle, np.arctan2(s, c), c), dg, hessian)
+    found = Values(np.where(angle, np.arctan2(s, c), c), dg, hessian)
+    for rows, own in _others(functions, vectors):
+        for array, given in zip(found, own, strict=True):
+            array[rows] = given
+    return found
 
 
 def _scaled(factor: NDArray[np.float64], array: NDArray[np.float64]) -> NDArray[np.float64]:

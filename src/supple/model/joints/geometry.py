@@ -40,12 +40,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.model.joints.functions import FORMS
 from supple.model.system import System
-from supple.scene.joints.joint import FORMS, Joint
+from supple.scene.joints.joint import Joint
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
-
-ANGLE, PRODUCT, COSINE, TWIST = (FORMS.index(form) for form in ("angle", "product", "cosine", "twist"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +92,7 @@ class JointGeometry:
     stiffness : (j,) of the smaller body against strain [N/m]; masses : (j,) of the lighter one [kg]
     centers : where forces are reduced to, the joint's points
     differences : of the two sides, all of which vanish
-    functions : (s,) `ANGLE`, `PRODUCT` (a . b), `COSINE` (a . b) or `TWIST`; arguments : their vectors a, b, d and f
+    functions : (s,) places in `FORMS`; arguments : their vectors a, b, d and f
     units : (s,) changes of the functions that count as much as a motion by the joint's size
     across, along : rows of `functions` that vanish; and the one that gives each joint's coordinate, or -1
     limits : (s, 2) of the functions, infinite where there are none
@@ -141,7 +140,7 @@ class JointGeometry:
                     across.append(len(functions))
                 elif along[j] < 0:
                     along[j] = len(functions)
-                functions.append(FORMS.index(one.form))
+                functions.append(list(FORMS).index(one.form))
                 units.append(size if one.is_length else 1.0)
                 limits.append(one.limits)
                 if one.form == "cosine":  # of an angle that is at most the second limit

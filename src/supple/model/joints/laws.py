@@ -25,7 +25,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.joints.geometry import ANGLE, JointGeometry
+from supple.model.joints.functions import ANGLE
+from supple.model.joints.geometry import JointGeometry
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.motors import ForceMotor, Motor, PositionMotor, VelocityMotor
 

@@ -23,16 +23,19 @@ class Format:
 
     Attributes
     ----------
-    home : the module in this package, and its function that writes the format
+    home : the module in this package, and its function that writes the format: `write(recording, path)`, or with a
+        `Film` as the third; or the function itself
     suffixes : that a file of this format may have; none where the format is a folder
     film : of a format that is drawn, what differs from the defaults of `Film`; None of the others
     """
 
-    home: str
+    home: str | Writer
     suffixes: tuple[str, ...] = ()
     film: Mapping[str, Any] | None = None
 
     def writer(self) -> Writer:
+        if not isinstance(self.home, str):
+            return self.home
         module, _, name = self.home.partition(":")
         return getattr(import_module(f"supple.results.{module}"), name)
 

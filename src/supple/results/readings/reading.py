@@ -9,6 +9,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.scene.sensors import Sensor, Taxels
+
 _AXES = "xyz"
 Columns = dict[str, NDArray[np.float64]]
 
@@ -19,11 +21,16 @@ class Reading(ABC):
     Attributes
     ----------
     quantity : what `value` is, with its unit in brackets
-    shape : of `numbers`; of a grid, that depends on the sensor
+    shape : of `numbers`; of a grid, that depends on the sensor, see `shape_of`
     """
 
     quantity: ClassVar[str]
     shape: ClassVar[tuple[int, ...]] = ()
+
+    @classmethod
+    def shape_of(cls, sensor: Sensor) -> tuple[int, ...]:
+        """The shape of `numbers` of a sensor."""
+        return cls.shape
 
     @property
     def unit(self) -> str:
@@ -105,6 +112,11 @@ class TaxelReading(Reading):
 
     normal: NDArray[np.float64]
     shear: NDArray[np.float64]
+
+    @classmethod
+    def shape_of(cls, sensor: Sensor) -> tuple[int, ...]:
+        assert isinstance(sensor, Taxels)
+        return (*sensor.cells, 3)
 
     @property
     def value(self) -> float:
@@ -223,6 +235,7 @@ class DrivenReading(Reading):
         return found | vector_columns("displacement", way) | vector_columns("force", force)
 
 
+# By the kind of the sensor.
 READINGS: dict[str, type[Reading]] = {
     "force": ForceReading,
     "taxels": TaxelReading,

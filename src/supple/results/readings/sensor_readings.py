@@ -9,16 +9,17 @@ triangles.
 
 from __future__ import annotations
 
+from functools import singledispatch
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from supple.errors import SceneError
 from supple.model.state import ContactPoints
 from supple.model.system import BodyRange, System
 from supple.results.readings.reading import (
-    READINGS,
     AngleReading,
     DistanceReading,
     ForceReading,
@@ -30,11 +31,6 @@ from supple.scene.rigid.pose import rotation_of
 from supple.scene.sensors import AngleSensor, DistanceSensor, ForceSensor, Sensor, SurfaceSensor, Taxels
 
 
-def numbers_shape(sensor: Sensor) -> tuple[int, ...]:
-    """The shape of `numbers` of a sensor's readings."""
-    return (*sensor.cells, 3) if isinstance(sensor, Taxels) else READINGS[sensor.kind].shape
-
-
 class Touched(NamedTuple):
     """Triangles (t, 3) and the parts of the contact force at their corners, (t, 3, 3) [N]; normals : (t, 3) now."""
 
@@ -43,33 +39,74 @@ class Touched(NamedTuple):
     normals: NDArray[np.float64]
 
 
+class Felt:
+    """What sensors can feel in one state: where everything is, and the contacts.
+
+    Attributes
+    ----------
+    x : (n, 3) vertices [m]; points, rest : (k, 3) points of surfaces, and where they are at rest [m]
+    """
+
+    def __init__(self, system: System, x: NDArray[np.float64], contacts: ContactPoints | None) -> None:
+        self.system, self.x, self._contacts = system, x, contacts
+        self.points, self.rest = system.points.positions(x), system.points.positions(system.rest_positions)
+        self._touched: dict[str | None, Touched] = {}  # by the one other thing that is felt
+
+    def part(self, body: str) -> BodyRange:
+        """The rows of a body."""
+        return next(part for part in self.system.bodies if part.name == body)
+
+    def touched(self, sensor: SurfaceSensor, by: str | None = None) -> Touched:
+        """The contact forces on the triangles of a sensor; of those with one other thing, where it is given."""
+        if by not in self._touched:
+            contacts = self._contacts
+            between = contacts if by is None or contacts is None else contacts.of_pair(sensor.body, by)
+            self._touched[by] = _touched(self.system.triangles, self.points, between)
+        rows = self.part(sensor.body).triangles.start + sensor.triangles(self.system.scene.bodies)
+        return Touched(*(values[rows] for values in self._touched[by]))
+
+    def place(self, point: Point) -> NDArray[np.float64]:
+        """(3,) where a point of a body, or of the world, is [m]."""
+        name, corners, weights, offset = point_corners(point, self.system.scene.bodies, "")
+        return offset if name is None else weights @ self.x[self.part(name).vertices][corners]
+
+
 def sensor_readings(system: System, x: NDArray[np.float64], contacts: ContactPoints | None) -> dict[str, Reading]:
     """By name, what the scene's sensors feel where the vertices are at x (n, 3) [m]."""
     sensors = system.scene.sensors
-    if not sensors:
-        return {}
-    parts = {part.name: part for part in system.bodies}
-    found: dict[str, Reading] = {}
-    touched: dict[str | None, Touched] = {}  # by the one other thing that is felt
-    points, rest = system.points.positions(x), system.points.positions(system.rest_positions)
-    for sensor in sensors:
-        if isinstance(sensor, SurfaceSensor):
-            by = sensor.by if isinstance(sensor, ForceSensor) else None
-            if by not in touched:
-                between = contacts if by is None or contacts is None else contacts.of_pair(sensor.body, by)
-                touched[by] = _touched(system.triangles, points, between)
-            rows = parts[sensor.body].triangles.start + sensor.triangles(system.scene.bodies)
-            felt = touched[by]
-            own = Touched(felt.triangles[rows], felt.forces[rows], felt.normals[rows])
-            found[sensor.name] = (
-                _taxels(sensor, own, points, rest) if isinstance(sensor, Taxels) else _force(own, points)
-            )
-        elif isinstance(sensor, AngleSensor):
-            found[sensor.name] = AngleReading(_angle(sensor, parts[sensor.body], x))
-        elif isinstance(sensor, DistanceSensor):
-            first, second = (_place(point, system, x) for point in (sensor.first, sensor.second))
-            found[sensor.name] = DistanceReading(float(np.linalg.norm(second - first)))
-    return found
+    felt = Felt(system, x, contacts) if sensors else None
+    return {sensor.name: reading_of(sensor, felt) for sensor in sensors}
+
+
+@singledispatch
+def reading_of(sensor: Sensor, felt: Felt) -> Reading:
+    """What one sensor feels; a new kind registers its own, and its class of readings in `READINGS`.
+
+    Raises
+    ------
+    SceneError : where the sensor is of an unknown kind.
+    """
+    raise SceneError(f"{sensor.label}: a {type(sensor).__name__} is not a sensor that has readings")
+
+
+@reading_of.register
+def _(sensor: ForceSensor, felt: Felt) -> Reading:
+    return _force(felt.touched(sensor, sensor.by), felt.points)
+
+
+@reading_of.register
+def _(sensor: Taxels, felt: Felt) -> Reading:
+    return _taxels(sensor, felt.touched(sensor), felt.points, felt.rest)
+
+
+@reading_of.register
+def _(sensor: DistanceSensor, felt: Felt) -> Reading:
+    return DistanceReading(float(np.linalg.norm(felt.place(sensor.second) - felt.place(sensor.first))))
+
+
+@reading_of.register
+def _(sensor: AngleSensor, felt: Felt) -> Reading:
+    return AngleReading(_angle(sensor, felt.part(sensor.body), felt.x))
 
 
 def _angle(sensor: AngleSensor, part: BodyRange, x: NDArray[np.float64]) -> float:
@@ -83,14 +120,6 @@ def _angle(sensor: AngleSensor, part: BodyRange, x: NDArray[np.float64]) -> floa
     # algebra", 2015).
     *vector, scalar = turn.as_quat(canonical=True)
     return 2.0 * float(np.arctan2(np.asarray(sensor.axis) @ vector, scalar))
-
-
-def _place(point: Point, system: System, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    name, corners, weights, offset = point_corners(point, system.scene.bodies, "")
-    if name is None:
-        return offset
-    part = next(part for part in system.bodies if part.name == name)
-    return weights @ x[part.vertices][corners]
 
 
 def _touched(triangles: NDArray[np.int32], x: NDArray[np.float64], contacts: ContactPoints | None) -> Touched:

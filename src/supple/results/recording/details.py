@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from supple.model.state import SolverDetails
 from supple.results.readings.driven import driven_names
 from supple.results.readings.reading import READINGS, Columns, Reading
-from supple.results.readings.sensor_readings import numbers_shape
 from supple.results.recording.file import Series
 from supple.scene.scene import Scene
 
@@ -151,6 +150,6 @@ class RecordedSensor:
 
 def recorded_sensors(scene: Scene) -> tuple[RecordedSensor, ...]:
     """The sensors of a scene, then its obstacles and pins."""
-    given = [(sensor.name, sensor.kind, numbers_shape(sensor)) for sensor in scene.sensors]
+    given = [(sensor.name, sensor.kind, READINGS[sensor.kind].shape_of(sensor)) for sensor in scene.sensors]
     driven = [(name, "driven", READINGS["driven"].shape) for name in driven_names(scene)]
     return tuple(RecordedSensor(k, *each) for k, each in enumerate([*given, *driven]))

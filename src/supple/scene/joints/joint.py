@@ -8,6 +8,8 @@ side minus that of the second. A function of such vectors a, b, d and f has the 
     cosine    a . b, of which the coordinate is the angle arccos(a . b)
     angle     atan2(a . d, a . b), over all turns
     twist     atan2(a . d - f . b, a . b + f . d), within half a turn
+
+and further ones can be added, see `supple.model.joints.functions`.
 """
 
 from __future__ import annotations
@@ -30,7 +32,6 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 
 FREE = (-np.inf, np.inf)
-FORMS = ("angle", "product", "cosine", "twist")
 
 
 class Function(NamedTuple):
@@ -38,7 +39,7 @@ class Function(NamedTuple):
 
     Attributes
     ----------
-    form : see the module; vectors : their names, two for a product or cosine, three for an angle, four for a twist
+    form : see the module; vectors : their names, as many as the form has
     limits : of its coordinate [rad] or [m]; infinite where there are none
     vanishes : whether it is a condition and has to be zero
     """

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.joints.at_state import coordinates_at, reported
-from supple.model.joints.geometry import ANGLE, JointGeometry
+from supple.model.joints.functions import ANGLE
+from supple.model.joints.geometry import JointGeometry
 from supple.model.joints.laws import laws_of
 from supple.model.state import State, Status
 from supple.solvers.implicit.details import ImplicitDetails

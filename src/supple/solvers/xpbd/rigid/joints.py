@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.joints.at_state import coordinates_at, initial_joint_details, refuse_apart, reported
-from supple.model.joints.functions import derivatives, turns, values
-from supple.model.joints.geometry import ANGLE, JointGeometry, Vectors
+from supple.model.joints.functions import ANGLE, derivatives, turns, values
+from supple.model.joints.geometry import JointGeometry, Vectors
 from supple.model.joints.laws import Laws, laws_of, wrapped
 from supple.model.state import State
 from supple.model.system import System
