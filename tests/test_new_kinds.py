@@ -22,7 +22,7 @@ from supple.materials.by_law import ByLaw
 from supple.materials.per_tet import Law
 from supple.mesh.primitives.shape import SHAPES, shape
 from supple.model.joints.functions import FORMS, Form, Values
-from supple.model.loads.applied import UniformLoad
+from supple.model.loads.applied import AppliedLoad, Setting, UniformLoad
 from supple.model.loads.build import applied
 from supple.results.export.exporter import FORMATS, Format
 from supple.results.readings.reading import READINGS, Reading
@@ -129,7 +129,7 @@ class Thrust(OnBody):
         body_of(self.body, bodies, self.label)
 
 
-def thrust_on_vertices(load: Thrust, setting):
+def thrust_on_vertices(load: Thrust, setting: Setting) -> list[AppliedLoad]:
     body = setting.body(load.body)
     vertices = (np.arange(len(body.mesh.vertices)) + setting.begins[load.body]).astype(np.int32)
     shares = setting.masses[vertices] / setting.masses[vertices].sum()

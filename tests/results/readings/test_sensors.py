@@ -61,6 +61,15 @@ def test_force_sensors_add_up_to_the_weight(resting):
     assert np.isnan(feel["top"].center).all()
 
 
+def test_sensors_of_two_bodies_on_one_floor_feel_each_its_own():
+    bodies = [sp.Body(f"block {k}", MESH, RUBBER, position=(k, 0.0505, 0)) for k in (0, 1)]
+    sensors = [sp.ForceSensor(f"foot {k}", f"block {k}", by="floor") for k in (0, 1)]
+    scene = sp.Scene(bodies, [sp.HalfSpace(name="floor")], sensors=sensors)
+    *_, frame = sp.simulate(scene, IMPLICIT, 0.1, 10)
+    for k in (0, 1):
+        np.testing.assert_allclose(frame.sensors[f"foot {k}"].force, [0, WEIGHT, 0], atol=1e-2 * WEIGHT)
+
+
 def test_taxels_add_up_to_the_weight(resting):
     frame, _, _ = resting
     skin, half = frame.sensors["skin"], frame.sensors["half"]

@@ -50,7 +50,7 @@ class Felt:
     def __init__(self, system: System, x: NDArray[np.float64], contacts: ContactPoints | None) -> None:
         self.system, self.x, self._contacts = system, x, contacts
         self.points, self.rest = system.points.positions(x), system.points.positions(system.rest_positions)
-        self._touched: dict[str | None, Touched] = {}  # by the one other thing that is felt
+        self._touched: dict[tuple[str, str] | None, Touched] = {}  # by the pair of things whose contacts are felt
 
     def part(self, body: str) -> BodyRange:
         """The rows of a body."""
@@ -58,12 +58,14 @@ class Felt:
 
     def touched(self, sensor: SurfaceSensor, by: str | None = None) -> Touched:
         """The contact forces on the triangles of a sensor; of those with one other thing, where it is given."""
-        if by not in self._touched:
+        pair = None if by is None else (sensor.body, by)
+        if pair not in self._touched:
             contacts = self._contacts
-            between = contacts if by is None or contacts is None else contacts.of_pair(sensor.body, by)
-            self._touched[by] = _touched(self.system.triangles, self.points, between)
+            between = contacts if pair is None or contacts is None else contacts.of_pair(*pair)
+            self._touched[pair] = _touched(self.system.triangles, self.points, between)
+        felt = self._touched[pair]
         rows = self.part(sensor.body).triangles.start + sensor.triangles(self.system.scene.bodies)
-        return Touched(*(values[rows] for values in self._touched[by]))
+        return Touched(felt.triangles[rows], felt.forces[rows], felt.normals[rows])
 
     def place(self, point: Point) -> NDArray[np.float64]:
         """(3,) where a point of a body, or of the world, is [m]."""
