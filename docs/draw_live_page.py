@@ -1,10 +1,12 @@
-"""Draw the pictures of docs/live.md: `python docs/draw_live_page.py`; needs Chromium and the packages of the tests."""
+"""Draw the pictures of docs/reference/live_page.md: `python docs/draw_live_page.py`.
+
+It needs Chromium and the packages of the tests.
+"""
 
 from __future__ import annotations
 
 import io
 import shutil
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,6 @@ import supple as sp
 from supple.app.viewer.app import opened_page
 from supple.app.viewer.protocol.commands import Grab, Pause, Play, ReleaseGrab, Reset, SetParameter, SetSpeed, Step
 from supple.app.viewer.protocol.live_source import LiveSource
-from supple.mesh.primitives.surfaces import torus_surface
 
 FOLDER = Path(__file__).parent / "images"
 FLAGS = "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader"
@@ -102,37 +103,19 @@ def draw_live(tab, page) -> None:
     save(tab, "live_solver.png")
 
 
-def draw_file(tab, page) -> None:
-    """A body from a file, above the others."""
-    controller = page.content.controller
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "ring.stl"
-        torus_surface(radius=0.3, tube_radius=0.11, edge_length=0.08).save(file)
-        tab.get_by_role("tab", name="Bodies").click()
-        tab.get_by_text("Add a body").click()
-        tab.locator("input[type=file]").set_input_files(file)
-        while len(controller.snapshot.description.bodies) < 5:
-            tab.wait_for_timeout(100)
-    controller.simulation.send(Step(18))
-    tab.get_by_role("button", name="From a file").scroll_into_view_if_needed()
-    tab.wait_for_timeout(6000)
-    save(tab, "live_file.png")
-
-
 def main() -> None:
     """All pictures."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS.split())
-        for draw in (draw_live, draw_file):
-            with opened_page(scene(), 0) as page:
-                tab = browser.new_page(viewport=SIZE)
-                tab.set_default_timeout(120_000)
-                tab.goto(page.url)
-                tab.wait_for_selector("canvas")
-                tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
-                tab.wait_for_timeout(3000)
-                draw(tab, page)
-                tab.close()
+        with opened_page(scene(), 0) as page:
+            tab = browser.new_page(viewport=SIZE)
+            tab.set_default_timeout(120_000)
+            tab.goto(page.url)
+            tab.wait_for_selector("canvas")
+            tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
+            tab.wait_for_timeout(3000)
+            draw_live(tab, page)
+            tab.close()
         browser.close()
 
 

@@ -1,4 +1,4 @@
-"""The page of a recording, which `tests/app/viewer/page/test_replay.py` plays in a browser."""
+"""The page of a recording, which `tests/app/viewer/page/test_recorded_page.py` plays in a browser."""
 
 from __future__ import annotations
 

@@ -195,10 +195,6 @@ CASES = {
     "steps that are no number": ({"s.yaml": scene()}, ["run", "s.yaml", "--steps", "many"]),
     "negative steps": ({"s.yaml": scene()}, ["run", "s.yaml", "--steps", "-3"]),
     "more steps than a scene file may have": ({"s.yaml": scene()}, ["run", "s.yaml", "--steps", "9" * 30]),
-    "a trace onto a folder": (
-        {"s.yaml": scene(top="solver: {kind: implicit}\nsteps: 1\n"), "t/x": b""},
-        ["run", "s.yaml", "--trace", "t"],
-    ),
     "a new scene of a name that is not in UTF-8": ({}, ["new", "\udcff.yaml"]),
     "a surface of a name that is not in UTF-8": ({}, ["new", "s.yaml", "--surface", "\udcff.stl"]),
     "a scene of a name that is not in UTF-8": ({}, ["run", "\udcff.yaml"]),

@@ -39,7 +39,6 @@ def contents(place):
         ["check", "r.vtkhdf", "--json", "r.vtkhdf"],
         ["export", "r.vtkhdf", "--to", "vtkhdf", "-o", "r.vtkhdf"],
         ["plot", "r.vtkhdf", "-o", "link.svg"],
-        ["run", "scene.yaml", "-o", "out", "--trace", "scene.yaml"],
         ["mesh", "cube.vtk", "-o", "cube.vtk"],
     ],
     ids=lambda arguments: arguments[0],

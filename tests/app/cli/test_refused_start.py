@@ -29,19 +29,17 @@ def _contents(folder):
 def good_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "good.yaml").write_text(_text(["{name: first, position: [0, 0.6, 0], " + CUBE + "}"]))
-    assert main(["run", "good.yaml", "-o", "out", "-q", "--trace", "out/newton.csv"]) == ExitCode.OK
+    assert main(["run", "good.yaml", "-o", "out", "-q"]) == ExitCode.OK
     return tmp_path
 
 
 def test_the_files_of_an_earlier_run_stay_as_they_are(good_run, capfd):
     before = _contents(good_run / "out")
-    assert set(before) > {"recording.vtkhdf", "index.html", "plot.png", "newton.csv", "run.json", "00000002.checkpoint"}
+    assert set(before) > {"recording.vtkhdf", "index.html", "plot.png", "run.json", "00000002.checkpoint"}
     for name, second in REFUSED.items():
         (good_run / "bad.yaml").write_text(_text(["{name: first, position: [0, 0.6, 0], " + CUBE + "}", second]))
         capfd.readouterr()
-        assert main(["run", "bad.yaml", "-o", "out", "--overwrite", "--trace", "out/newton.csv"]) == ExitCode.INPUT, (
-            name
-        )
+        assert main(["run", "bad.yaml", "-o", "out", "--overwrite"]) == ExitCode.INPUT, name
         out, err = capfd.readouterr()
         assert out == ""
         assert err.startswith("supple: ")

@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import urllib.request
+from itertools import pairwise
 from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
@@ -31,13 +32,20 @@ dt: 0.01
 """
 
 
+class Calls(list):
+    """What was served; and how the last one is read again."""
+
+    again = None
+
+
 @pytest.fixture
 def served(monkeypatch):
     """The arguments of `serve`."""
-    calls = []
+    calls = Calls()
 
-    def serve(source, port, *, open_browser):
+    def serve(source, port, *, open_browser, again):
         calls.append((source, port, open_browser))
+        calls.again = again
 
     monkeypatch.setattr("supple.app.viewer.app.serve", serve)
     return calls
@@ -86,12 +94,52 @@ def test_a_browser_gets_the_address_from_a_file_of_this_user_alone(monkeypatch):
     assert not path.exists()
 
 
-def test_a_recording_is_found_by_its_file_or_folder(tmp_path, served):
-    (tmp_path / "recording.vtkhdf").write_bytes(b"")
-    for path in (tmp_path, tmp_path / "recording.vtkhdf"):
-        assert main(["view", str(path)]) == ExitCode.OK
-        assert served[-1][0] == tmp_path / "recording.vtkhdf"
-    assert main(["view", str(tmp_path), "--solver", "xpbd"]) == ExitCode.INPUT
+def test_the_page_of_a_recording_is_written_beside_it_and_opened(tmp_path, served, monkeypatch, capsys):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    path, page = tmp_path / "recording.vtkhdf", tmp_path / "recording.html"
+    scene = sp.Scene(
+        [sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))]
+    )
+    for _ in sp.simulate(scene, sp.XPBD(substeps=2), 0.01, 2, sinks=[sp.Recorder(path)]):
+        pass
+    for given in (tmp_path, path):
+        page.unlink(missing_ok=True)
+        assert main(["view", str(given)]) == ExitCode.OK
+        assert "<title>cube" in page.read_text(encoding="utf-8")
+        assert opened.pop() == page.as_uri()
+        assert capsys.readouterr().out == f"{page}\n"
+    assert main(["view", str(path), "--no-open"]) == ExitCode.OK
+    for more in (["--solver", "xpbd"], ["--port", "0"], ["--full"], [str(path)]):
+        assert main(["view", str(path), *more]) == ExitCode.INPUT
+    assert served == opened == []
+
+
+def test_several_surfaces_stand_in_a_row_in_one_unit(tmp_path, served):
+    """The larger one is in millimetres, as its size tells; so is the smaller one."""
+    files = [tmp_path / "a.stl", tmp_path / "b.stl", tmp_path / "more" / "a.stl"]
+    files[2].parent.mkdir()
+    for path, size in zip(files, (6.0, 20.0, 6.0), strict=True):
+        sp.shapes.box_surface((size, size, size), (1, 1, 1)).save(path)
+    assert main(["view", *map(str, files), "--no-open"]) == ExitCode.OK
+    scene = served[0][0].scene
+    assert [body.name for body in scene.bodies] == ["a", "b", "a 2"]
+    placed = [body.place(body.mesh.vertices) for body in scene.bodies]
+    for x, size in zip(placed, (0.006, 0.02, 0.006), strict=True):
+        assert np.ptp(x, axis=0) == pytest.approx([size] * 3, rel=1e-6)
+        assert x[:, 1].min() > 0.0
+    assert all(a[:, 0].max() < b[:, 0].min() for a, b in pairwise(placed))
+    assert served[0][0].title == "a, b, a"
+
+
+def test_reload_reads_the_scene_file_again(scene, served):
+    assert main(["view", str(scene)]) == ExitCode.OK
+    scene.write_text(SCENE.replace("name: cube", "name: block"))
+    again = served.again()
+    assert [body.name for body in again.scene.bodies] == ["block"]
+    scene.write_text("bodies: [")
+    with pytest.raises(sp.SceneError, match=r"cube.yaml"):
+        served.again()
 
 
 def test_a_live_demo_is_served_and_not_recorded(tmp_path, monkeypatch, served):
@@ -137,6 +185,7 @@ def test_errors_are_one_line(tmp_path, scene, served, capfd):
         ["view", str(outside)],
         ["view", str(scene), "--port", "70000"],
         ["view", str(scene), "--port", "http"],
+        ["view", str(scene), str(scene)],
         ["demo", "teapot", "--live"],
     ):
         assert main(arguments) == ExitCode.INPUT, arguments

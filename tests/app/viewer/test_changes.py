@@ -13,9 +13,7 @@ from supple.app.viewer.engine.scene.new_bodies import unused_name
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import (
     AddBody,
-    AddMesh,
     CopyBody,
-    MovePusher,
     Pin,
     ReleaseGrab,
     RemoveBody,
@@ -115,7 +113,6 @@ class TestSolvers:
             SetParameter("youngs", 2e5),
             SetParameter("substeps", 5),
             SetParameter("dt", 0.01),
-            MovePusher((3, 3, 3), 0.1),
             Pin("cube", 1),
             Unpin(),
         ):
@@ -184,26 +181,6 @@ class TestBodies:
             assert np.array_equal(live.body_positions(name), before)
         assert describe(live).bodies[-1].added
         run(live, 2)
-
-    def test_a_given_mesh_is_placed_above_the_others(self, live):
-        mesh = sp.shapes.box((0.3, 0.2, 0.1), (2, 2, 2))
-        top = live.state.positions[:, 1].max()
-        for k in (1, 2):
-            change(AddMesh(mesh.vertices, mesh.tets, youngs=3e5, name="mine"), live)
-            body = live.setup.scene.bodies[-1]
-            assert (body.name, body.material.youngs) == (f"mine {k}", 3e5)
-            placed = live.body_positions(body.name)
-            assert np.ptp(placed, axis=0) == pytest.approx([0.3, 0.2, 0.1])
-            assert placed[:, 1].min() > top
-            top = placed[:, 1].max()
-        run(live, 2)
-        count = len(live.system.tets)
-        with pytest.raises(SuppleError, match=r"flat|volume"):
-            change(AddMesh(np.zeros((4, 3)), np.array([[0, 1, 2, 3]], dtype=np.int32)), live)
-        assert len(live.system.tets) == count
-        change(RemoveBody("mine 1"), live)
-        change(Reset(), live)
-        assert [body.name for body in live.setup.scene.bodies] == ["cube", "block", "mine 2"]
 
     def test_copy_and_removal_do_not_change_other_bodies(self, live):
         run(live, 5)
@@ -298,7 +275,6 @@ def test_reset_keeps_added_bodies_and_parameters(live):
     start = live.state.positions.copy()
     change(SetParameter("youngs", 5e4, "cube"), live)
     change(corner_grab((0, 2, 0)), live)
-    change(MovePusher((3, 3, 3), 0.1), live)
     change(Pin("cube", 3), live)
     change(AddBody("sphere", resolution=4, position=(0, 4, 0)), live)
     added = live.body_positions("sphere 1").copy()
@@ -310,7 +286,6 @@ def test_reset_keeps_added_bodies_and_parameters(live):
     assert np.array_equal(live.body_positions("sphere 1"), added)
     assert describe(live).body("cube").values["youngs"] == 5e4
     assert not live.setup.grabs
-    assert live.setup.pusher is None
     run(live, 2)
 
 

@@ -4,7 +4,7 @@ import threading
 import time
 
 from supple.app.viewer.protocol.command_queue import CommandQueue
-from supple.app.viewer.protocol.commands import Grab, MoveGrab, MovePusher, Pause, Play, ReleaseGrab, SetParameter, Step
+from supple.app.viewer.protocol.commands import Grab, MoveGrab, Pause, Play, ReleaseGrab, SetParameter, SetSpeed, Step
 
 
 def drained(*commands, capacity=100):
@@ -57,13 +57,13 @@ def test_no_play_pause_or_step_is_merged():
 def test_commands_beyond_the_capacity_are_dropped_and_moves_are_merged():
     queue = CommandQueue(capacity=5)
     assert all(queue.put(k, Step()) for k in range(4))
-    assert queue.put(4, MovePusher((0, 0, 0), 0.1))
+    assert queue.put(4, SetSpeed(0.5))
     assert not queue.put(5, Play())
-    assert queue.put(6, MovePusher((1, 0, 0), 0.1))
+    assert queue.put(6, SetSpeed(0.25))
     assert queue.dropped == 1
     taken = queue.take(0.0)
     assert len(taken) == 5
-    assert taken[-1] == (6, MovePusher((1, 0, 0), 0.1))
+    assert taken[-1] == (6, SetSpeed(0.25))
 
 
 def test_the_release_of_a_grab_is_never_dropped():

@@ -31,7 +31,7 @@ from supple.app.viewer.protocol.live_source import LiveSource
 from supple.app.viewer.protocol.outbox import DESCRIPTION, SNAPSHOT, Outbox
 from supple.errors import CommandError, SceneError, SolverError
 
-from .conftest import small_source
+from .conftest import free_source, small_source
 
 TIMEOUT = 60.0
 
@@ -203,6 +203,29 @@ def test_a_killed_process_is_reported_and_nothing_blocks(fresh):
     assert (first.frame, first.paused) == (0, True)
     number = fresh.send(Step(2))
     assert until(fresh, lambda s: s.frame == 2, "2 steps").applied == number
+
+
+def test_a_source_is_read_again_and_what_runs_goes_on_where_that_fails():
+    first, second = small_source(), free_source()
+    with Engine(first, again=lambda: second) as engine:
+        engine.send(Step(2))
+        number = engine.send(SetParameter("youngs", 2e5))
+        engine.wait_for(number, TIMEOUT)
+        engine.reload()
+        assert engine.starts == 2
+        assert [body.name for body in engine.description.bodies] == [body.name for body in second.scene.bodies]
+        assert engine.latest().frame == 0
+        assert engine.latest().applied == number, "no input of the page waits for a command of the first one"
+        engine.wait_for(engine.send(Step(1)), TIMEOUT)
+
+        def broken():
+            raise SceneError("scene.yaml:3: wrong")
+
+        engine.again = broken
+        with pytest.raises(SceneError, match="wrong"):
+            engine.reload()
+        assert engine.alive
+        engine.wait_for(engine.send(Step(1)), TIMEOUT)
 
 
 def test_a_process_that_reads_an_unguarded_program_ends_at_once(monkeypatch):

@@ -1,4 +1,4 @@
-"""Effects of grab, pin, pusher and squash on a live scene, checked on the state of the simulation."""
+"""Effects of grab, pin and squash on a live scene, checked on the state of the simulation."""
 
 import dataclasses
 
@@ -13,10 +13,8 @@ from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import (
     Grab,
     MoveGrab,
-    MovePusher,
     Pin,
     ReleaseGrab,
-    RemovePusher,
     Reset,
     SetParameter,
     Squash,
@@ -162,35 +160,6 @@ class TestPins:
         assert len(live.system.pinned_vertices) == len(before) + 2
         change(Unpin(), live)
         assert live.system.pinned_vertices.tolist() == before
-
-
-class TestPusher:
-    def test_it_pushes_a_body_without_passing_through(self):
-        live = LiveScene(free_source())
-        change(MovePusher((-0.6, 0.0, 0.0), 0.2), live)
-        for k in range(60):
-            change(MovePusher((-0.6 + 0.02 * k, 0.0, 0.0), 0.2), live)
-            run(live, 1)
-        center = live.setup.pusher.center
-        assert center[0] == pytest.approx(0.58, abs=0.05)
-        assert live.system.masses @ live.state.positions[:, 0] > 0.3 * live.system.masses.sum()
-        distance = np.linalg.norm(live.state.positions - center, axis=1)
-        assert distance.min() > 0.2 - 0.02
-
-    def test_its_motion_in_one_step_is_limited(self):
-        live = LiveScene(free_source())
-        change(MovePusher((-5.0, 0.0, 0.0), 0.2), live)
-        change(MovePusher((5.0, 0.0, 0.0), 0.2), live)
-        run(live, 1)
-        assert live.setup.pusher.center == pytest.approx([-4.95, 0.0, 0.0])
-
-    def test_it_can_be_removed(self, live):
-        change(MovePusher((0.0, 2.0, 0.0), 0.2), live)
-        assert [obstacle.name for obstacle in live.system.obstacles] == ["floor", "pusher"]
-        generation = live.generation
-        change(RemovePusher(), live)
-        assert [obstacle.name for obstacle in live.system.obstacles] == ["floor"]
-        assert live.generation == generation + 1
 
 
 class TestSquash:

@@ -54,21 +54,19 @@ def test_pictures_do_not_change_the_bits(eager):
 def test_a_picture_within_a_step_shows_what_has_moved_by_then(eager):
     eager.execute(corner_grab((0.4, 1.0, 0.2)))
     eager.execute(commands.SetView(velocities=True))
-    eager.execute(commands.MovePusher((5.0, 5.0, 5.0), 0.1))
+    eager.execute(commands.AddBody("box", size=0.1, resolution=3))
     eager.step()
-    assert not eager.outbox.snapshots  # the page does not know the pusher yet
+    assert not eager.outbox.snapshots  # the page does not know the box yet
     eager.publish(0.0)
-    eager.execute(commands.MovePusher((5.0, 4.0, 5.0), 0.1))
     eager.outbox.snapshots.clear()
     eager.inbox.put(9, commands.MoveGrab(7, (0.5, 1.1, 0.2)))
     eager.step()
     pictures = eager.outbox.snapshots
-    heights = [picture.pusher[0][1] for picture in pictures]
+    heights = [picture.positions[-1, 1] for picture in pictures]
     assert np.all(np.diff(heights) < 0.0)
     for picture in pictures:
         assert (picture.grabs[0].target, picture.applied) == ((0.5, 1.1, 0.2), 9)
         assert picture.grabs[0].point == pytest.approx(picture.positions[0])
-        assert picture.obstacle_poses[1][-1] == pytest.approx(picture.pusher[0])
         assert picture.velocities.shape == picture.positions.shape
 
 

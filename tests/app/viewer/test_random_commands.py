@@ -66,8 +66,6 @@ def random_command(rng, bodies, solvers=("xpbd",)):
             lambda: commands.Pin(body, rng.randint(0, 80)),
             lambda: commands.Unpin(body, rng.randint(0, 80)),
             lambda: commands.Unpin(),
-            lambda: commands.MovePusher(point, size),
-            lambda: commands.RemovePusher(),
             lambda: commands.Squash(rng.uniform(limits.FLATTEST, limits.TALLEST)),
             lambda: commands.AddBody(rng.choice(limits.SHAPES), size, rng.randint(3, 4), rng.choice([None, point])),
             lambda: commands.CopyBody(body),

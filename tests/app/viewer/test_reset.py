@@ -5,7 +5,7 @@ import pytest
 
 from supple.app.viewer.engine.scene.changes import change
 from supple.app.viewer.engine.scene.live_scene import LiveScene
-from supple.app.viewer.protocol.commands import MovePusher, Pin, RemoveBody, Reset, SetParameter, Squash, Unpin
+from supple.app.viewer.protocol.commands import Pin, RemoveBody, Reset, SetParameter, Squash, Unpin
 from supple.errors import SolverError
 from supple.runtime.interruption import interruptible
 
@@ -28,7 +28,6 @@ def test_after_a_reset_a_scene_does_the_same_bit_for_bit(live):
         lambda: change(corner_grab((0.3, 1.2, 0.1)), live),
         lambda: change(Pin("cube", 3), live),
         lambda: change(Unpin(), live),
-        lambda: change(MovePusher((0.0, 0.9, 0.0), 0.1), live),
         lambda: change(Squash(0.5), live),
     ):
         disturb()
@@ -38,7 +37,6 @@ def test_after_a_reset_a_scene_does_the_same_bit_for_bit(live):
         assert live.state.time == 0.0
         assert not (live.setup.grabs)
         assert not (live.setup.page_pins)
-        assert not (live.setup.pusher)
     assert same_bits(state_after(live, 12), expected)
 
 

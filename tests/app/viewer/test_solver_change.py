@@ -8,12 +8,12 @@ import pytest
 import supple as sp
 from supple.app.viewer.engine.describe import describe, measures
 from supple.app.viewer.engine.scene.changes import change
+from supple.app.viewer.engine.scene.clearance import moved_out, signed_distance
 from supple.app.viewer.engine.scene.live_scene import LiveScene
-from supple.app.viewer.engine.scene.pusher import moved_out, signed_distance
-from supple.app.viewer.protocol.commands import MovePusher, SetSolver
+from supple.app.viewer.protocol.commands import SetSolver
 from supple.errors import SuppleError
 
-from .conftest import free_source, run, small_source
+from .conftest import run, small_source
 
 
 class TestSolverChange:
@@ -60,14 +60,6 @@ class TestSolverChange:
         assert np.array_equal(live.state.positions, x)
         live.step()
         assert live.frame == 1
-
-    def test_a_pusher_inside_a_body_is_refused(self):
-        live = LiveScene(free_source())
-        change(SetSolver("implicit"), live)
-        with pytest.raises(SuppleError):
-            change(MovePusher((0.0, 0.0, 0.0), 0.25), live)
-        assert live.setup.pusher is None
-        run(live, 1)
 
 
 @pytest.mark.parametrize(

@@ -102,3 +102,17 @@ def recording_at(path: Path) -> Path:
     if path.is_dir() and not inside.exists():
         raise OutputError(f"{path} is a folder without recording.vtkhdf; name a recording, or the folder of a run")
     return inside if path.is_dir() else path
+
+
+def exported(run: Path, to: str, output: Path | None, in_folder: str | None = None, **film: Any) -> Path:
+    """Export a recording, or that of the folder of a run; the path of what was written.
+
+    Parameters
+    ----------
+    in_folder : the name of the output in the folder of a run, where no output is given; see `export` otherwise
+    """
+    from supple.results.export.exporter import export
+
+    if output is None and in_folder is not None and run.is_dir():
+        output = run / in_folder
+    return export(recording_at(run), to, output, **film)

@@ -98,13 +98,14 @@ def load_scene(path: str | Path, *, confine: bool = False) -> Scene:
     return run.scene
 
 
-def load_run(path: str | Path, *, confine: bool = False) -> Run:
+def load_run(path: str | Path, *, confine: bool = False, scale: float | None = None) -> Run:
     """The scene of a scene file, with its solver, timing and start.
 
     Parameters
     ----------
     path : of the scene file (YAML), of a robot (URDF), or of a surface, which becomes a body above a floor.
     confine : as of `load_scene`
+    scale : factor of the coordinates of a surface; see `scene_of_surface`
 
     Raises
     ------
@@ -116,7 +117,7 @@ def load_run(path: str | Path, *, confine: bool = False) -> Run:
         if pairs := overlaps(_run(path, document, store).scene):
             document = document.with_pairs(pairs)
     else:
-        document = (read_surface_scene if suffix in MESH_FILES else read_yaml)(path)
+        document = read_surface_scene(path, scale) if suffix in MESH_FILES else read_yaml(path)
     return _run(path, document, store)
 
 

@@ -151,15 +151,16 @@ def _text(name: str, entry: str, **values: str) -> str:
 logger = logging.getLogger(__name__)
 
 
-def read_surface_scene(path: str | Path) -> YamlDocument:
-    """The scene of a file of a surface or of tets, as if a scene file beside it described it.
+def read_surface_scene(path: str | Path, scale: float | None = None) -> YamlDocument:
+    """The scene of a file of a surface or of tets, as if a scene file beside it described it; `scale` as of
+    `scene_of_surface`.
 
     Raises
     ------
     MeshError : where the file cannot be read.
     """
     path = Path(path)
-    text, chosen = scene_of_surface(path, path.name, f"{path.stem}.yaml")
+    text, chosen = scene_of_surface(path, path.name, f"{path.stem}.yaml", scale)
     logger.info("%s; to change it: supple new --surface %s", chosen, path)
     return parse_yaml(text, path)
 

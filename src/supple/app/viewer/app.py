@@ -1,14 +1,13 @@
-"""The page: a server that displays a live simulation, or a recording, in browsers of this machine."""
+"""The page: a server that displays a live simulation in browsers of this machine."""
 
 from __future__ import annotations
 
 import html
 import threading
 import webbrowser
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,8 +16,6 @@ from supple.app.viewer.controls.view.overlay import set_theme
 from supple.app.viewer.engine.engine import Engine
 from supple.app.viewer.live_page import LivePage
 from supple.app.viewer.protocol.live_source import LiveSource
-from supple.app.viewer.replay import Replay
-from supple.results.recording.reader import read_recording
 from supple.results.view.gate import new_token
 from supple.results.view.server import gated_server, require_free_port
 
@@ -37,55 +34,52 @@ class OpenPage:
 
     url: str
     server: Any
-    content: LivePage | Replay
+    content: LivePage
 
 
 @contextmanager
-def opened_page(source: LiveSource | str | Path, port: int | None = None) -> Iterator[OpenPage]:
-    """Serve a live scene, or the recording at a path, within a block.
+def opened_page(
+    source: LiveSource, port: int | None = None, again: Callable[[], LiveSource] | None = None
+) -> Iterator[OpenPage]:
+    """Serve a live scene within a block.
 
     Parameters
     ----------
     port : 0 takes any free port; None takes 8080, or the next free one
+    again : reads the source again, for the button *Reload*; without it, there is no such button
 
     Raises
     ------
-    SceneError, SolverError, OutputError : where the source cannot be simulated or read, or the port is not free.
+    SceneError, SolverError, OutputError : where the source cannot be simulated, or the port is not free.
     """
     if port is not None:
         require_free_port(port)
     with ExitStack() as ends:
-        if isinstance(source, LiveSource):
-            engine = ends.enter_context(Engine(source))
-            first = engine.latest()
-            assert first is not None  # the constructor of the engine waits for it
-            draw = partial(LivePage, simulation=engine, first=first)
-        else:
-            draw = partial(Replay, recording=ends.enter_context(read_recording(source)))
+        engine = ends.enter_context(Engine(source, again))
+        first = engine.latest()
+        assert first is not None  # the constructor of the engine waits for it
         token = new_token()
         server = ends.enter_context(gated_server(token, DEFAULT_PORT if port is None else port))
-        configure_page(server, title_of(source))
-        content = draw(server)
+        configure_page(server, source.title)
+        content = LivePage(server, engine, first)
         ends.callback(content.stop)
         yield OpenPage(f"http://localhost:{server.get_port()}/?token={token}", server, content)
 
 
-def title_of(source: LiveSource | str | Path) -> str:
-    """The title of the page: that of a live scene, or the name of a recording or of its folder."""
-    if isinstance(source, LiveSource):
-        return source.title
-    path = Path(source).resolve()
-    return path.name if path.is_dir() or path.stem != "recording" else path.parent.name
-
-
-def serve(source: LiveSource | str | Path, port: int | None = None, *, open_browser: bool = True) -> None:
-    """Serve a live scene, or the recording at a path, until interrupted.
+def serve(
+    source: LiveSource,
+    port: int | None = None,
+    *,
+    open_browser: bool = True,
+    again: Callable[[], LiveSource] | None = None,
+) -> None:
+    """Serve a live scene until interrupted; see `opened_page`.
 
     Raises
     ------
     SceneError, SolverError, OutputError : see `opened_page`.
     """
-    with opened_page(source, port) as page:
+    with opened_page(source, port, again) as page:
         print(f"{page.url}  (press Ctrl+C to end)", flush=True)
         with browser_at(page.url) if open_browser else nullcontext(), suppress(KeyboardInterrupt):
             threading.Event().wait()

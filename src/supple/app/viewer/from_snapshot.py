@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.protocol.snapshots import PUSHER, RIGID, BodyDescription, SceneDescription, Snapshot
+from supple.app.viewer.protocol.snapshots import RIGID, BodyDescription, SceneDescription, Snapshot
 from supple.mesh.skin import Embedding
 from supple.mesh.tetmesh import TetMesh
-from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
+from supple.results.recording.scene import SkinnedSurface
 from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.model import Model, ModelBody, Moment
 
@@ -22,24 +22,18 @@ class MomentBuilder:
     def __init__(self) -> None:
         self._generation: int | None = None
         self._model: Model | None = None
-        self._key: tuple[Any, ...] = ()
         self._skins: dict[tuple[int, int], SkinnedSurface] = {}
 
     def moment(self, snapshot: Snapshot) -> Moment:
         """The moment of a snapshot."""
         if self._model is None or snapshot.description.generation != self._generation:
             self._generation = snapshot.description.generation
-            # The pusher also changes the generation, but a new model would interrupt a drag.
-            key = _model_key(snapshot.description)
-            if self._model is None or key != self._key:
-                self._model, self._key = self._model_of(snapshot.description), key
+            self._model = self._model_of(snapshot.description)
         rotations, translations = snapshot.obstacle_poses
         poses = np.concatenate([rotations.reshape(-1, 3, 3), translations.reshape(-1, 3, 1)], axis=2)
-        poses = poses[: len(self._model.obstacles)]
         values = {}
         if snapshot.tet_values is not None and snapshot.tet_quantity is not None:
             values[snapshot.tet_quantity] = snapshot.tet_values
-        pusher = snapshot.pusher
         return Moment(
             self._model,
             snapshot.time,
@@ -50,7 +44,6 @@ class MomentBuilder:
             contact_forces=snapshot.contact_forces,
             pinned=snapshot.pinned.astype(np.int64),
             springs={grab.grab: (np.array(grab.point), np.array(grab.target)) for grab in snapshot.grabs},
-            pusher=None if pusher is None else (np.array(pusher[0]), pusher[1]),
             tet_values=values,
             broken_stitches=snapshot.broken_stitches,
         )
@@ -73,10 +66,10 @@ class MomentBuilder:
         tets = np.concatenate([body.nodes[:, :4] + body.vertices.start for body in scene.bodies])
         return Model(
             bodies,
-            _scene_obstacles(scene),
+            scene.obstacles,
             np.concatenate([body.rest_positions for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
-            view_of_scene(box_corners(scene.low, scene.high), np.asarray(scene.up), _scene_obstacles(scene)),
+            view_of_scene(box_corners(scene.low, scene.high), np.asarray(scene.up), scene.obstacles),
             scene.stitches,
             joints=scene.joints,
         )
@@ -91,23 +84,6 @@ class MomentBuilder:
             held = Embedding.of(TetMesh(body.rest_positions, body.nodes), vertices)
             self._skins[key] = SkinnedSurface(held.corners, held.weights, np.asarray(triangles, dtype=np.int32))
         return self._skins[key]
-
-
-def _scene_obstacles(scene: SceneDescription) -> tuple[RecordedObstacle, ...]:
-    """The obstacles without the pusher, which is the last one and has its own layer."""
-    some = scene.obstacles
-    return some[:-1] if some and some[-1].name == PUSHER else some
-
-
-def _model_key(scene: SceneDescription) -> tuple[Any, ...]:
-    """A key that is equal for scenes with the same things to draw, apart from their positions."""
-    bodies = ((b.name, _fingerprint(b.rest_positions), _fingerprint(b.nodes), b.skin is None) for b in scene.bodies)
-    return (
-        *bodies,
-        *((o.name, o.kind) for o in _scene_obstacles(scene)),
-        _fingerprint(scene.stitches.nodes),
-        len(scene.joints),
-    )
 
 
 def _fingerprint(values: NDArray[Any]) -> int:

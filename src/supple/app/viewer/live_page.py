@@ -38,7 +38,7 @@ class LivePage:
     def __init__(self, server: Any, simulation: Simulation, first: Snapshot) -> None:
         self._simulation = simulation
         self._moment_builder = MomentBuilder()
-        self._displayed, self._ended = first, False
+        self._displayed, self._starts = first, simulation.starts
         self._server, self._watched, self._seen_at = server, True, time.monotonic()
         self.controller = Controller(simulation, first)
         self.panel = Panel(server, self.controller)
@@ -53,7 +53,6 @@ class LivePage:
     def stop(self) -> None:
         """End the thread that draws."""
         self._end.set()
-        self.panel.stop()
         self._thread.join()
 
     def _run(self) -> None:
@@ -84,10 +83,10 @@ class LivePage:
         error = self._simulation.error
         if error is not None:
             self.panel.time.show_error(error)
-        elif self._ended:  # it was started again, and does not know what to send
-            self.panel.time.restarted()
-            self.panel.request_view(self.stage.options)
-        self._ended = error is not None
+        elif self._simulation.starts != self._starts:
+            self._starts = self._simulation.starts
+            self._moment_builder = MomentBuilder()
+            self.panel.restarted()
         snapshot = self._simulation.latest()
         if snapshot is None or snapshot is self._displayed:
             if error is None:

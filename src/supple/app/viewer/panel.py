@@ -11,7 +11,6 @@ from supple.app.viewer.controls.measures import Measures, Sensors
 from supple.app.viewer.controls.mouse import Mouse, MouseControls
 from supple.app.viewer.controls.solver_controls import SolverControls
 from supple.app.viewer.controls.time_controls import TimeControls
-from supple.app.viewer.controls.upload_controls import UploadControls
 from supple.app.viewer.controls.view.overlay import Overlay
 from supple.app.viewer.controls.view.record_controls import RecordControls
 from supple.app.viewer.controls.view.view_controls import ViewControls, add_keys
@@ -23,8 +22,6 @@ from supple.results.view.stage import Stage
 
 _NUMBERS_EVERY = 0.15  # [s]; numbers that change faster cannot be read
 _PLOTS_EVERY = 0.5  # [s]
-# Positions of sliders with a unit: their values are texts below them.
-NO_NUMBERS = ".mantine-Slider-root + .mantine-NumberInput-root { display: none; }"
 TABS = ("Bodies", "View", "Solver")
 
 
@@ -39,12 +36,12 @@ class Panel:
     def __init__(self, server: Any, controller: Controller) -> None:
         self._server, self._controller = server, controller
         gui, snapshot = server.gui, controller.snapshot
-        self.overlay = Overlay(gui, NO_NUMBERS)
+        self.overlay = Overlay(gui)
         self.time = TimeControls(gui, controller, self.overlay)
         tabs = gui.add_tab_group()
         self._bodies_tab, self._view_tab, self._solver_tab = (tabs.add_tab(name) for name in TABS)
         with self._bodies_tab:
-            self.mouse_controls = MouseControls(gui, controller, lambda: self.mouse.switch())
+            self.mouse_controls = MouseControls(gui, controller)
         self.mouse = Mouse(server, controller, self.mouse_controls)
         self.stage: Stage | None = None
         self._numbers_at = self._plots_at = 0.0
@@ -57,9 +54,7 @@ class Panel:
         self.stage = stage
         gui = self._server.gui
         with self._bodies_tab:
-            self.bodies = bodies = BodyControls(gui, self._controller)
-            with bodies.new:
-                self.upload = UploadControls(gui, self._controller, bodies.new_size, bodies.new_youngs)
+            self.bodies = BodyControls(gui, self._controller)
         with self._view_tab:
             self.views = ViewControls(self._server, stage, self.overlay, self.request_view)
             self.record = RecordControls(self._server, stage)
@@ -81,9 +76,12 @@ class Panel:
         self.show(self._controller.snapshot)
         self.refresh()
 
-    def stop(self) -> None:
-        """End its threads."""
-        self.upload.stop()
+    def restarted(self) -> None:
+        """The simulation was started again: it does not know what to send, and its notices are new."""
+        self.time.restarted()
+        self._last_notice = 0
+        assert self.stage is not None
+        self.request_view(self.stage.options)
 
     def show(self, snapshot: Snapshot) -> None:
         """Store a snapshot; `refresh` displays it."""

@@ -17,8 +17,7 @@ from urllib.parse import parse_qs, urlsplit
 logger = logging.getLogger(__name__)
 
 _HOSTS = ("localhost", "127.0.0.1", "::1")
-# A message of a browser, of which pictures are the largest; the parts of one file together [bytes].
-LARGEST_MESSAGE, LARGEST_FILE = 32 * 2**20, 256 * 2**20
+LARGEST_MESSAGE = 32 * 2**20  # of a browser, of which pictures are the largest [bytes]
 _HEADERS = {
     "Referrer-Policy": "no-referrer",  # the address contains the token
     "X-Content-Type-Options": "nosniff",
@@ -26,7 +25,7 @@ _HEADERS = {
     "Content-Security-Policy": "frame-ancestors 'none'",
     "X-Frame-Options": "DENY",
 }
-_TOO_BIG, _ERROR = 1009, 1011  # for closing a connection, RFC 6455 section 7.4.1
+_NOT_ALLOWED, _ERROR = 1008, 1011  # for closing a connection, RFC 6455 section 7.4.1
 
 Handler = Callable[[Any], Awaitable[None]]
 
@@ -104,19 +103,19 @@ def _cookie_name(host: str) -> str:
     return f"supple-{_address(host)[1] or 80}"
 
 
-class _TooBig(Exception):
-    """A file that no page may send."""
+class _File(Exception):
+    """A file, which no page takes."""
 
 
 def limited(handler: Handler) -> Handler:
-    """The handler of connections of viser: one that sends nonsense, or files without end, is closed in one line."""
+    """The handler of connections of viser: one that sends nonsense, or a file, is closed in one line."""
 
     async def handle(connection: Any) -> None:
-        connection.recv = _counted(connection.recv)
+        connection.recv = _without_files(connection.recv)
         try:
             await handler(connection)
-        except _TooBig:
-            await connection.close(_TOO_BIG, f"a file may have {LARGEST_FILE // 2**20} MiB")
+        except _File:
+            await connection.close(_NOT_ALLOWED, "this page takes no files")
         except Exception as error:
             logger.warning("a browser was disconnected: %s: %s", type(error).__name__, error)
             await connection.close(_ERROR, "an error of the server")
@@ -124,20 +123,13 @@ def limited(handler: Handler) -> Handler:
     return handle
 
 
-def _counted(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[Any]]:
-    """Receives the next message; raises `_TooBig` where the parts of a file become larger than one may be."""
-    size = 0
+def _without_files(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[Any]]:
+    """Receives the next message; raises `_File` where a file begins."""
 
     async def received() -> Any:
-        nonlocal size
         raw = await receive()
-        head = raw[:512]
-        if b"FileTransferStartUpload" in head:
-            size = 0
-        elif b"FileTransferPart" in head:
-            size += len(raw)
-            if size > LARGEST_FILE:
-                raise _TooBig
+        if b"FileTransferStartUpload" in raw[:512]:
+            raise _File
         return raw
 
     return received

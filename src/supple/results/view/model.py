@@ -150,7 +150,6 @@ class Moment:
     contact_forces : points (c, 3) [m] and forces (c, 3) [N] of contacts, or None where they are not known
     pinned : (p,) vertices that are pinned
     springs : point of a body and target (3,) [m], by number of the grab
-    pusher : center (3,) and radius of a ball [m], or None
     tet_values : values of tets (m,) that the simulation sent, by the key of their field
     internal : (k, 11) internal variables of a recorded frame, see `State`
     broken_stitches : (b,) numbers of the pairs of stitches that have broken
@@ -166,7 +165,6 @@ class Moment:
     contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     pinned: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
-    pusher: tuple[NDArray[np.float64], float] | None = None
     tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     internal: NDArray[np.float64] = field(default_factory=lambda: NEVER_FLOWED)
     broken_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))

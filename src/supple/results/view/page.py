@@ -43,17 +43,13 @@ def write_page(
     ------
     OutputError : where the recording cannot be read, or the page cannot be written.
     """
-    output = Path(output)
+    output, options = Path(output), ViewOptions()
     with opened(recording) as source, whole_file(output) as fresh:
-        fresh.write_text(page_of_frames(source, frames or source, ViewOptions()), encoding="utf-8")
+        model, taken = model_of_recording(source), frames or source
+        played = (taken[i] for i in evenly(len(taken), _most_moments(model, options)))
+        moments = ((frame.time, moment_of_frame(model, frame)) for frame in played)
+        fresh.write_text(_page(moments, options), encoding="utf-8")
     return output
-
-
-def page_of_frames(recording: Recording, frames: Sequence[RecordedFrame], options: ViewOptions) -> str:
-    """The HTML of a page that plays frames of a recording in a loop."""
-    model = model_of_recording(recording)
-    played = (frames[i] for i in evenly(len(frames), _most_moments(model, options)))
-    return _page(((frame.time, moment_of_frame(model, frame)) for frame in played), options)
 
 
 def page_of_moments(moments: Sequence[tuple[float, Moment]], options: ViewOptions) -> str:

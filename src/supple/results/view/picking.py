@@ -106,25 +106,3 @@ def _on_triangle(model: Model, triangles: _Triangles, row: int, place: NDArray[n
         weights = (np.arange(3) == np.argmin(np.linalg.norm(corners - place, axis=1))).astype(np.float64)
     weights = np.clip(weights, 0.0, 1.0)
     return SurfacePoint(model.bodies[triangles.body[row]], triangles.vertices[row], weights / weights.sum(), place)
-
-
-def point_on_camera_plane(
-    eye: ArrayLike, toward: ArrayLike, look: ArrayLike, through: ArrayLike
-) -> NDArray[np.float64] | None:
-    """Intersection of the line from the eye (3,) to a point (3,) with the plane through a point that faces the camera.
-
-    Parameters
-    ----------
-    look : (3,) viewing direction of the camera; through : (3,) a point of the plane
-
-    Returns
-    -------
-    (3,) [m], or None where nothing intersects in front of the eye.
-    """
-    start, along, normal = (np.asarray(v, dtype=np.float64) for v in (eye, toward, look))
-    along = along - start
-    slope = float(along @ normal)
-    reach = float((np.asarray(through, dtype=np.float64) - start) @ normal)
-    if slope * reach <= 0.0:
-        return None
-    return start + reach / slope * along

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.results.view.camera import set_initial_camera
 from supple.results.view.fields import FIELDS, Field
 from supple.results.view.layers.arrows import ForceView, VelocityView
-from supple.results.view.layers.connections import PusherView, SpringView, StitchView
+from supple.results.view.layers.connections import SpringView, StitchView
 from supple.results.view.layers.dots import Dots
 from supple.results.view.layers.floor import Ground, ShadowView
 from supple.results.view.layers.joints import JointView
@@ -120,7 +120,7 @@ class Stage:
             SpringView(scene, moment),
         ]
         self._layers.append(ShadowView(scene, moment))
-        self._layers += [PusherView(scene, moment), Dots(scene, moment, "/pins", _PIN_COLOR, 0.04, _pins)]
+        self._layers.append(Dots(scene, moment, "/pins", _PIN_COLOR, 0.04, _pins))
         self._layers.append(JointView(scene, moment))
         if options.velocities:
             self._layers.append(VelocityView(scene, moment))

@@ -26,7 +26,7 @@ class FakeSimulation:
     def __init__(self, snapshot: Snapshot) -> None:
         self.snapshot, self.received, self.error = snapshot, [], None
         self.sent = 0  # number of commands; the test sets `snapshot.applied`
-        self.progress, self.watched, self.starts = None, True, 0
+        self.progress, self.watched, self.starts, self.again = None, True, 0, None
 
     @property
     def heard_at(self) -> float:
@@ -37,6 +37,10 @@ class FakeSimulation:
 
     def restart(self) -> None:
         self.error, self.starts = None, self.starts + 1
+
+    def reload(self) -> None:
+        self.again()
+        self.restart()
 
     def send(self, command):
         if isinstance(command, Watch):
@@ -105,7 +109,6 @@ def snapshot_of(description: SceneDescription, **changes) -> Snapshot:
         obstacle_poses=(np.eye(3)[None], np.zeros((1, 3))),
         pinned=np.zeros(0, dtype=np.int32),
         grabs=(),
-        pusher=None,
         paused=True,
         speed=1.0,
         measures=measures,
@@ -345,13 +348,6 @@ class Screen:
     def choose(self, handle, option: str) -> None:
         self.tab.locator(f'[id="{handle._impl.uuid}"]').click()
         self.tab.get_by_role("option", name=option, exact=True).click()
-
-    def write(self, name: str, text: str) -> None:
-        """Type the value of the slider with this label, in the text below it."""
-        label = self.tab.get_by_text(name, exact=True).first
-        box = label.locator("xpath=following::input[contains(@class, 'TextInput')]").first
-        box.fill("")
-        box.press_sequentially(text, delay=20)
 
     def slide(self, handle, key: str, times: int = 1) -> None:
         thumb = self._thumb(handle)

@@ -20,7 +20,6 @@ def demo(
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     steps: Steps = None,
     solver: str | None = None,
-    trace: Path | None = None,
     page: bool = True,
     plot: bool = True,
     checkpoint_every: CheckpointEvery = ON_THE_WAY,
@@ -45,8 +44,6 @@ def demo(
         Number of frames, instead of the demo's own. Claims that need more frames do not hold then.
     solver
         Kind of solver, xpbd or implicit, for a demo that has both.
-    trace
-        CSV file with every iteration of Newton's method; for the implicit solver.
     page
         Write index.html, which plays the recording in a browser.
     plot
@@ -92,7 +89,6 @@ def demo(
         return ExitCode.OK
 
     from supple.app.cli.session import Products, run_session
-    from supple.app.cli.trace import traces
     from supple.app.runs.run_folder import SceneSource
 
     products = Products(
@@ -115,7 +111,7 @@ def demo(
         chosen.steps if steps is None else steps,
         products=products,
         source=SceneSource({"kind": "demo", "name": name, "solver": solver, "page": page, "plot": plot}),
-        sinks=[measurement, *traces(trace, used)],
+        sinks=[measurement],
     )
     claims = measurement.claims() if outcome.frames else []
     for claim in claims:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import recording_at
+from supple.app.cli.arguments import exported
 from supple.app.cli.film_options import FilmOptions
 
 _USUAL = FilmOptions()
@@ -36,6 +36,4 @@ def export(
     film
         How a film or picture is drawn.
     """
-    from supple.results.export.exporter import export as write
-
-    print(write(recording_at(recording), to, output, **film.given()))
+    print(exported(recording, to, output, **film.given()))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import Seconds, recording_at
+from supple.app.cli.arguments import Seconds, exported
 from supple.app.cli.film_options import PictureOptions
 
 _USUAL = PictureOptions()
@@ -34,9 +34,5 @@ def picture(
     look
         How it is drawn.
     """
-    from supple.results.export.exporter import export
-
-    if output is None and recording.is_dir():
-        output = recording / "picture.png"
     moment = {} if time is None else {"time": time}
-    print(export(recording_at(recording), "png", output, **look.given(), **moment))
+    print(exported(recording, "png", output, "picture.png", **look.given(), **moment))

@@ -22,7 +22,6 @@ def run(
     steps: Steps = None,
     dt: Seconds = None,
     solver: str | None = None,
-    trace: Path | None = None,
     separate: Annotated[bool, Parameter(negative="")] = False,
     strict: Annotated[bool, Parameter(negative="")] = False,
     page: bool | None = None,
@@ -52,8 +51,6 @@ def run(
         Time from frame to frame [s], instead of the file's; 1/60 may be written as such.
     solver
         Kind of solver, instead of the file's, with its default parameters.
-    trace
-        CSV file with every iteration of Newton's method; for the implicit solver.
     separate
         Move bodies apart that intersect at the start, where a small translation separates them, and print the moves.
     strict
@@ -79,7 +76,6 @@ def run(
     """
     from supple.app.cli.console import reading
     from supple.app.cli.session import Products, run_session
-    from supple.app.cli.trace import traces
     from supple.app.runs.run_folder import SceneSource
     from supple.app.scene_file.loader import load_run
     from supple.app.scene_file.resolved import resolved_scene
@@ -87,10 +83,6 @@ def run(
 
     products = Products(output, quiet=quiet, checkpoints=checkpoint_every, overwrite=overwrite)
     products.refuse_a_run()
-    if trace is not None:
-        from supple.runtime.replacing import refuse_to_replace
-
-        refuse_to_replace(scene, trace)
     with reading(yes):
         described = load_run(scene, confine=confine)
     if separate:
@@ -108,7 +100,6 @@ def run(
         steps,
         start=described.start,
         strict=strict,
-        sinks=traces(trace, used),
         products=replace(products, page=page, plot=plot, compress=described.output.compress, fields=tuple(names)),
         source=SceneSource(origin, described.text, resolved_scene(described, solver=solver, dt=dt, steps=steps)),
     ).code

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from supple.app.cli.arguments import exported
+
 
 def table(
     run: Path,
@@ -25,10 +27,4 @@ def table(
     output
         File to write (.csv); without it, report.csv in the run folder, or beside the recording and under its name.
     """
-    from supple.app.runs.contents import RunPaths
-    from supple.results.export.exporter import export
-
-    if run.is_dir():
-        paths = RunPaths(run)
-        run, output = paths.recording, output or paths.table
-    print(export(run, "csv", output))
+    print(exported(run, "csv", output, "report.csv"))

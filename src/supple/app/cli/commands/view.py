@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import webbrowser
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import Yes, recording_at, whole_number
+from supple.app.cli.arguments import Yes, exported, recording_at, whole_number
 
 if TYPE_CHECKING:
     from supple.app.viewer.protocol.live_source import LiveSource
@@ -24,7 +26,7 @@ RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 def view(
     source: Path,
     /,
-    *,
+    *more: Path,
     solver: str | None = None,
     full: Full = False,
     port: Port = None,
@@ -32,16 +34,18 @@ def view(
     confine: bool = True,
     yes: Yes = False,
 ) -> None:
-    """Show a recording, or a scene that is simulated live and can be dragged and tuned, in a browser.
+    """Show a scene that is simulated live and can be dragged and tuned, or a recording, in a browser.
 
-    Runs until Ctrl-C. Only this machine can open the page, at an address that contains a secret; from another one, use
-    `ssh -L`.
+    A live page runs until Ctrl-C. Only this machine can open it, at an address that contains a secret; from another
+    one, use `ssh -L`. A recording is written to an HTML file beside it, which plays by itself.
 
     Parameters
     ----------
     source
         A scene file (.yaml), a surface (.stl, .obj ...), a robot (.urdf), or a recording (.vtkhdf, or the folder that
-        holds it).
+        holds it). The button *Reload* of the page reads the file again.
+    more
+        Further surfaces: their bodies stand beside the first one.
     solver
         Kind of solver, instead of the file's, with its default parameters.
     full
@@ -56,30 +60,48 @@ def view(
     yes
         Go on without a question where a mesh needs more than 10 times the tets that were asked for.
     """
+    from supple.app.cli.console import reading
 
-    found = find_source(source)
-    if found.suffix.lower() in RECORDINGS:
-        if solver is not None:
-            from supple.errors import OutputError
-
-            raise OutputError(f"{found} is a recording, which uses no solver; remove --solver")
-        serve_page(found, port, open_)
+    paths = [find_source(path) for path in (source, *more)]
+    recordings = [path for path in paths if path.suffix.lower() in RECORDINGS]
+    if recordings:
+        given = {"--solver": solver is not None, "--port": port is not None, "--full": full, "another file": more}
+        show_recording(recordings[0], [name for name, value in given.items() if value], open_)
         return
 
-    from supple.app.cli.console import reading
-    from supple.app.scene_file.loader import load_run
+    from supple.app.scene_file.several_meshes import load_run_of
     from supple.app.viewer.protocol.live_source import LiveSource
     from supple.solvers.registry import solver_of_kind
 
-    with reading(yes):
-        run = load_run(found, confine=confine)
-    if solver is not None:
-        run = replace(run, solver=solver_of_kind(solver))
-    used = run.chosen_solver
-    if used.because:
-        print(f"solver {used.kind}: {used.because}")
-    live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions, not full, solver is not None)
-    serve_page(live, port, open_)
+    def read() -> LiveSource:
+        with reading(yes):
+            run = load_run_of(paths, confine=confine)
+        if solver is not None:
+            run = replace(run, solver=solver_of_kind(solver))
+        used = run.chosen_solver
+        if used.because:
+            print(f"solver {used.kind}: {used.because}")
+        title = ", ".join(path.stem for path in paths)
+        return LiveSource(title, run.scene, used, run.dt, run.initial_positions, not full, solver is not None)
+
+    serve_page(read(), port, open_, read)
+
+
+def show_recording(path: Path, unused: list[str], open_browser: bool) -> None:
+    """Write the page of a recording beside it, print where, and open it.
+
+    Raises
+    ------
+    OutputError : where options are given that a recording does not use, or the page cannot be written.
+    """
+    from supple.errors import OutputError
+
+    if unused:
+        raise OutputError(f"{path} is a recording, whose page is one file; leave out {' and '.join(unused)}")
+    page = exported(path, "html", None)
+    print(page)
+    if open_browser:
+        webbrowser.open(page.resolve().as_uri())
 
 
 def find_source(path: Path) -> Path:
@@ -100,10 +122,16 @@ def find_source(path: Path) -> Path:
     return path
 
 
-def serve_page(source: LiveSource | Path, port: int | None, open_browser: bool) -> None:
-    """Serve a live scene, or the recording at a path, until Ctrl-C.
+def serve_page(
+    source: LiveSource, port: int | None, open_browser: bool, again: Callable[[], LiveSource] | None = None
+) -> None:
+    """Serve a live scene until Ctrl-C.
 
     A given port must be free; without one, 8080 or the next free port above it is used.
+
+    Parameters
+    ----------
+    again : reads the source again, for the button *Reload*
 
     Raises
     ------
@@ -114,4 +142,4 @@ def serve_page(source: LiveSource | Path, port: int | None, open_browser: bool) 
 
     if port is not None and not 0 <= port <= 65535:
         raise OutputError(f"--port is {port}; give a number from 1 to 65535, or 0 for any free one")
-    serve(source, port, open_browser=open_browser)
+    serve(source, port, open_browser=open_browser, again=again)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, sequential
+from supple.app.viewer.controls.number_input import NumberInput
 from supple.app.viewer.controls.parameter_input import ParameterInput
-from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import AddBody, CopyBody, RemoveBody, Squash
 from supple.app.viewer.protocol.parameters import PARAMETERS, Value
@@ -38,28 +38,20 @@ class BodyControls:
             self.change = gui.add_button_group(
                 "This one", ("copy", "remove"), visible=False, hint="Add a copy of this body, or remove it"
             )
-        with gui.add_folder("Add a body", expand_by_default=False) as self.new:
+        with gui.add_folder("Add a body", expand_by_default=False):
             self.shape = gui.add_dropdown("Shape", limits.SHAPES, initial_value="sphere", hint="Of the new body")
-            self.size = UnitSlider(
-                gui,
-                "Size",
-                Scale(0.03 * size, 3.0 * size, 1e-3, 100.0, "m", logarithmic=True),
-                0.3 * size,
-                hint="Largest side of the new body",
-            )
-            self.resolution = UnitSlider(
+            self.size = NumberInput(gui, "Size", 0.3 * size, 1e-3, 100.0, unit="m", hint="Largest side of the new body")
+            self.resolution = NumberInput(
                 gui,
                 "Edges across",
-                Scale(limits.COARSEST, 16, limits.COARSEST, limits.FINEST, whole=True),
                 6,
+                limits.COARSEST,
+                limits.FINEST,
+                whole=True,
                 hint="Edges of the mesh across the new body",
             )
-            self.youngs = UnitSlider(
-                gui,
-                "Young's modulus",
-                Scale(1e3, 1e8, 1e2, 1e11, "Pa", logarithmic=True),
-                1e5,
-                hint="Stiffness of the new body",
+            self.youngs = NumberInput(
+                gui, "Young's modulus", 1e5, 1e2, 1e11, unit="kPa", factor=1e3, hint="Stiffness of the new body"
             )
             self.add = gui.add_button("Add", hint="Add this shape above all bodies")
         self.squash.on_click(sequential(self._squash))
@@ -119,16 +111,8 @@ class BodyControls:
             event.client,
             lambda: AddBody(
                 self.shape.value,
-                size=self.new_size(),
+                size=self.size.value,
                 resolution=round(self.resolution.value),
-                youngs=self.new_youngs(),
+                youngs=self.youngs.value,
             ),
         )
-
-    def new_size(self) -> float:
-        """Size of a new body [m]."""
-        return self.size.value
-
-    def new_youngs(self) -> float:
-        """Young's modulus of a new body [Pa]."""
-        return self.youngs.value

@@ -41,8 +41,22 @@ class Simulation(Protocol):
         """When the last message of the simulation came [s of `time.monotonic`]."""
         ...
 
+    @property
+    def starts(self) -> int:
+        """How often it was started: each time, what is drawn is another scene."""
+        ...
+
+    @property
+    def again(self) -> Callable[[], Any] | None:
+        """Reads the scene again; None where it does not come from files."""
+        ...
+
     def restart(self) -> None:
         """Start the simulation again. Raises `SuppleError` where that is impossible."""
+        ...
+
+    def reload(self) -> None:
+        """Read the scene again, and start it. Raises `SuppleError` where that is impossible."""
         ...
 
 

@@ -8,16 +8,13 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, sequential
-from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
+from supple.app.viewer.controls.number_input import NumberInput
 from supple.app.viewer.protocol.commands import SetParameter
 from supple.app.viewer.protocol.parameters import PARAMETERS, Parameter, Value
 
-# Ends of sliders, where the allowed range is too wide for a slider.
-_SLIDER_ENDS = {"gravity": (-20.0, 20.0), "friction": (0.0, 2.0), "poisson": (0.0, 0.499), "youngs": (1e2, 1e9)}
-
 
 class ParameterInput:
-    """A slider or check box for one parameter.
+    """A number or check box for one parameter.
 
     Parameters
     ----------
@@ -34,22 +31,23 @@ class ParameterInput:
         parameter = self.parameter
         label = parameter.label[:1].upper() + parameter.label[1:]
         if parameter.kind is bool:
-            self.slider = None
+            self.number = None
             self.handle = gui.add_checkbox(label, initial_value=bool(value), hint=parameter.hint)
             self.handle.on_update(sequential(lambda event: self._changed(event.client, bool(self.handle.value))))
             return
-        low, high = _SLIDER_ENDS.get(name, (parameter.low, parameter.high))
-        scale = Scale(
-            min(low, float(value)),
-            max(high, float(value)),
+        self.number = NumberInput(
+            gui,
+            label,
+            value,
             parameter.low,
             parameter.high,
-            parameter.unit,
-            parameter.logarithmic,
-            parameter.kind is int,
+            unit=parameter.unit,
+            factor=parameter.factor,
+            whole=parameter.kind is int,
+            hint=parameter.hint,
+            changed=self._changed,
         )
-        self.slider = UnitSlider(gui, label, scale, value, hint=parameter.hint, changed=self._changed)
-        self.handle = self.slider.handle
+        self.handle = self.number.handle
 
     def show(self, value: Value, applied: int) -> None:
         """Set the input to the value of the simulation, unless the value of a visitor is pending.
@@ -60,15 +58,15 @@ class ParameterInput:
         """
         if value != self.value and not self._pending.is_pending(applied):
             self.value = value
-            if self.slider is None:
+            if self.number is None:
                 self.handle.value = bool(value)
             else:
-                self.slider.show(float(value))
+                self.number.show(float(value))
 
     def remove(self) -> None:
         """Remove it from the panel."""
         self._removed = True
-        (self.slider or self.handle).remove()
+        (self.number or self.handle).remove()
 
     def _changed(self, client: Any, value: Value) -> None:
         if client is None:
@@ -83,7 +81,7 @@ class ParameterInput:
 
 
 # An input of a visitor is kept for this time, even after the simulation has executed its command [s], because a visitor
-# who moves a slider continues to move it.
+# who types a number continues to type.
 _KEEP_SECONDS = 1.0
 # A dropped command is never executed: its value is kept for this time [s].
 _LONGEST = 60.0

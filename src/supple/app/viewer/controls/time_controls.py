@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import html
 import threading
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from supple.app.viewer.controls.controller import Controller, notify, sequential
-from supple.app.viewer.controls.unit_slider import Scale, UnitSlider
+from supple.app.viewer.controls.number_input import NumberInput
 from supple.app.viewer.controls.view.overlay import Overlay, button, plain
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.commands import Command, Pause, Play, Reset, SetSpeed, Step
 from supple.app.viewer.protocol.snapshots import Progress, Snapshot
 from supple.errors import SuppleError
 
-_SPEEDS = limits.SLOWEST_MOTION, limits.FASTEST_MOTION
 _ROUNDS = {"xpbd": "substep", "implicit": "Newton iteration"}
 _FRAME_ACTIONS = ("step", "reset")
 
@@ -30,20 +30,26 @@ class TimeControls:
             self._time_text = ""
             self.play = gui.add_button("Play", hint="Start or stop the time (space bar)")
             self.frames = gui.add_button_group("Frames", _FRAME_ACTIONS, hint="One frame (N), or back to the start (R)")
-            self.speed = UnitSlider(
+            self.speed = NumberInput(
                 gui,
                 "Slow motion",
-                Scale(*_SPEEDS, *_SPEEDS, logarithmic=True),
                 1.0,
+                limits.SLOWEST_MOTION,
+                limits.FASTEST_MOTION,
                 hint="Simulated seconds in a second; the time step of the solver does not change",
                 changed=lambda client, factor: controller.send(client, lambda: SetSpeed(factor)),
             )
             self.remedy = gui.add_button("Remedy", visible=False, hint="Make the simulation as fast as real time")
             self.restart = gui.add_button("Restart", visible=False, hint="Start the simulation again")
+            self.reload = gui.add_button(
+                "Reload", visible=controller.simulation.again is not None, hint="Read the file again, and start from it"
+            )
         self.play.on_click(sequential(lambda event: self.toggle(event.client)))
         self.frames.on_click(sequential(self._change_frame))
         self.remedy.on_click(sequential(self._apply_remedy))
         self.restart.on_click(self._restart)
+        if self.reload.visible:
+            self.reload.on_click(lambda event: self._start_again(event, controller.simulation.reload))
 
     def show(self, snapshot: Snapshot) -> None:
         """Display time, speed and state."""
@@ -95,16 +101,21 @@ class TimeControls:
         self.play.disabled = self.speed.handle.disabled = self.restart.visible = False
 
     def _restart(self, event: Any) -> None:
+        if self._controller.simulation.error is not None:
+            self._start_again(event, self._controller.simulation.restart)
+
+    def _start_again(self, event: Any, start: Callable[[], None]) -> None:
         """Called in a thread: a start takes seconds."""
-        if event.client is None or self._controller.simulation.error is None:
+        if event.client is None:
             return
         if not self._restarts.acquire(blocking=False):  # somebody else has pressed the button
             return
         self._overlay.show("warning", "The simulation starts again.")
         try:
-            self._controller.simulation.restart()
+            start()
         except SuppleError as error:
             notify(event.client, "Not started", str(error), "red")
+            self._overlay.show("warning", "")
         finally:
             self._restarts.release()
 

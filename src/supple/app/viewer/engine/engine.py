@@ -8,6 +8,7 @@ import multiprocessing
 import pickle
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 from supple.app.viewer.engine.simulation_process import run_simulation
@@ -31,11 +32,12 @@ class Engine:
 
     Parameters
     ----------
-    source : what to simulate.
+    source : what to simulate; again : reads it again, where it comes from files
     start_timeout : longest time to wait for the first snapshot [s]; on a new machine, kernels are compiled before it.
 
     Attributes
     ----------
+    starts : how often it was started
     error : why the simulation ended, where it was not closed; otherwise None
     progress : of the present step, where it takes long; heard_at : when the last message came [s of time.monotonic]
 
@@ -44,8 +46,11 @@ class Engine:
     SceneError, SolverError : where the source cannot be simulated.
     """
 
-    def __init__(self, source: LiveSource, start_timeout: float = 600.0) -> None:
-        self.source = source
+    def __init__(
+        self, source: LiveSource, again: Callable[[], LiveSource] | None = None, start_timeout: float = 600.0
+    ) -> None:
+        self.source, self.again = source, again
+        self.starts = 0
         self._arrived = threading.Condition()
         self._start_timeout = start_timeout
         self._number = 0
@@ -71,7 +76,7 @@ class Engine:
         level = logging.getLogger().getEffectiveLevel()
         self._process = context.Process(
             target=run_simulation,
-            args=(source, command_reader, snapshot_writer, level),
+            args=(source, command_reader, snapshot_writer, level, self._number),
             name="supple simulation",
             daemon=True,
         )
@@ -94,6 +99,7 @@ class Engine:
             reason = self.error or f"the simulation did not start within {self._start_timeout:g} s"
             self.close()
             raise SolverError(reason)
+        self.starts += 1
 
     def restart(self) -> None:
         """Start the simulation again from its source, in a new process. Waits for its first snapshot.
@@ -109,6 +115,17 @@ class Engine:
         except (SceneError, SolverError) as error:
             self.error = self.error or str(error)
             raise
+
+    def reload(self) -> None:
+        """Read the source again, and start from it. What runs goes on where it cannot be read.
+
+        Raises
+        ------
+        SuppleError : where it cannot be read, or not be simulated; see `restart`.
+        """
+        assert self.again is not None
+        self.source = self.again()
+        self.restart()
 
     def send(self, command: Command) -> int:
         """Send a command to the simulation, without waiting for it.

@@ -36,7 +36,7 @@ def within_step(live: LiveScene, last: Snapshot, shown: float) -> Snapshot | Non
     if not isinstance(workspace, XPBDWorkspace) or workspace.time <= shown:
         return None
     system, setup, state = live.system, live.setup, workspace.present()
-    points, pusher = system.split(state.positions), setup.pusher
+    points = system.split(state.positions)
     return replace(
         last,
         time=state.time,
@@ -44,7 +44,6 @@ def within_step(live: LiveScene, last: Snapshot, shown: float) -> Snapshot | Non
         velocities=None if last.velocities is None else state.velocities,
         obstacle_poses=ObstaclePoses(system.obstacles).at(state.time),
         grabs=tuple(spring.drawn(points[spring.command.body]) for spring in setup.grabs.values()),
-        pusher=None if pusher is None else (tuple(pusher.place(state.time).tolist()), pusher.radius),
     )
 
 

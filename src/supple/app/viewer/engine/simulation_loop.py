@@ -207,7 +207,6 @@ class SimulationLoop:
         system, setup = live.system, live.setup
         points = system.split(state.positions)
         grabs = [spring.drawn(points[spring.command.body]) for spring in setup.grabs.values()]
-        pusher = setup.pusher
         contacts = self._requested("contacts", lambda: contact_points(live))
         forces = self._requested("contacts", lambda: strongest_forces(live))
         quantity = self.view.tet_values or ""
@@ -222,7 +221,6 @@ class SimulationLoop:
             obstacle_poses=ObstaclePoses(system.obstacles).at(state.time),
             pinned=system.pinned_vertices,
             grabs=tuple(grabs),
-            pusher=None if pusher is None else (tuple(pusher.center.tolist()), pusher.radius),
             paused=not self.playing,
             speed=self.speed,
             measures=measures(live),

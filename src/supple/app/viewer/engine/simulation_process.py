@@ -20,8 +20,15 @@ if TYPE_CHECKING:
     from supple.app.viewer.engine.scene.live_scene import LiveScene
 
 
-def run_simulation(source: LiveSource, commands: Connection, snapshots: Connection, log_level: int) -> None:
-    """Simulate until the other end of `commands` is closed, by `Engine.close` or by the end of the page's process."""
+def run_simulation(
+    source: LiveSource, commands: Connection, snapshots: Connection, log_level: int, applied: int
+) -> None:
+    """Simulate until the other end of `commands` is closed, by `Engine.close` or by the end of the page's process.
+
+    Parameters
+    ----------
+    applied : number of the last command to an earlier simulation of the same page
+    """
     # Ctrl-C in a terminal reaches both processes; the process of the page ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.basicConfig(level=log_level, format="%(levelname)s: %(message)s")
@@ -34,10 +41,10 @@ def run_simulation(source: LiveSource, commands: Connection, snapshots: Connecti
 
     # One core is left to the page and the browser: a kernel waits long for a thread that does not get a core.
     with numba_threads(max(1, numba.get_num_threads() - 1)):
-        _simulate(source, inbox, snapshots)
+        _simulate(source, inbox, snapshots, applied)
 
 
-def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) -> None:
+def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection, applied: int) -> None:
     from supple.app.viewer.engine.scene.live_scene import LiveScene
     from supple.app.viewer.engine.simulation_loop import SimulationLoop
     from supple.app.viewer.protocol.outbox import ERROR, Outbox, packed
@@ -55,6 +62,7 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) ->
         snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
         return
     loop = SimulationLoop(live, inbox, Outbox(snapshots))
+    loop.applied = applied
     if chosen:
         logging.getLogger(__name__).info("%s", chosen)
         loop.notify("info", chosen)

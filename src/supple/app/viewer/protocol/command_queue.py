@@ -11,7 +11,6 @@ from supple.app.viewer.protocol.commands import (
     Command,
     Grab,
     MoveGrab,
-    MovePusher,
     ReleaseGrab,
     SetParameter,
     SetSpeed,
@@ -30,7 +29,7 @@ def subject(command: Command) -> Hashable | None:
             return "grab", grab
         case SetParameter(name=name, body=body):
             return "parameter", name, body
-        case MovePusher() | SetSpeed() | SetView():
+        case SetSpeed() | SetView():
             return type(command)
         case Unpin(body=None):
             return "unpin"

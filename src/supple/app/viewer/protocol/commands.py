@@ -11,14 +11,10 @@ from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.parameters import Value, find_parameter
 from supple.app.viewer.protocol.values import (
     Point,
-    check_mesh,
     checked_index,
     checked_length,
     checked_name,
@@ -216,19 +212,6 @@ class Unpin(Command):
 
 
 @dataclass(frozen=True)
-class MovePusher(Command):
-    """Move the pusher, a solid ball, to `center` (3,) [m]; create it if it does not exist; `radius` [m]."""
-
-    center: Point
-    radius: float
-
-
-@dataclass(frozen=True)
-class RemovePusher(Command):
-    """Remove the pusher."""
-
-
-@dataclass(frozen=True)
 class Squash(Command):
     """Scale the height of all free bodies, along gravity, by `factor`. They get wider and keep their volume.
 
@@ -265,27 +248,6 @@ class AddBody(Command):
     name: str | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class AddMesh(Command):
-    """Add a body of stable Neo-Hookean rubber with a given mesh, above all other bodies.
-
-    Parameters
-    ----------
-    vertices : (n, 3) [m]; tets : (m, 4) rows of them
-    youngs [Pa]
-    name : the body gets this name with a number.
-    """
-
-    vertices: NDArray[np.float64]
-    tets: NDArray[np.int32]
-    youngs: float = 1e5
-    name: str = "mesh"
-
-    def __post_init__(self) -> None:
-        check_mesh(self.vertices, self.tets)
-        super().__post_init__()
-
-
 @dataclass(frozen=True)
 class CopyBody(Command):
     """Add an undeformed copy of a body, at rest; `position` as for `AddBody`."""
@@ -316,9 +278,7 @@ _CHECKS: dict[str, Callable[[Any, str], object]] = {
     "grab": checked_index,
     "vertex": checked_index,
     "target": checked_point,
-    "center": checked_point,
     "position": checked_point,
-    "radius": checked_length,
     "size": checked_length,
     "count": partial(whole, low=1, high=limits.MOST_STEPS),
     "resolution": partial(whole, low=limits.COARSEST, high=limits.FINEST),

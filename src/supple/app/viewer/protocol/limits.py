@@ -32,12 +32,5 @@ LONGEST_GRAB = 3.0
 # Commands that wait for the simulation; further commands are dropped.
 MOST_WAITING = 512
 
-# Upload of a surface: size of the file [bytes]; number of triangles; time [s] and memory [bytes] for reading and
-# meshing it.
-UPLOAD_FORMATS = (".stl", ".obj", ".ply", ".off", ".vtp", ".vtk")
-LARGEST_UPLOAD = 16 * 1024 * 1024
-MOST_UPLOADED_TRIANGLES = 20_000
-LONGEST_UPLOAD, UPLOAD_MEMORY = 60.0, 3 * 2**30
-
 # Contact points, and forces of contacts, in a snapshot.
 MOST_CONTACT_POINTS, MOST_CONTACT_FORCES = 2_000, 400

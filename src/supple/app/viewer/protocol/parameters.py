@@ -1,4 +1,4 @@
-"""The parameters that a page may change while a simulation runs, with their ranges, for sliders and checks."""
+"""The parameters that a page may change while a simulation runs, with their ranges, for inputs and checks."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Parameter:
 
     Attributes
     ----------
-    name : in commands and descriptions; label, hint : on the panel; unit : "" where it has none
+    name : in commands and descriptions; label, hint : on the panel; unit : that the panel
+        displays, "" where it has none; factor : how many of the SI unit it is
     owner : "body" where each body has its own value
     kind : float, int or bool; low, high : both are allowed
-    logarithmic : whether a slider uses powers of ten (zero, where allowed, is its left end)
     """
 
     name: str
@@ -33,7 +33,7 @@ class Parameter:
     low: float
     high: float
     unit: str = ""
-    logarithmic: bool = False
+    factor: float = 1.0
     hint: str = ""
 
     def checked(self, value: object) -> Value:
@@ -74,9 +74,7 @@ PARAMETERS: dict[str, Parameter] = {
         Parameter(
             "contact", "contact of bodies", "solver", bool, 0, 1, hint="Whether bodies touch each other, and themselves"
         ),
-        Parameter(
-            "dt", "time step", "scene", float, 1e-4, 0.1, "s", logarithmic=True, hint="Simulated time of a frame"
-        ),
+        Parameter("dt", "time step", "scene", float, 1e-4, 0.1, "ms", 1e-3, hint="Simulated time of a frame"),
         Parameter(
             "gravity",
             "gravity",
@@ -94,8 +92,8 @@ PARAMETERS: dict[str, Parameter] = {
             float,
             1e2,
             1e11,
-            "Pa",
-            logarithmic=True,
+            "kPa",
+            1e3,
             hint="Stiffness: stress per strain. Rubber 1 MPa, gummy bears 30 kPa",
         ),
         Parameter(
@@ -114,8 +112,8 @@ PARAMETERS: dict[str, Parameter] = {
             float,
             0.0,
             1.0,
-            "m/N",
-            logarithmic=True,
+            "mm/N",
+            1e-3,
             hint="How far edges give way to a force",
         ),
         Parameter(
@@ -125,8 +123,8 @@ PARAMETERS: dict[str, Parameter] = {
             float,
             0.0,
             1.0,
-            "m^5/N",
-            logarithmic=True,
+            "mm^5/N",
+            1e-15,
             hint="How far the volume of tets gives way to a pressure",
         ),
         Parameter(
@@ -136,8 +134,8 @@ PARAMETERS: dict[str, Parameter] = {
             float,
             0.0,
             1.0,
-            "s",
-            logarithmic=True,
+            "ms",
+            1e-3,
             hint="Relaxation time of the viscous stress",
         ),
         Parameter(
@@ -148,7 +146,6 @@ PARAMETERS: dict[str, Parameter] = {
             1.0,
             1e5,
             "kg/m^3",
-            logarithmic=True,
             hint="Mass per volume; water 1000 kg/m³",
         ),
         Parameter(

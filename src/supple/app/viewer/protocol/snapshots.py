@@ -15,7 +15,6 @@ from supple.results.recording.actions import RecordedJoint, RecordedStitches
 from supple.results.recording.scene import RecordedObstacle
 
 RIGID = "rigid"  # instead of a material
-PUSHER = "pusher"  # name of the obstacle that the mouse moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +184,7 @@ class Snapshot:
     positions : (n, 3) of all bodies [m]
     obstacle_poses : rotations (k, 3, 3) and translations (k, 3) [m] of the obstacles
     pinned : (p,) global vertices that are pinned
-    grabs : springs that pull; pusher : center (3,) and radius of the ball [m], or None
+    grabs : springs that pull
     paused : whether the time is stopped; speed : see `SetSpeed`
     measures, timing : numbers for the panel
     notices : the newest ones; see `Notice`
@@ -205,7 +204,6 @@ class Snapshot:
     obstacle_poses: tuple[NDArray[np.float64], NDArray[np.float64]]
     pinned: NDArray[np.int32]
     grabs: tuple[GrabState, ...]
-    pusher: tuple[tuple[float, float, float], float] | None
     paused: bool
     speed: float
     measures: Measures

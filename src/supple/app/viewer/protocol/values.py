@@ -54,20 +54,6 @@ def checked_items(value: object, what: str, least: int, most: int) -> list[objec
     return list(value)
 
 
-def check_mesh(vertices: object, tets: object) -> None:
-    for array, width, kind, what in ((vertices, 3, "f", "vertices"), (tets, 4, "i", "tets")):
-        if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] != width or array.dtype.kind != kind:
-            raise CommandError(f"{what} must be an array of {width} numbers each")
-    assert isinstance(vertices, np.ndarray)
-    assert isinstance(tets, np.ndarray)
-    if not 1 <= len(tets) <= limits.MOST_TETS or not 4 <= len(vertices) <= 4 * len(tets):
-        raise CommandError(
-            f"{len(tets)} tets, {len(vertices)} vertices; a live page allows at most {limits.MOST_TETS} tets"
-        )
-    if not np.all(np.abs(vertices) <= limits.LARGEST_LENGTH) or tets.min() < 0 or tets.max() >= len(vertices):
-        raise CommandError("a vertex is too far away, or a tet refers to a vertex that does not exist")
-
-
 def checked_vertices(value: object) -> tuple[int, ...]:
     vertices = tuple(whole(each, "vertices", 0, 2**31 - 1) for each in checked_items(value, "vertices", 1, 4))
     if len(set(vertices)) != len(vertices):

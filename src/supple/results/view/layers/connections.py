@@ -1,4 +1,4 @@
-"""Springs of grabs with their length, the pusher, and a line for each stitch."""
+"""Springs of grabs with their length, and a line for each stitch."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from supple.results.view.layers.layer import Layer, single
 from supple.results.view.model import Moment
 
 STITCH_COLOR = (30, 30, 34)
-_SPRING_COLOR, _PUSHER_COLOR = (20, 150, 70), (120, 90, 200)
+_SPRING_COLOR = (20, 150, 70)
 
 
 class SpringView(Layer):
@@ -47,22 +47,6 @@ class SpringView(Layer):
     def remove(self) -> None:
         for node in (self._lines, *self._labels.values()):
             node.remove()
-
-
-class PusherView(Layer):
-    """The ball of the pusher."""
-
-    def __init__(self, scene: Any, moment: Moment) -> None:
-        self._ball = scene.add_icosphere(
-            "/pusher", radius=1.0, color=_PUSHER_COLOR, opacity=0.85, subdivisions=4, visible=False
-        )
-        self.nodes = [self._ball]
-        self.update(moment)
-
-    def update(self, moment: Moment) -> None:
-        self._ball.visible = moment.pusher is not None
-        if moment.pusher is not None:
-            self._ball.position, self._ball.radius = tuple(moment.pusher[0]), moment.pusher[1]
 
 
 def length_text(meters: float) -> str:

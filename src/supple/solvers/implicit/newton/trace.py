@@ -1,11 +1,8 @@
-"""One row of numbers for every Newton iteration, and the rows as CSV."""
+"""One row of numbers for every Newton iteration."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -41,15 +38,3 @@ class NewtonRow:
     projected: bool = True
     kind: str = "newton"
     substep: int = 0
-
-
-def trace_csv(steps: Iterable[tuple[float, Iterable[NewtonRow]]]) -> str:
-    """The rows of several steps, each with the time [s] at its end, as CSV text with one header."""
-    text = io.StringIO()
-    names = [field.name for field in fields(NewtonRow)]
-    writer = csv.DictWriter(text, ["time", *names], lineterminator="\n")
-    writer.writeheader()
-    for time, rows in steps:
-        for row in rows:
-            writer.writerow({"time": repr(float(time)), **asdict(row)})
-    return text.getvalue()

@@ -31,7 +31,10 @@ def test_a_thousand_random_events(live, server, fake, visit, until, caplog, capf
             elif isinstance(handle.value, bool):
                 value = rng.random() < 0.5
             elif isinstance(handle.value, (int, float)):
-                value = rng.uniform(handle.min, handle.max)
+                ends = [-10.0 if handle.min is None else handle.min, 10.0 if handle.max is None else handle.max]
+                value = rng.uniform(*ends)
+                if isinstance(handle.value, float) and rng.random() < 0.2:
+                    value = rng.choice(numbers)
             else:
                 continue
             visitor.set(handle, value)
@@ -46,12 +49,12 @@ def test_a_thousand_random_events(live, server, fake, visit, until, caplog, capf
             grabs = (GrabState(1, "body 0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),) if rng.random() < 0.5 else ()
             fake.show(grabs=grabs, time=0.01 * k)
     # All events have been handled once the last value has arrived; another visitor may have been faster.
-    factors = iter(np.linspace(0.2, 0.9, 1000))
+    factors = iter(np.linspace(0.2, 0.9, 1000).round(4))
 
     def heard(visitor, message):
         message.append(float(next(factors)))
-        visitor.set(live.panel.time.speed.text, repr(message[-1]))
-        time.sleep(1.2)  # a text counts when nothing more is typed
+        visitor.set(live.panel.time.speed.handle, message[-1])
+        time.sleep(1.2)  # a number counts when nothing more is typed
         return any(SetSpeed(factor) in fake.received for factor in message)
 
     for visitor in visitors:

@@ -4,10 +4,14 @@ import time
 from dataclasses import replace
 
 import numpy as np
+from tests.app.viewer.page.conftest import describe, snapshot_of
 
+import supple as sp
 from supple.app.viewer import live_page
+from supple.app.viewer.live_page import LivePage
 from supple.app.viewer.protocol.commands import Play, SetSpeed, SetView
-from supple.app.viewer.protocol.snapshots import Progress, Reading, Timing
+from supple.app.viewer.protocol.snapshots import Notice, Progress, Reading, Timing
+from supple.errors import SceneError
 
 
 def test_the_page_names_the_bottleneck_and_has_a_remedy(live, fake, visitor, received, until):
@@ -117,3 +121,36 @@ def test_sensors_cavities_and_cables_are_plots(live, fake, until):
     np.testing.assert_allclose(plots["Pa"].data[1][-5:], 1e3)
     fake.show(time=0.6, readings=(Reading("air", "Pa", 5.0),))
     until(lambda: set(plots) == {"Pa"})
+
+
+def test_reload_draws_the_scene_that_is_read_again(server, fake, visit, until, monkeypatch):
+    """Also where it has the generation of the one before; its notices are new ones."""
+    fake.show(notices=(Notice(7, "info", "seven"),))
+    two, one = fake.snapshot, snapshot_of(describe(sp.shapes.box((1, 1, 1), (1, 1, 1))))
+    fake.again = lambda: fake.__setattr__("snapshot", one)
+    page = LivePage(server, fake, two)
+    visitor = visit(server.get_port())
+    until(server.get_clients)
+    assert page.panel.time.reload.visible
+    displayed = []
+    client = next(iter(server.get_clients().values()))
+    monkeypatch.setattr(client, "add_notification", lambda title, text, **_: displayed.append(text))
+    visitor.press(page.panel.time.reload)
+    until(lambda: [body.name for body in page.stage.model.bodies] == ["body 0"])
+    until(lambda: page.panel.bodies.which.options == ("all bodies", "body 0"))
+    fake.show(notices=(Notice(1, "info", "one"),))
+    until(lambda: displayed == ["one"])
+
+    def broken():
+        raise SceneError("scene.yaml:3: wrong")
+
+    fake.again = broken
+    visitor.press(page.panel.time.reload)
+    until(lambda: displayed[-1] == "scene.yaml:3: wrong")
+    until(lambda: page.panel.overlay.part("warning") == "")
+    visitor.leave()
+    page.stop()
+
+
+def test_without_a_file_nothing_is_reloaded(live):
+    assert not live.panel.time.reload.visible

@@ -17,12 +17,13 @@ def test_the_range_of_the_colors_is_chosen(live, fake, visitor, until):
     fake.show(tet_values=values, tet_quantity="von_mises")
     until(lambda: "50 kPa" in legend())
     visitor.set(views.range.kind, "fixed")
-    until(lambda: (views.range.low.value, views.range.high.value) == ("0 Pa", "50 kPa"))
-    visitor.set(views.range.high, "8 kPa")
+    until(lambda: (views.range.low.value, views.range.high.value) == (0.0, 50e3))
+    assert (views.range.low.label, views.range.high.label) == ("From [Pa]", "To [Pa]")
+    visitor.set(views.range.high, 8e3)
     until(lambda: ">8 kPa<" in legend())
-    visitor.set(views.range.high, "8 kN")  # not complete, or wrong: the last one stays
-    visitor.set(views.range.low, "2e3")
-    visitor.set(views.range.high, "12 kPa")
+    visitor.set(views.range.high, -1.0)  # not complete, or wrong: the last one stays
+    visitor.set(views.range.low, 2e3)
+    visitor.set(views.range.high, 12e3)
     until(lambda: ">2 kPa<" in legend())
     assert ">7 kPa<" in legend()
     visitor.set(views.range.kind, "all values")

@@ -37,45 +37,12 @@ def test_a_snapshot_becomes_a_moment(fake):
     assert translator.moment(fake.show()).model is moment.model
 
 
-def test_the_pusher_does_not_create_a_new_model(fake):
+def test_another_generation_has_a_new_model(fake):
     from dataclasses import replace
-
-    from supple.results.recording.scene import RecordedObstacle
 
     translator = MomentBuilder()
     before = translator.moment(fake.snapshot)
-    old = fake.snapshot.description
-    shape = {"center": np.zeros(3), "radius": 0.1, "inside": False}
-    ball = RecordedObstacle("pusher", "Sphere", shape, np.zeros((0, 3)), np.zeros((0, 3), np.int32))
-    pushed = translator.moment(
-        fake.show(
-            description=replace(old, generation=2, obstacles=(*old.obstacles, ball)),
-            obstacle_poses=(np.stack([np.eye(3)] * 2), np.zeros((2, 3))),
-            pusher=((1.0, 0.0, 0.0), 0.1),
-        )
-    )
-    assert pushed.model is before.model
-    assert len(pushed.poses) == 1
-    assert pushed.pusher[1] == 0.1
-    # Another body does.
-    assert (
-        translator.moment(
-            fake.show(
-                description=replace(old, generation=3, bodies=old.bodies[:1]), positions=fake.snapshot.positions[:27]
-            )
-        ).model
-        is not before.model
-    )
-
-
-def test_a_skin_follows_the_tets_of_its_body(fake):
-    from dataclasses import replace
-
-    body = fake.snapshot.description.bodies[0]
-    fine = np.random.default_rng(1).uniform(0.1, 0.9, (50, 3))
-    skinned = replace(body, skin=(fine, np.array([[0, 1, 2]])))
-    description = replace(fake.snapshot.description, bodies=(skinned, *fake.snapshot.description.bodies[1:]))
-    x = fake.snapshot.positions * [1.0, 2.0, 1.0] + [0.0, 1.0, 0.0]
-    moment = MomentBuilder().moment(fake.show(description=description, positions=x))
-    drawn = moment.model.bodies[0].skin.positions(moment.positions[moment.model.bodies[0].vertices])
-    np.testing.assert_allclose(drawn, fine * [1.0, 2.0, 1.0] + [0.0, 1.0, 0.0], atol=1e-12)
+    smaller = replace(fake.snapshot.description, generation=2, bodies=fake.snapshot.description.bodies[:1])
+    after = translator.moment(fake.show(description=smaller, positions=fake.snapshot.positions[:27]))
+    assert after.model is not before.model
+    assert [body.name for body in after.model.bodies] == ["body 0"]

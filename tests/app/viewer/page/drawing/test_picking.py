@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from supple.app.viewer.from_snapshot import MomentBuilder
-from supple.results.view.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
+from supple.results.view.picking import nearest_surface_point, surface_point_on_ray
 
 
 @pytest.fixture
@@ -43,10 +43,3 @@ def test_first_intersection_of_a_ray(moment):
     assert np.linalg.norm(vertex - point.place) <= 0.36  # half the diagonal of a facet
     assert surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [-1.0, 0.0, 0.0]) is None
     assert surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [0.0, 0.0, 0.0]) is None
-
-
-def test_points_on_planes_parallel_to_the_screen():
-    eye, look = np.array([0.0, 0.0, -4.0]), np.array([0.0, 0.0, 1.0])
-    place = point_on_camera_plane(eye, [3.0, 3.0, 8.0], look, [9.0, -9.0, 0.0])
-    np.testing.assert_allclose(place, [1.0, 1.0, 0.0])
-    assert point_on_camera_plane(eye, [3.0, 3.0, -8.0], look, [9.0, -9.0, 0.0]) is None

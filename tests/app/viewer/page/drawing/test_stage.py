@@ -109,17 +109,15 @@ def test_springs_with_length_and_pins(server, fake):
     translator = MomentBuilder()
     stage = Stage(server, translator.moment(fake.snapshot), ViewOptions())
     held = GrabState(7, "body 0", (0.0, 0.0, 0.0), (0.0, 0.3, 0.4))
-    stage.show(translator.moment(fake.show(grabs=(held,), pinned=np.array([2]), pusher=((1.0, 2.0, 3.0), 0.2))))
+    stage.show(translator.moment(fake.show(grabs=(held,), pinned=np.array([2]))))
     nodes = server.scene._handle_from_node_name
     assert nodes["/springs/7"].text == "50.0 cm"
     np.testing.assert_allclose(nodes["/springs/lines"].points, [[[0.0, 0.0, 0.0], [0.0, 0.3, 0.4]]], atol=1e-7)
     assert nodes["/springs/lines"].visible
     np.testing.assert_allclose(nodes["/pins"].points, fake.snapshot.positions[[2]])
-    np.testing.assert_allclose(nodes["/pusher"].position, [1.0, 2.0, 3.0])
-    assert nodes["/pusher"].visible
-    stage.show(translator.moment(fake.show(grabs=(), pusher=None, pinned=np.zeros(0, int))))
+    stage.show(translator.moment(fake.show(grabs=(), pinned=np.zeros(0, int))))
     assert "/springs/7" not in nodes
-    assert [nodes[name].visible for name in ("/springs/lines", "/pusher", "/pins")] == [False] * 3
+    assert [nodes[name].visible for name in ("/springs/lines", "/pins")] == [False] * 2
 
 
 def test_stitches_are_lines_from_vertices_to_the_places_that_were_nearest(server, fake):

@@ -27,15 +27,15 @@ class Cameras:
 
     Parameters
     ----------
-    server : of viser; stage : has the bodies; followed : `ALL` or `NOTHING` at first
+    server : of viser; stage : has the bodies
     """
 
-    def __init__(self, server: Any, stage: Stage, followed: str) -> None:
+    def __init__(self, server: Any, stage: Stage) -> None:
         self._server, self._stage = server, stage
         self._lock = threading.RLock()
         self._carried: dict[int, CarriedCamera] = {}  # by the number of the visitor
         self._start = stage.moment.finite_positions.mean(axis=0)
-        self._center: NDArray[np.float64] | None = self._start if followed == ALL else None
+        self._center: NDArray[np.float64] | None = self._start
         self._time = stage.moment.time  # at which the cameras have moved last
         self.presets = server.gui.add_button_group(
             "Camera", PRESETS, hint="Keys 1 to 5; F fits the picture to the bodies"
@@ -43,7 +43,7 @@ class Cameras:
         self.follow = server.gui.add_dropdown(
             "Follow",
             self._names(),
-            initial_value=followed,
+            initial_value=ALL,
             hint="The camera moves with a body, or with all bodies where they leave the middle of the picture; a "
             "double click on a body fits the picture to it",
         )
@@ -68,7 +68,7 @@ class Cameras:
                 return
             way = center - self._center
             if self.follow.value == ALL:
-                if moment.springs or moment.pusher is not None:  # a camera that moves would move the mouse's target
+                if moment.springs:  # a camera that moves would move the mouse's target
                     return
                 way *= _SHARE if moment.time >= self._time else 1.0  # back at the start, nothing moves any more
             if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.app.viewer.controls.controller import sequential
-from supple.app.viewer.protocol.quantities import typed, written
-from supple.errors import CommandError
+from supple.app.viewer.protocol.quantities import written
 from supple.results.view.fields import BINS, Field, Range, palette
 from supple.results.view.layers.arrows import COLOR
 from supple.results.view.stage import Stage
@@ -45,7 +44,7 @@ KINDS = (*_SHARES, _FIXED)
 
 
 class ColorRange:
-    """A choice between a share of the values and fixed ends, which are typed with their unit.
+    """A choice between a share of the values and fixed ends, whose labels have the unit.
 
     Parameters
     ----------
@@ -59,9 +58,11 @@ class ColorRange:
             "Range", KINDS, initial_value=KINDS[0], visible=False, hint="Which values the colors cover"
         )
         self.low, self.high = (
-            gui.add_text(label, "", visible=False, hint=f"{which} end of the colors, for example 20 kPa")
-            for label, which in (("From", "Lower"), ("To", "Upper"))
+            gui.add_number(label, value, visible=False, hint=f"{which} end of the colors")
+            for label, value, which in (("From", 0.0, "Lower"), ("To", 1.0, "Upper"))
         )
+        for end in (self.low, self.high):
+            end.precision = 6
         self.kind.on_update(sequential(self._chosen))
         for end in (self.low, self.high):
             end.on_update(sequential(self._typed))
@@ -82,18 +83,12 @@ class ColorRange:
             present, field = self._stage.color_range, self._stage.field
             if self.kind.value == _FIXED and present is not None and field is not None:
                 self._fixed = present
-                self.low.value, self.high.value = (written(end, field.unit) for end in present)
+                for end, name, value in zip((self.low, self.high), ("From", "To"), present, strict=True):
+                    end.label, end.value = f"{name} [{field.unit}]" if field.unit else name, float(f"{value:.6g}")
             self._changed()
 
     def _typed(self, event: Any) -> None:
-        field = self._stage.field
-        if event.client is None or field is None:
-            return
-        try:
-            low, high = (typed(str(end.value), field.unit, field.name) for end in (self.low, self.high))
-            if not low < high:
-                raise CommandError("the upper end of the colors must be above the lower one")
-        except CommandError:
-            return  # viser sends every letter: the text is not complete yet
-        self._fixed = low, high
-        self._changed()
+        # viser sends every digit: as long as a number is not complete, the last range stays.
+        if event.client is not None and self.low.value < self.high.value:
+            self._fixed = float(self.low.value), float(self.high.value)
+            self._changed()

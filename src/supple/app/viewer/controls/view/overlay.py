@@ -32,21 +32,6 @@ _STYLE = """
 #supple-legend .bar { height: 12px; width: min(220px, 60vw); border-radius: 3px; }
 #supple-legend .numbers { display: flex; justify-content: space-between; font-variant-numeric: tabular-nums; }
 #supple-arrows { bottom: 84px; }
-.mantine-Slider-markLabel { white-space: nowrap; }
-.mantine-Slider-markWrapper:first-child .mantine-Slider-markLabel { transform: translate(-4px, .05rem) !important; }
-.mantine-Slider-markWrapper:last-child .mantine-Slider-markLabel {
-  transform: translate(calc(4px - 100%), .05rem) !important; }
-.mantine-Notifications-root[data-position="top-left"] { top: 172px !important; }
-@media (max-width: 36em) {  /* the panel is below the picture, not above its lower right corner */
-  div:has(> .mantine-Paper-root[style*="max-height"]) { flex-direction: column; }
-  div:has(> .mantine-Paper-root[style*="max-height"]) > :first-child { min-height: 0; }
-  .mantine-Paper-root[style*="max-height"] { position: relative !important; width: 100% !important;
-    max-height: 45% !important; flex-shrink: 0; }
-  .mantine-Paper-root[style*="max-height"] .mantine-ScrollArea-content > div { width: 100% !important; }
-  #supple-start { bottom: 47%; left: 50%; transform: translateX(-50%); }
-  #supple-legend { bottom: calc(45% + 12px); }
-  #supple-arrows { bottom: calc(45% + 84px); }
-}
 """
 
 
@@ -55,13 +40,13 @@ class Overlay:
 
     Parameters
     ----------
-    gui : of viser; style : further rules
+    gui : of viser
     """
 
-    def __init__(self, gui: Any, style: str = "") -> None:
+    def __init__(self, gui: Any) -> None:
         self._lock = threading.Lock()
         self._parts: dict[str, str] = {}
-        self._style = f"<style>{_STYLE}{style}</style>"
+        self._style = f"<style>{_STYLE}</style>"
         self._handle = gui.add_html(self._style)
 
     def show(self, name: str, content: str) -> None:

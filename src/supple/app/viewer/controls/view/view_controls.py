@@ -1,4 +1,4 @@
-"""The folder "View" of the panel: view options, for simulations and recordings."""
+"""The folder "View" of the panel: view options."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.viewer.controls.controller import sequential
-from supple.app.viewer.controls.view.cameras import ALL, Cameras
+from supple.app.viewer.controls.view.cameras import Cameras
 from supple.app.viewer.controls.view.color_scale import ColorRange, arrows_html, bar_html
 from supple.app.viewer.controls.view.overlay import Overlay, set_theme
 from supple.app.viewer.protocol.quantities import written
@@ -92,7 +92,6 @@ class ViewControls:
     ----------
     server : of viser; stage : draws with the options; overlay : has the legend
     changed : called with every change, before it is drawn
-    followed : by the cameras, see `Cameras`
     """
 
     def __init__(
@@ -100,8 +99,7 @@ class ViewControls:
         server: Any,
         stage: Stage,
         overlay: Overlay,
-        changed: Callable[[ViewOptions], None] = lambda options: None,
-        followed: str = ALL,
+        changed: Callable[[ViewOptions], None],
     ) -> None:
         self._server, self._stage, self._overlay, self._changed = server, stage, overlay, changed
         self._lock = threading.RLock()
@@ -134,7 +132,7 @@ class ViewControls:
             )
             self.dark = gui.add_checkbox("Dark", initial_value=False, hint="A dark page, for all who look at it")
             self._message = gui.add_markdown("", visible=False)
-            self.cameras = Cameras(server, stage, followed)
+            self.cameras = Cameras(server, stage)
         self.probe = Probe(server, stage)
         shape = self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place
         for handle in (*shape, self.velocities, self.contacts, self.stitches):

@@ -11,10 +11,10 @@ from functools import singledispatch
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.app.viewer.engine.scene.clearance import moved_out
 from supple.app.viewer.engine.scene.grab_spring import make_spring
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.scene.new_bodies import check_size, new_body, place_for, unused_name
-from supple.app.viewer.engine.scene.pusher import Pusher, moved_out
 from supple.app.viewer.engine.scene.solvers import SOLVERS, kind_of, with_value
 from supple.app.viewer.protocol import commands, limits
 from supple.app.viewer.protocol.parameters import Value, find_parameter
@@ -202,21 +202,6 @@ def _remove_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
 
 
 @change.register
-def _(command: commands.MovePusher, live: LiveScene) -> None:
-    pusher = live.setup.pusher
-    if pusher is not None and pusher.radius == command.radius:
-        pusher.target[:] = command.center
-        return
-    live.adopt_checked(replace(live.setup, pusher=Pusher(np.array(command.center), command.radius)))
-
-
-@change.register
-def _(command: commands.RemovePusher, live: LiveScene) -> None:
-    if live.setup.pusher is not None:
-        live.adopt(replace(live.setup, pusher=None))
-
-
-@change.register
 def _(command: commands.Squash, live: LiveScene) -> None:
     pinned = set(live.system.pinned_vertices.tolist())
     free = [
@@ -245,9 +230,8 @@ def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: floa
     return middle + (flat - middle) / np.sqrt(factor) + (low + factor * (heights - low))[:, None] * up
 
 
-@change.register(commands.AddBody)
-@change.register(commands.AddMesh)
-def _(command: commands.AddBody | commands.AddMesh, live: LiveScene) -> None:
+@change.register
+def _(command: commands.AddBody, live: LiveScene) -> None:
     _add(live, new_body(command, live.setup.scene, live.state.positions, live.up))
 
 

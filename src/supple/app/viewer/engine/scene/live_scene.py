@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from supple.app.viewer.engine.scene.costs import without_long_repetitions
 from supple.app.viewer.engine.scene.grab_spring import GrabSpring, grabbed, make_spring, workspace_for
 from supple.app.viewer.engine.scene.new_bodies import moved_apart
-from supple.app.viewer.engine.scene.pusher import Pusher
 from supple.app.viewer.engine.scene.solvers import kind_of
 from supple.app.viewer.protocol.commands import Grab, MoveGrab
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -35,7 +34,7 @@ class Setup:
     Attributes
     ----------
     scene : without what the page adds to it:
-    page_pins : pins made on the page, by body and vertex; grabs : by number; pusher : or None
+    page_pins : pins made on the page, by body and vertex; grabs : by number
     added : names of bodies that were added on the page
     """
 
@@ -44,12 +43,11 @@ class Setup:
     dt: float
     page_pins: Mapping[tuple[str, int], Pin] = field(default_factory=lambda: MappingProxyType({}))
     grabs: Mapping[int, GrabSpring] = field(default_factory=lambda: MappingProxyType({}))
-    pusher: Pusher | None = None
     added: frozenset[str] = frozenset()
 
     def whole_scene(self) -> Scene:
-        """The scene with pins, grabs and pusher of the page."""
-        if not self.page_pins and not self.grabs and self.pusher is None:
+        """The scene with pins and grabs of the page."""
+        if not self.page_pins and not self.grabs:
             return self.scene
         pulls = [spring.load for spring in self.grabs.values()]
         return replace(
@@ -57,7 +55,6 @@ class Setup:
             pins=(*self.scene.pins, *self.page_pins.values()),
             forces=(*self.scene.forces, *(load for load in pulls if isinstance(load, Force))),
             soft_targets=(*self.scene.soft_targets, *(load for load in pulls if isinstance(load, SoftTarget))),
-            obstacles=(*self.scene.obstacles, *([self.pusher.obstacle] if self.pusher else [])),
         )
 
 
@@ -71,7 +68,7 @@ class Start:
     workspace: XPBDWorkspace
 
     def serves(self, setup: Setup) -> bool:
-        """Whether a reset with this setup leads here. Grabs, pins of the page and the pusher end with a reset."""
+        """Whether a reset with this setup leads here. Grabs and pins of the page end with a reset."""
         same = self.setup
         return setup.scene is same.scene and setup.solver is same.solver and setup.added == same.added
 
@@ -199,20 +196,13 @@ class LiveScene:
     def step(self) -> StepReport:
         """Simulate one frame. Where this fails, the state does not change, and the report contains the reason."""
         setup = self.setup
-        if setup.pusher is not None:
-            setup.pusher.begin_step(self.state.time, setup.dt)
         for spring in setup.grabs.values():
             self._aim(spring)
         state, report = self._stepped()
-        if not report.status.can_go_on and setup.pusher is not None and setup.pusher.moves:
-            setup.pusher.stay()  # it is blocked
-            state, report = self._stepped()
         self.report = report
         if report.status.can_go_on:
             self.state = state
             self.frame += 1
-            if setup.pusher is not None:
-                setup.pusher.end_step()
         return report
 
     @property

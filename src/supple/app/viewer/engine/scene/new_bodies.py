@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.viewer.protocol import limits
-from supple.app.viewer.protocol.commands import AddBody, AddMesh, Point
+from supple.app.viewer.protocol.commands import AddBody, Point
 from supple.errors import CommandError
 from supple.materials.elastic import StableNeoHookean
 from supple.mesh import shapes
@@ -41,22 +41,18 @@ def make_mesh(shape: str, size: float, resolution: int) -> TetMesh:
     raise CommandError(f"shape {shape!r} does not exist")
 
 
-def new_body(command: AddBody | AddMesh, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
+def new_body(command: AddBody, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
     """The body that a command describes, above `positions` (n, 3) [m] where the command gives no position.
 
     Raises
     ------
     MeshError : where the mesh of the command cannot be used.
     """
-    if isinstance(command, AddMesh):
-        mesh, poisson, density, position = TetMesh(command.vertices, command.tets), 0.45, 1000.0, None
-        name = unused_name(scene, command.name)
-    else:
-        mesh = make_mesh(command.shape, command.size, command.resolution)
-        poisson, density, position = command.poisson, command.density, command.position
-        name = command.name if command.name is not None else unused_name(scene, command.shape.replace("_", " "))
-    material = StableNeoHookean(youngs=command.youngs, poisson=poisson, density=density, damping=_DAMPING)
-    return Body(name, mesh, material, position=place_for(mesh, position, positions, up), friction=_FRICTION)
+    mesh = make_mesh(command.shape, command.size, command.resolution)
+    name = command.name if command.name is not None else unused_name(scene, command.shape.replace("_", " "))
+    values = {"youngs": command.youngs, "poisson": command.poisson, "density": command.density}
+    material = StableNeoHookean(**values, damping=_DAMPING)
+    return Body(name, mesh, material, position=place_for(mesh, command.position, positions, up), friction=_FRICTION)
 
 
 def place_for(
