@@ -165,7 +165,56 @@ def same_bits(one, other):
         one.state.positions.tobytes() == other.state.positions.tobytes()
         and one.state.velocities.tobytes() == other.state.velocities.tobytes()
         and one.state.broken_stitches.tolist() == other.state.broken_stitches.tolist()
+        and one.state.parted_stitches.tolist() == other.state.parted_stitches.tolist()
     )
+
+
+@parametrized
+@pytest.mark.parametrize("below", ["cube", "plate"])
+def test_what_was_torn_off_falls_back_onto_what_it_was_stitched_to(tmp_path, solver, below):
+    """In both, from the same place onto the same triangles, which stitches had excluded from contact."""
+    mesh, plate = sp.shapes.box((0.05, 0.05, 0.05), (2, 1, 2)), sp.shapes.box_surface((0.2, 0.05, 0.2), (2, 1, 2))
+    top = sp.Body("top", mesh, SOFT, position=(0, 0.051, 0), velocity=(0, 0.8, 0), friction=0.2)
+    seam = sp.VertexVertexStitch("top", below, max_distance=0.03, stiffness=20.0, strength=0.05)
+    parts = {"stitches": [seam], "gravity": (0, -9.81, 0)}
+    if below == "cube":
+        base = sp.Body("cube", sp.shapes.box((0.2, 0.05, 0.2), (4, 1, 4)), SOFT)
+        scene = sp.Scene([base, top], pins=[sp.Pin("cube", sp.InBox((-1, -1, -1), (1, -0.0249, 1)))], **parts)
+    else:
+        scene = sp.Scene([top], [sp.obstacles.TriangleObstacle(name="plate", surface=plate)], **parts)
+    path = tmp_path / "r.vtkhdf"
+    frames = list(sp.simulate(scene, solver, DT, 24, sinks=[sp.Recorder(path)]))
+    assert len(broken(frames)) >= 1
+    assert len(frames[-1].state.parted_stitches) == len(scene.stitching) >= 5
+    heights = [frame.positions["top"][:, 1].min() for frame in frames]
+    assert max(heights) > 0.03
+    assert min(heights) > 0.0245
+    assert heights[-1] < 0.026
+    assert {str(frame.report.status) for frame in frames} == {"converged"}
+    begun = next(frame for frame in frames if len(frame.state.parted_stitches))
+    rest = sp.simulate(scene, solver, DT, 24 - begun.index, start=begun)
+    assert all(map(same_bits, frames[begun.index :], rest))
+    with sp.read_recording(path) as recording:
+        report = recording.check()
+        assert report.ok, str(report)
+        for one, other in zip(frames, recording[1:], strict=True):
+            assert one.state.parted_stitches.tolist() == other.state.parted_stitches.tolist()
+
+
+def test_sides_that_touch_collide_only_when_they_are_apart():
+    """A cube on another one is torn off sideways, while they touch."""
+    base = sp.Body("cube", sp.shapes.box((0.2, 0.05, 0.2), (4, 1, 4)), SOFT)
+    mesh = sp.shapes.box((0.05, 0.05, 0.05), (2, 1, 2))
+    top = sp.Body("top", mesh, SOFT, position=(0, 0.05, 0), velocity=(1.0, 0, 0), friction=0.2)
+    seam = sp.SoftVertexTriangleStitch("top", "cube", max_distance=1e-6, youngs=1e4, poisson=0.3, strength=0.05)
+    held = sp.Pin("cube", sp.InBox((-1, -1, -1), (1, -0.0249, 1)))
+    frames = list(sp.simulate(sp.Scene([base, top], pins=[held], stitches=[seam]), sp.Implicit(), DT, 20))
+    counts = [(len(frame.state.broken_stitches), len(frame.state.parted_stitches)) for frame in frames]
+    assert counts[-1] == (9, 9)
+    assert all(parted <= of for of, parted in counts)
+    assert counts == sorted(counts)
+    assert {str(frame.report.status) for frame in frames} == {"converged"}
+    assert min(frame.positions["top"][:, 1].min() for frame in frames[5:]) > 0.0245
 
 
 def test_an_equilibrium_that_lost_what_held_it_ends_the_run():

@@ -16,19 +16,20 @@ from supple.model.system import System
 from supple.scene.stitches.measures import stitch_energies, stitch_loads
 
 
-def without_broken(system: System, broken: NDArray[np.int64]) -> System:
-    """The system with all stitches of its scene but the pairs of these numbers (b,); the same one where that is so."""
-    if np.array_equal(system.stitching.broken, broken):
+def without_broken(system: System, broken: NDArray[np.int64], parted: NDArray[np.int64]) -> System:
+    """The system with all stitches of its scene but `broken` ones, see `State`; the same one where that is so."""
+    stitching = system.stitching
+    if np.array_equal(stitching.broken, broken) and np.array_equal(stitching.parted, parted):
         return system
-    return replace(system, stitching=system.scene.stitching.without(broken))
+    return replace(system, stitching=system.scene.stitching.without(broken, parted))
 
 
 def after_breaks(system: System, state: State, step: StepReport) -> tuple[System, State, StepReport]:
     """What a step has led to, with the pairs broken that carry too much; the same system where none breaks."""
     stitching, names = system.stitching, system.scene.stitching.names
-    if not names.breakable:
+    if not names.breakable and not len(stitching.broken):
         return system, state, step
-    broken = stitching.broken
+    broken, parted = stitching.broken, stitching.parted
     holding = np.delete(np.arange(len(names)), broken)
     if len(holding) and step.status.can_go_on:
         points = stitching.points(state.positions, state.time)
@@ -39,4 +40,5 @@ def after_breaks(system: System, state: State, step: StepReport) -> tuple[System
             new = holding[over]
             step = replace(step, details=replace(step.details, work=work), broken_stitches=names.named(new))
             broken = np.union1d(broken, new)
-    return without_broken(system, broken), replace(state, broken_stitches=broken), step
+    state = replace(state, broken_stitches=broken, parted_stitches=parted)
+    return without_broken(system, broken, parted), state, step

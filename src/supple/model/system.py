@@ -265,7 +265,9 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         loads=(*forces, *(load for parts in given for load in parts)),
         actuators=actuators_of(scene.cavities, scene.cables, scene.bodies, begins, x_start),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
-        stitching=scene.stitching if start is None else scene.stitching.without(start.broken_stitches),
+        stitching=scene.stitching
+        if start is None
+        else scene.stitching.without(start.broken_stitches, start.parted_stitches),
         welding=scene.welding,
         start_states=start_states,
         quadratic=_quadratic_tets(ranges, rest_positions),

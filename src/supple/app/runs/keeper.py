@@ -52,8 +52,9 @@ def frame_of(checkpoint: Checkpoint, scene: Scene, solver: Solver) -> Frame | No
     system = rebuilt_system(scene, checkpoint.start_states, checkpoint.anchors)
     if scene_hash(system, *checkpoint.run.span) != checkpoint.run.scene:
         return None
-    system = without_broken(system, checkpoint.state.broken_stitches)
-    return start_frame(system, checkpoint.state, checkpoint.index, solver)
+    state = checkpoint.state
+    system = without_broken(system, state.broken_stitches, state.parted_stitches)
+    return start_frame(system, state, checkpoint.index, solver)
 
 
 logger = logging.getLogger(__name__)

@@ -92,9 +92,7 @@ def contact_mesh(
     number = np.full(len(points), -1, dtype=np.int32)
     number[used] = np.arange(len(used), dtype=np.int32)
     surface = points.taken(used)
-    # Obstacles are vertices here; the last entry is for nodes without one.
-    of_vertex = np.append(system.stitching.points_of_nodes(points), -1)
-    of_vertex = np.where(of_vertex >= 0, number[of_vertex], -1).astype(np.int32)
+    of_vertex = points_of_stitches(system, obstacles)
     return mesh_of_triangles(
         surface,
         number[corners],
@@ -108,6 +106,16 @@ def contact_mesh(
         touching=touching,
         rows=np.where(used < len(system.points), used, -1).astype(np.int32),
     )
+
+
+def points_of_stitches(system: System, obstacles: tuple[ObstacleRange, ...]) -> NDArray[np.int32]:
+    """(q + 1,) of each node of stitches the point of `contact_mesh` that it is, -1 where it is on no surface."""
+    points, corners, _ = joined_surfaces(system, obstacles)
+    number = np.full(len(points) + 1, -1, dtype=np.int32)
+    used = np.unique(corners)
+    number[used] = np.arange(len(used), dtype=np.int32)
+    # Obstacles are vertices here; the last entry is for nodes without one.
+    return number[np.append(system.stitching.points_of_nodes(points), -1)]
 
 
 def joined_surfaces(

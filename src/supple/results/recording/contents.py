@@ -177,11 +177,11 @@ class RecordedContents(RecordedScene):
         """Close the file; frames that were not read before can then not be read."""
         self._file.close()
 
-    def broken_stitches(self, number: int) -> NDArray[np.int64]:
-        """(b,) numbers of the pairs of stitches that have broken until a frame, ascending; see `State`."""
+    def broken_stitches(self, number: int, parted: bool = False) -> NDArray[np.int64]:
+        """(b,) numbers of the pairs of stitches that have broken until a frame, or also parted; see `State`."""
         if BROKEN_STITCHES not in self._series:
             return np.zeros(0, dtype=np.int64)
-        return np.flatnonzero(self._values(BROKEN_STITCHES)[number])
+        return np.flatnonzero(self._values(BROKEN_STITCHES)[number] > parted)
 
     def _values(self, path: str) -> NDArray[Any]:
         """All frames' rows of a series; read once."""

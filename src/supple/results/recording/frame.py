@@ -55,8 +55,9 @@ class RecordedFrame(TetReadings):
         joints = {name for name, measure in measures.items() if measure is not None and measure.form == "angle"}
         known = self.report.joints.items()
         angles = {name: one.coordinate for name, one in known if name in joints and one.coordinate is not None}
-        broken = self.recording.broken_stitches(self.number)
-        return State(self.time, *vertices, internal=internal, hinge_angles=angles, broken_stitches=broken)
+        broken, parted = (self.recording.broken_stitches(self.number, parted=parted) for parted in (False, True))
+        more = {"hinge_angles": angles, "broken_stitches": broken, "parted_stitches": parted}
+        return State(self.time, *vertices, internal=internal, **more)
 
     @cached_property
     def positions(self) -> dict[str, NDArray[np.float64]]:

@@ -259,7 +259,8 @@ class Recorder:
             file.put(INTERNAL, frame.state.internal)
         names = frame.system.scene.stitching.names
         if names.breakable:
-            file.put(BROKEN_STITCHES, np.isin(np.arange(len(names)), frame.state.broken_stitches))
+            rows, state = np.arange(len(names)), frame.state
+            file.put(BROKEN_STITCHES, sum(np.isin(rows, of) for of in (state.broken_stitches, state.parted_stitches)))
         readings = frame.sensors
         for sensor in recorded_sensors(frame.system.scene):
             file.put(sensor.series.path, readings[sensor.name].numbers())

@@ -101,7 +101,9 @@ class Stitching:
     ranges : of each stitch of the scene, before any pair has broken
     tets, springs : of all pairs that hold
     rigid : points of rigid bodies; anchors : vertices of obstacles, whose numbers are the last ones
-    broken : (b,) numbers of the pairs that have broken, of all of the scene, ascending; parted : (b, 4) their `nodes`
+    broken : (b,) numbers of the pairs that have broken, of all of the scene, ascending
+    old_nodes : (b, 4) their `nodes`
+    parted : (c,) those of them whose sides collide
     """
 
     body_vertices: int
@@ -111,7 +113,8 @@ class Stitching:
     rigid: RigidNodes
     anchors: Anchors
     broken: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    parted: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
+    old_nodes: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
+    parted: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __len__(self) -> int:
         return len(self.tets) + len(self.springs)
@@ -138,14 +141,14 @@ class Stitching:
         """Of the scene, before any has broken."""
         return max((part.tets.stop for part in self.ranges), default=0)
 
-    def without(self, broken: NDArray[np.int64]) -> Stitching:
-        """All stitches of a scene but the pairs that have broken, (b,) numbers in ascending order."""
+    def without(self, broken: NDArray[np.int64], parted: NDArray[np.int64]) -> Stitching:
+        """All stitches of a scene but the pairs that have `broken`; see `Stitching`."""
         if not len(broken):
             return self
         holds = np.ones(len(self), dtype=np.bool_)
         holds[broken] = False
         tets, springs = self.tets.chosen(holds[: len(self.tets)]), self.springs.chosen(holds[len(self.tets) :])
-        return replace(self, tets=tets, springs=springs, broken=broken, parted=self.nodes()[broken])
+        return replace(self, tets=tets, springs=springs, broken=broken, old_nodes=self.nodes()[broken], parted=parted)
 
     @property
     def apart(self) -> RigidNodes:
@@ -171,8 +174,14 @@ class Stitching:
         return np.concatenate([self.tets.vertices, springs]).astype(np.int32)
 
     def seams(self) -> NDArray[np.int32]:
-        """(k + b, 4) as `nodes`, of broken ones too: what they joined does not collide."""
-        return np.concatenate([self.nodes(), self.parted])
+        """(q, 4) as `nodes`, also of broken pairs that are not parted: what they join, or joined, does not collide."""
+        return np.concatenate([self.nodes(), self.old_nodes[~np.isin(self.broken, self.parted)]])
+
+    @property
+    def seamed(self) -> list[Stitch]:
+        """The stitches with a pair that is not parted."""
+        owners = np.unique(np.delete(self.names.owner, self.parted))
+        return [self.ranges[k].stitch for k in owners]
 
     def elements(self) -> NDArray[np.int32]:
         """(k, 4) the nodes as solvers assemble them; -1 also for nodes that are not vertices of bodies."""
@@ -204,8 +213,8 @@ class Stitching:
         tets = replace(self.tets, vertices=np.ascontiguousarray(numbers[self.tets.vertices]))
         springs = replace(self.springs, vertices=np.ascontiguousarray(numbers[self.springs.vertices]))
         rigid = replace(self.rigid, numbers=numbers[self.rigid.numbers], control=numbers[self.rigid.control])
-        parted = np.append(numbers, -1)[self.parted].astype(np.int32)
-        return replace(self, tets=tets, springs=springs, rigid=rigid, parted=parted)
+        old_nodes = np.append(numbers, -1)[self.old_nodes].astype(np.int32)
+        return replace(self, tets=tets, springs=springs, rigid=rigid, old_nodes=old_nodes)
 
     def joins(self) -> NDArray[np.int32]:
         """(q, 2) each stitch's first vertex with each of the others, anchors included.

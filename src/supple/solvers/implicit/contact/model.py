@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,8 +153,11 @@ def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np
     placed = np.concatenate([begun, obstacle_positions(obstacles, 0.0)])
     mesh = contact_mesh(extended, obstacles, table.collide, placed)
     widest = largest_dhat(system)
-    collisions = Collisions(mesh, obstacles, widest)
-    # A run that is continued keeps its dhat: what rests on something is nearer to it than at the start.
+    # A run that is continued keeps its dhat: what rests on something is nearer to it than at the start. What collides
+    # since its stitches have broken does not change it.
+    whole = replace(extended, stitching=replace(extended.stitching, parted=extended.stitching.parted[:0]))
+    begun_mesh = contact_mesh(whole, obstacles, table.collide, placed) if len(extended.stitching.parted) else mesh
+    collisions = Collisions(begun_mesh, obstacles, widest)
     gaps = []
     for start in system.start_states:
         there = stitched_state(extended, start).positions

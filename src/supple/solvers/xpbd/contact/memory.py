@@ -20,6 +20,7 @@ class ListMemory:
     age, until : the time since then, and how long the list holds [s]
     collide : (p, p) which things could touch; on_shapes : (p, s) which of them simple shapes
     shapes : (s, ...) the frames and numbers of these, one row each
+    excluded : number of pairs of parts that do not collide since they are joined
     """
 
     points: NDArray[np.int32]
@@ -33,6 +34,7 @@ class ListMemory:
     collide: NDArray[np.bool_]
     on_shapes: NDArray[np.bool_]
     shapes: NDArray[np.float64]
+    excluded: int
 
 
 @dataclass(frozen=True, eq=False)

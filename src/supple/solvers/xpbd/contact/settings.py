@@ -53,7 +53,7 @@ def colliding_pairs(system: System, settings: XPBDContact | None, joined: bool =
     if settings is None or not settings.self_collision:
         collide[np.arange(bodies), np.arange(bodies)] = False
     names = [part.name for part in system.bodies] + [str(obstacle.name) for obstacle in system.obstacles]
-    joints = [(stitch.first, stitch.second) for stitch in system.scene.stitches]
+    joints = [(stitch.first, stitch.second) for stitch in system.stitching.seamed]
     for first, second in [*joints, *((weld.body, weld.rigid) for weld in system.scene.welds)]:
         a, b = names.index(first), names.index(second)
         if not joined or max(a, b) >= bodies:

@@ -55,6 +55,8 @@ class Lists:
         self._surface, self._shapes, self._edge = surface, shapes, surface.edge_length
         self._widest = float(surface.simplices.gaps[surface.simplices.nodes].max(initial=0.0))
         self._search = PatchSearch(surface.parts, surface.patches)
+        excluded = surface.parts.excluded_triangles, surface.parts.excluded_edges
+        self._excluded = sum(len(lists.items) for lists in excluded)
         self._every = np.ones(surface.count, dtype=np.bool_)
         self._collide, self._on_shapes = surface.simplices.collide.copy(), shapes.collide
         self._fixed = shapes.described()
@@ -110,6 +112,7 @@ class Lists:
         """Whether a list is of this scene, with the same things at rest."""
         s = self._surface.simplices
         same = [
+            known.excluded == self._excluded,
             known.x.shape == self.wide.x.shape == known.v.shape,
             np.array_equal(known.collide, s.collide),
             np.array_equal(known.on_shapes, self._on_shapes),
@@ -134,7 +137,7 @@ class Lists:
         first = len(self._deep.normals)
         reached = self.pairs.reached[first : first + len(self._points) + len(self._edges)].copy()
         pairs = self._points, self._edges, self._on_walls, reached
-        lists = ListMemory(*pairs, wide.x + origin, wide.v.copy(), wide.age, wide.until, *masks)
+        lists = ListMemory(*pairs, wide.x + origin, wide.v.copy(), wide.age, wide.until, *masks, self._excluded)
         return ContactMemory(self.pairs.keys[k], self.pairs.impulses[k] / (h * h), self.pairs.normals[k], x, lists)
 
     def renew(self, x: NDArray[np.float64], v: NDArray[np.float64], h: float, frames: NDArray[np.float64]) -> None:
