@@ -155,7 +155,7 @@ def test_a_run_goes_on_across_a_break_with_the_same_bits(tmp_path, solver):
         assert len(recording) == 25
         assert all(map(same_bits, whole, list(recording)[1:]))
         assert list(broken(recording)) == list(broken(whole))
-        again = next(sp.simulate(scene, solver, DT, 1, start=recording[first]))
+        again = next(sp.simulate(scene, solver, DT, 1, start=recording[first].state))
         assert np.isin(whole[first - 1].state.broken_stitches, again.state.broken_stitches).all()
         assert len(again.system.stitching) == 18 - len(again.state.broken_stitches)
 

@@ -71,4 +71,4 @@ def _are_near(system: System, state: State, waiting: NDArray[np.int64], least: f
     found = points[:, 0], mesh.triangles[points[:, 1]], mesh.edges[edges], mesh.triangles[crossing]
     near = np.zeros(len(x) + 1, dtype=np.bool_)  # the last one is for nodes that are not on a surface
     near[np.concatenate([rows.ravel() for rows in found])] = True
-    return near[points_of_stitches(extended, obstacles)[extended.stitching.old_nodes]].any(axis=1)
+    return np.asarray(near[points_of_stitches(extended, obstacles)[extended.stitching.old_nodes]].any(axis=1))
