@@ -14,7 +14,7 @@ endif
 # Bytecode is compiled now, also that of src, so that no later start has to (it is 1.3 s of one, and 0.4 s for src).
 install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
 
-.PHONY: demo test test-all fuzz soak bench blender lint format docs kernels dist lock clean
+.PHONY: demo test test-all coverage fuzz soak bench blender lint format docs kernels dist lock clean
 .DELETE_ON_ERROR:
 
 # Both demos compile for half a minute, once: first, on all cores. They run at the same time, and the first says at the end
@@ -34,6 +34,10 @@ test: .venv/.dev
 
 test-all: .venv/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal --durations=30
+
+# Which lines of Python the tests run; kernels are compiled and not counted.
+coverage: .venv/.dev
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not slow" --cov=supple --cov-report=term:skip-covered
 
 # Every reader on many thousands of damaged files, which are new ones each time; with SEED, those of an earlier run.
 fuzz: .venv/.dev

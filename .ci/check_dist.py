@@ -28,7 +28,7 @@ def check_contents(wheel: Path, sdist: Path) -> None:
     assert any(name.endswith("/licenses/LICENSE") for name in names), "the wheel has no licence"
     assert "Typing :: Typed" in metadata
     page = metadata.partition("\n\n")[2]
-    assert "pip install supple" in page.partition("##")[0], "the page does not begin with the installation"
+    assert "pip install" in page.partition("##")[0], "the page does not begin with the installation"
     relative = re.findall(r"\]\((?!https:|#)([^)]*)\)", page)
     assert not relative, f"links that do not work on an index: {relative[:5]}"
     with tarfile.open(sdist) as file:

@@ -26,7 +26,7 @@ IMPORT_NAMES = {
 }
 BY_TRIMESH = {"lxml", "networkx"}  # imported by it where it reads 3MF
 # Development tools that are run, or loaded by pytest; no test imports them.
-TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-xdist", "ruff"}
+TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-cov", "pytest-xdist", "ruff"}
 OWN = {"supple", "tests", "benchmarks"}
 
 

@@ -91,6 +91,27 @@ def test_the_address_on_github_is_that_of_its_actions(hook, monkeypatch):
     assert hook.repository(ROOT) == "https://github.example/a/b"
 
 
+def test_actions_are_pinned_by_their_hash():
+    text = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    used = re.findall(r"uses: (\S+)", text)
+    assert used
+    assert all(re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", one) for one in used), used
+
+
+def test_files_that_repeat_the_version_agree_with_it():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == supple.__version__
+    assert f"## [{supple.__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_hooks_before_a_commit_are_the_lint_of_ci():
+    hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"][0]["hooks"]
+    lint = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nlint:")[2].partition("\n\n")[0]
+    for hook in hooks:
+        tool = hook["entry"].removeprefix(".venv/bin/").replace(" --force-exclude", "")
+        assert tool == "make lint" or f"$(BIN)/{tool} ." in lint
+
+
 def test_types_are_marked_as_such():
     assert (Path(supple.__file__).parent / "py.typed").is_file()
 
@@ -100,7 +121,7 @@ def test_the_workflow_runs_commands_that_exist():
     targets = set(re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.M))
     commands = [step["run"] for job in workflow["jobs"].values() for step in job["steps"] if "run" in step]
     used = [command.split()[1] for command in commands if command.startswith("make ")]
-    assert set(used) == {"demo", "test", "dist"}
+    assert set(used) == {"demo", "test", "coverage", "dist"}
     assert set(used) <= targets
     scripts = [match[0] for command in commands for match in re.finditer(r"\.ci/\w+", command)]
     assert scripts
