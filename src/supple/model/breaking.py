@@ -33,7 +33,7 @@ def after_breaks(system: System, state: State, step: StepReport) -> tuple[System
     holding = np.delete(np.arange(len(names)), broken)
     if len(holding) and step.status.can_go_on:
         points = stitching.points(state.positions, state.time)
-        over = stitch_loads(stitching, points) > names.strength[holding]
+        over = stitch_loads(stitching, points, step.stitch_forces) > names.strength[holding]
         if over.any():
             lost = float(stitch_energies(stitching, points)[over].sum())
             work = {**step.details.work, BREAKING: -lost} if step.details.work else {}

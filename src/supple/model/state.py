@@ -237,6 +237,8 @@ class StepReport:
         included [m]; None where the solver does not compute it (`XPBD`), or found nothing in the range of its contact.
     details : what only this solver reports.
     contacts : makes the list of all contacts, for solvers that know them one by one.
+    stitch_forces : (k, 3) elastic forces on the vertices of stitches at the end, where a solver knows them better than
+        by their law from the positions, NaN for others [N]; or None
     broken_stitches : pairs that broke in the step, by the name of their stitch, or what messages call it: (k, 2) vertex
         of its first body, number of the partner in the second one
     """
@@ -247,6 +249,7 @@ class StepReport:
     min_distance: float | None = None
     details: SolverDetails = field(default_factory=SolverDetails)
     contacts: Callable[[], ContactPoints] | None = None
+    stitch_forces: NDArray[np.float64] | None = None
     broken_stitches: Mapping[str, NDArray[np.int32]] = field(default_factory=dict)
 
 

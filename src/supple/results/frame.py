@@ -154,7 +154,7 @@ def completed_report(
             message = "; ".join(filter(None, (crushed_message(system, state, tets), step.message)))
             step = replace(step, status=Status.CRUSHED, message=message)
     values = vars(measured) | vars(step)
-    del values["contacts"]  # made when they are asked for: `Frame.contacts`
+    del values["contacts"], values["stitch_forces"]  # the first are made when they are asked for: `Frame.contacts`
     details = with_applied_values(step.details, system, state.time)
     if energy_before is not None and details.work:
         works = completed_works(details.work, details.energy_residual, measured.energy - energy_before)

@@ -25,30 +25,42 @@ def stitch_energies(stitching: Stitching, points: NDArray[np.float64]) -> NDArra
     return np.concatenate([of_tets, 0.5 * springs.stiffness * longer * longer])
 
 
-def stitch_loads(stitching: Stitching, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k,) what each pair carries, tets first [N]; points as of `stitch_energy`.
+def stitch_loads(
+    stitching: Stitching, points: NDArray[np.float64], known: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """(k,) what each pair carries, tets first [N].
 
     Of a spring, how hard it pulls, 0 where it is shorter than at rest. Of a tet, the size of the elastic force on its
     vertex, without what presses the vertex away from the triangle. A seam does not break where its sides are pressed
     onto each other; a tet that starts flat presses them apart.
 
+    Parameters
+    ----------
+    points : as of `stitch_energy`
+    known : (k, 3) forces on the vertices that are known otherwise, NaN for those that follow from the points [N]
+
     Source: Camanho and Dávila, "Mixed-Mode Decohesion Finite Elements" (2002): traction that closes a seam counts as 0.
     """
-    tets, springs = stitching.tets, stitching.springs
+    tets, springs, count = stitching.tets, stitching.springs, len(stitching.tets)
     F = _deformation_gradients(stitching, points)
     a, b, c = np.moveaxis(F, 2, 0)
     cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
     beyond = tets.lam * (np.einsum("ti,ti->t", a, cofactor[:, :, 0]) - 1.0) - tets.mu
     stress = tets.mu[:, None, None] * F + beyond[:, None, None] * cofactor
-    force = np.einsum("tij,tj,t->ti", stress, tets.rest_shape_inverse.sum(axis=1), tets.rest_volumes)
+    of_tets = np.einsum("tij,tj,t->ti", stress, tets.rest_shape_inverse.sum(axis=1), tets.rest_volumes)
     x1, x2, x3 = points[tets.vertices[:, 1:]].transpose(1, 0, 2)
-    # At rest the vertex is on the other side of the triangle than this normal.
-    normal = np.cross(x2 - x1, x3 - x1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(np.float64).tiny)[:, None]
-    pressing = np.minimum(np.einsum("ti,ti->t", force, normal), 0.0)
-    of_tets = np.linalg.norm(force - pressing[:, None] * normal, axis=1)
-    longer = np.linalg.norm(springs.extensions(points), axis=1) - springs.rest_lengths
-    return np.concatenate([of_tets, springs.stiffness * np.maximum(longer, 0.0)])
+    d = springs.extensions(points)
+    lengths = np.linalg.norm(d, axis=1)
+    # From the vertex to the other side: of a tet, the normal of the triangle at rest.
+    ways = np.concatenate([np.cross(x2 - x1, x3 - x1), -d])
+    ways /= np.maximum(np.linalg.norm(ways, axis=1), np.finfo(np.float64).tiny)[:, None]
+    forces = np.concatenate([of_tets, (springs.stiffness * (lengths - springs.rest_lengths))[:, None] * ways[count:]])
+    if known is not None:
+        forces = np.where(np.isnan(known), forces, known)
+    along = np.einsum("ki,ki->k", forces, ways)
+    across = np.linalg.norm(forces - along[:, None] * ways, axis=1)
+    across[count:] = 0.0  # of springs: what has turned since the last sweep
+    return np.hypot(across, np.maximum(along, 0.0))
 
 
 def largest_stitch_stretch(stitching: Stitching, points: NDArray[np.float64]) -> float | None:

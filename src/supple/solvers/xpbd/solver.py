@@ -5,7 +5,7 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, ClassVar, Literal
 
 import numba
@@ -28,7 +28,7 @@ from supple.solvers.xpbd.assessment.works import Works
 from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
 from supple.solvers.xpbd.constraints.registry import build_constraint_sets, refuse_materials
-from supple.solvers.xpbd.constraints.stitches import StitchAnchors, stitch_constraints
+from supple.solvers.xpbd.constraints.stitches import StitchAnchors, StitchForces, stitch_constraints
 from supple.solvers.xpbd.contact.contact import Contact
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.damping.kelvin_voigt import make_damping
@@ -187,6 +187,7 @@ class XPBD(Solver):
             threads=self.threads or (None if large else 1),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
+            stitch_forces=StitchForces(inner, sets),
         )
 
     def check(self, system: System, state: State, workspace: XPBDWorkspace) -> None:
@@ -212,7 +213,7 @@ class XPBD(Solver):
         """
         with workspace.own_threads():
             new, report = self._step(system, workspace.welded.inner(state), dt, workspace)
-            return workspace.welded.outer(new), report
+            return workspace.welded.outer(new), replace(report, stitch_forces=workspace.stitch_forces.latest)
 
     def _step(self, system: System, state: State, dt: float, ws: XPBDWorkspace) -> tuple[State, StepReport]:
         time = state.time + dt

@@ -23,7 +23,7 @@ from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
 from supple.solvers.xpbd.constraints.registry import ConstraintSet
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
-from supple.solvers.xpbd.constraints.stitches import StitchAnchors
+from supple.solvers.xpbd.constraints.stitches import StitchAnchors, StitchForces
 from supple.solvers.xpbd.contact.contact import Contact
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping
 from supple.solvers.xpbd.external_forces import ExternalForces
@@ -75,6 +75,7 @@ class XPBDWorkspace:
     threads: int | None
     pace: ThreadTuner
     anchors: StitchAnchors
+    stitch_forces: StitchForces
     growth: Growth | None = None
     most_threads: int = 1
     time: float = 0.0
@@ -137,6 +138,7 @@ class XPBDWorkspace:
         """Begin a frame at `time` [s], in substeps of h [s]."""
         self.actuators.begin_frame(self.substep(time, h))
         self.works.begin_frame(self.velocities)
+        self.stitch_forces.begin_frame()
         self.rigid.begin_frame(self.velocities)
 
     def substep(self, time: float, h: float) -> Substep:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.scene.stitches.elements import Springs, StitchTets
+from supple.solvers.xpbd.constraints.registry import ConstraintSet
 from supple.solvers.xpbd.constraints.stable_neo_hookean import BlocksOfTwo
 from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, make_groups_of_one_chunk, nine, put_nine
 from supple.solvers.xpbd.sweeps.sweep import Sweep
@@ -49,14 +50,15 @@ class StitchAnchors:
 
 
 class StitchTetConstraints(BlocksOfTwo):
-    """The tetrahedra of all soft vertex-triangle stitches."""
+    """The tetrahedra of all soft vertex-triangle stitches; rows : which of the pairs they are."""
 
     called = "stitch tets"
+    rows: NDArray[np.int64]
 
     def __init__(self, system: System, inverse_masses: NDArray[np.float64]) -> None:
         tets: StitchTets = system.stitching.tets
         movable = (inverse_masses[tets.vertices] > 0.0).any(axis=1)
-        corners = tets.vertices[movable]
+        corners, self.rows = tets.vertices[movable], np.flatnonzero(movable)
         super().__init__(
             (corners, tets.rest_shape_inverse[movable], tets.rest_volumes[movable]),
             (tets.mu[movable], tets.lam[movable]),
@@ -66,12 +68,13 @@ class StitchTetConstraints(BlocksOfTwo):
 
 
 class StitchSpringConstraints:
-    """The springs of all vertex-vertex and vertex-edge stitches."""
+    """The springs of all vertex-vertex and vertex-edge stitches; rows : which of the pairs they are."""
 
     def __init__(self, system: System, inverse_masses: NDArray[np.float64]) -> None:
         springs: Springs = system.stitching.springs
         movable = (inverse_masses[springs.vertices] > 0.0).any(axis=1)
         ends, t = springs.vertices[movable], springs.place[movable]
+        self.rows = len(system.stitching.tets) + np.flatnonzero(movable)
         w = inverse_masses[ends]
         shares = np.column_stack([1.0 - t, t])
         # Where both ends of the edge are one vertex, it has both shares.
@@ -88,6 +91,43 @@ class StitchSpringConstraints:
     def project(self, points: NDArray[np.float64], h: float) -> None:
         """See `ConstraintSet.project`."""
         self.sweep.run(points, h)
+
+
+class StitchForces:
+    """What stitches that may break deliver in the last sweep of a frame: that is exact where they are stiff, too.
+
+    After it, other stitches and their bodies move the same vertices, so that the elastic law of the positions at the
+    end of a frame gives other forces, where a stitch is stiff for its substeps.
+
+    Attributes
+    ----------
+    latest : (k, 3) forces on the vertices of all pairs, NaN where they are not known, 0 where bodies sleep: what has
+        held them does not break [N]; None where nothing breaks
+    """
+
+    def __init__(self, system: System, sets: list[ConstraintSet]) -> None:
+        self._needed = system.scene.stitching.names.breakable
+        self._others = system.stitching.nodes()[:, 1:] >= 0
+        rows = (each.rows for each in sets if isinstance(each, StitchTetConstraints | StitchSpringConstraints))
+        self._rows = np.concatenate([np.zeros(0, dtype=np.int64), *rows])
+        self.begin_frame()
+
+    def begin_frame(self) -> None:
+        """Forget the forces of the frame before."""
+        self.latest = None
+        if self._needed:
+            self.latest = np.full((len(self._others), 3), np.nan)
+            self.latest[self._rows] = 0.0
+
+    def project(self, constraints: ConstraintSet, points: NDArray[np.float64], h: float) -> None:
+        """Project constraints as their `project` does, and keep the forces where they are stitches that may break."""
+        if self.latest is None or not isinstance(constraints, StitchTetConstraints | StitchSpringConstraints):
+            constraints.project(points, h)
+            return
+        rows, forces = constraints.rows, constraints.sweep.run_measured(points, h)
+        # On a vertex that is held, what acts is opposite to what acts on the others.
+        others = forces[:, 1:] * self._others[rows, : forces.shape[1] - 1, None]
+        self.latest[rows] = np.where(np.isnan(forces[:, 0]), -others.sum(axis=1), forces[:, 0])
 
 
 def stitch_constraints(

@@ -43,8 +43,11 @@ def substep(
     push(ws, damping, h)  # (X6)
     if last:
         ws.delivered.begin(ws.extended)
-    for constraints in ws.sets:
-        constraints.project(ws.extended, h)  # 4: (X1) to (X4)
+    for constraints in ws.sets:  # 4: (X1) to (X4)
+        if last:
+            ws.stitch_forces.project(constraints, ws.extended, h)
+        else:
+            constraints.project(ws.extended, h)
     ws.actuators.project_within(at)
     restore(ws, h)  # 5: (X5)
     ws.loads.pull_to_targets(at)  # 6

@@ -61,6 +61,25 @@ class Sweep:
         """Project every constraint once: see `ConstraintSet.project`."""
         self._kernel(points, self._corners, self._counts, self._active, self._data, self._pointers, h)
 
+    def run_measured(self, points: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        """`run`, and the forces (m, k, 3) that it delivered to the vertices of each constraint [N].
+
+        NaN for vertices that cannot move, 0 for constraints that are not active.
+        """
+        members, active = self._groups.members, self._active.copy()
+        forces = np.zeros((int(members.max()) + 1, self._corners.shape[2], 3))
+        for g in np.flatnonzero(active):  # one after another, as in `run`
+            self._active[:] = False
+            self._active[g] = True
+            corners = self._corners[g, : self._counts[g]]
+            before = points[corners]
+            self.run(points, h)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                moved = (points[corners] - before)[..., :3] / (h * h * before[..., 3:])
+            forces[members[g, : self._counts[g]]] = np.where(before[..., 3:] > 0.0, moved, np.nan)
+        self._active[:] = active
+        return forces
+
 
 @cache
 def _sweep_of(project: Any, corners: int) -> Any:
