@@ -136,6 +136,16 @@ def test_stitches_of_a_scene(rows_of, tmp_path):
     assert thread.endswith(", breaks at 2 to 3 N")
 
 
+def test_stitches_that_broke_in_a_recording(rows_of, tmp_path):
+    mesh, rubber = sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), sp.StableNeoHookean(youngs=1e4, poisson=0.3)
+    bodies = [sp.Body("held", mesh, rubber), sp.Body("low", mesh, rubber, position=(0, -0.11, 0))]
+    seam = sp.VertexVertexStitch("low", "held", max_distance=0.0101, stiffness=500.0, strength=[0.1, 9.0, 9.0, 0.1])
+    scene = sp.Scene(bodies, pins=[sp.Pin("held", np.arange(8))], stitches=[seam])
+    frames = sp.simulate(scene, sp.XPBD(substeps=20), 0.01, 8, sinks=[sp.Recorder(tmp_path / "r.vtkhdf")])
+    assert [len(frame.state.broken_stitches) for frame in frames][-1] == 2
+    assert rows_of("r.vtkhdf")["stitches"] == "2 of 4 pairs have broken at the end"
+
+
 def scene_of(divisions, poisson, order=1):
     return (
         f"bodies: [{{name: bar, shape: {{kind: box, size: [4, 1, 0.1], divisions: {divisions}}}, order: {order}, "

@@ -94,3 +94,11 @@ def test_wrong_pairs_are_errors_that_name_their_line(load, tmp_path, pairs):
         )
     assert re.search(r"scene.yaml:9:", str(caught.value))
     assert "\n" not in str(caught.value)
+
+
+def test_strengths_of_a_file_are_those_of_the_pairs(load):
+    one = "kind: vertex_vertex, first: high, second: low, max_distance: 0.3, stiffness: 10, strength: "
+    before, after = STITCHED.split("obstacles:")
+    text = before + after[after.index("stitches:") :]
+    scene = load(f"{text}  - {{{one}2.5}}\n  - {{{one}[1, 2, 3, 4]}}\n  - {{{one}null}}\n", load_scene)
+    assert scene.stitching.names.strength.tolist() == [2.5] * 4 + [1.0, 2.0, 3.0, 4.0] + [float("inf")] * 4

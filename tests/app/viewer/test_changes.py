@@ -223,6 +223,32 @@ class TestBodies:
         assert [tuple(pair.first) for pair in left.contact_pairs] == [("b",)]
         run(live, 2)
 
+    def test_broken_stitches_stay_broken_when_bodies_come_and_go(self):
+        rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+        mesh = sp.shapes.box((0.4, 0.4, 0.4), (1, 1, 1))
+        names = {"far": (9, 0, 0), "near": (9, 0.41, 0), "low": (0, 0, 0), "high": (0, 0.41, 0)}
+        bodies = [sp.Body(name, mesh, rubber, position=place) for name, place in names.items()]
+        held = [sp.Pin(name, np.arange(8)) for name in ("far", "low")]
+        seams = [
+            sp.VertexVertexStitch(*pair, max_distance=0.02, stiffness=1e4, strength=strength)
+            for pair, strength in ((("near", "far"), None), (("high", "low"), [1e6, 1.0, 1.0, 1e6]))
+        ]
+        scene = sp.Scene(bodies, pins=held, stitches=seams, gravity=(0, 9.81, 0))
+        live = LiveScene(LiveSource("stack", scene, sp.XPBD(substeps=20), 1 / 60))
+        run(live, 4)
+        assert live.state.broken_stitches.tolist() == [5, 6]
+        assert len(live.system.stitching) == 6
+        change(AddBody("box"), live)
+        run(live, 1)
+        assert live.state.broken_stitches.tolist() == [5, 6]
+        change(RemoveBody("near"), live)
+        run(live, 1)
+        assert live.state.broken_stitches.tolist() == [1, 2]
+        assert len(live.system.stitching) == 2
+        change(Reset(), live)
+        assert len(live.state.broken_stitches) == 0
+        assert len(live.system.stitching) == 4
+
     def test_only_what_refers_to_a_body_is_removed_with_it(self):
         """The name of a pin, force or stitch that equals the name of the body is not a reference to it."""
         rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4)

@@ -248,10 +248,12 @@ def _print_summary(outcome: Outcome, recording: Path, products: Products) -> Non
     console = shell_console()
     if outcome.last is not None:
         report = outcome.last.report
+        broken, pairs = len(outcome.last.state.broken_stitches), len(outcome.last.system.scene.stitching)
         energy = report.kinetic_energy + report.elastic_energy + report.potential_energy
         console.print(
             f"{outcome.frames} frames to t = {outcome.last.time:.6g} s ({report.status}); "
             f"smallest J {outcome.worst_J:.4g}; energy {energy:.6g} J"
+            + (f"; {broken} of {pairs} stitched pairs have broken" if broken else "")
         )
     for name, path in {"recording": recording, **products.files()}.items():
         console.print(f"{name:<9}  {escape(str(path))}")

@@ -35,9 +35,14 @@ class BlocksOfTwo:
     moduli : mu and lam of the energy density, (m,) each, above zero [Pa]
     inverse_masses : of all vertices [1/kg]
     groups : of the tets
+
+    Attributes
+    ----------
+    warns : whether the log says that they are too stiff; it did before stitches broke
     """
 
     called = "stable Neo-Hookean tets"
+    warns = True
 
     def __init__(
         self,
@@ -65,7 +70,7 @@ class BlocksOfTwo:
 
     def project(self, points: NDArray[np.float64], h: float) -> None:
         """See `ConstraintSet.project`."""
-        if h != self._warned_for:
+        if self.warns and h != self._warned_for:
             self._warn_if_shortened(h)
         self.sweep.run(points, h)
 
@@ -97,6 +102,7 @@ class StableNeoHookeanConstraints(BlocksOfTwo):
         tets = system.tets[rows], system.rest_shape_inverse[rows], system.rest_volumes[rows]
         self._rows = rows
         super().__init__(tets, (mu, lam), system.inverse_masses, make_groups(layout, tets[0]))
+        self.warns = len(system.stitching.broken) == 0
 
     def grow(self, Dm_inv: NDArray[np.float64], volumes: NDArray[np.float64]) -> None:
         """Take other stress-free shapes of all tets of the system: (m, 3, 3) [1/m], (m,) [m^3]."""

@@ -65,6 +65,7 @@ class StitchTetConstraints(BlocksOfTwo):
             inverse_masses,
             make_groups_of_one_chunk(corners, system.joined_components, len(inverse_masses)),
         )
+        self.warns = len(system.stitching.broken) == 0
 
 
 class StitchSpringConstraints:
