@@ -6,16 +6,16 @@ import json
 from typing import Any
 
 import h5py
-from numpy.typing import NDArray
 
-from supple.results.checkpoint.values import encoded
-from supple.scene.joints.joint import Function
+from supple.kinds.codec import decoded, encoded, kinds_by_name
+from supple.model.system import System, build_system
+from supple.results.recording import description
 
 
 def set_in_scene(file: h5py.File, where: str, value: Any) -> None:
-    """Replace a value of the description, such as "joints/0/limits"; of arrays, see `replace_array`."""
+    """Replace a value of the description, such as "scene/joints/0/limits"; of arrays, see `replace_array`."""
     tree, inner, last = _found(file, where)
-    inner[last] = encoded(value, {"Function": Function})[0]
+    inner[last] = encoded(value, kinds_by_name(), inline=1 << 20)[0]
     _write(file, tree)
 
 
@@ -49,7 +49,14 @@ def _write(file: h5py.File, tree: Any) -> None:
     file["supple/header"] = json.dumps(tree)
 
 
-def replace_array(file: h5py.File, where: str, values: NDArray[Any]) -> None:
-    """Write an array of any shape in the place of one of the description."""
-    del file[f"supple/{where}"]
-    file[f"supple/{where}"] = values
+def system_in(file: h5py.File) -> System:
+    """The flat arrays of the scene that an open file describes."""
+    arrays = {path: item[()] for path, item in _datasets(file["supple"])}
+    tree = json.loads(file["supple/header"][()])["fields"]["scene"]
+    return build_system(decoded(tree, arrays, description._classes(), lambda number: None))
+
+
+def _datasets(group: h5py.Group) -> list[tuple[str, h5py.Dataset]]:
+    found: list[tuple[str, h5py.Dataset]] = []
+    group.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
+    return found

@@ -205,7 +205,7 @@ def test_a_recording_with_a_hostile_formula_is_refused(tmp_path):
     path = tmp_path / "r.vtkhdf"
     list(sp.simulate(scene, sp.Implicit(contact=None), dt=0.01, steps=1, sinks=[sp.Recorder(path)]))
     with h5py.File(path, "r+") as file:
-        set_in_scene(file, "physics/recorded_laws/0/law/text", "__import__('os').system('touch hacked')")
+        set_in_scene(file, "scene/bodies/0/material/psi/text", "__import__('os').system('touch hacked')")
     with pytest.raises(OutputError, match=r"is damaged: its description of the scene: the formula has \"__import__"):
         sp.read_recording(path)
 

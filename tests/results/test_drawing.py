@@ -13,7 +13,6 @@ from supple.results.export.video import Film
 from supple.results.export.video_worker import placed
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
-from supple.results.recording.scene import RecordedObstacle
 from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.camera import direction_of, fitted
 from supple.results.view.floor_shadow import FloorShadow
@@ -99,8 +98,7 @@ def test_a_bowl_is_seen_whole_and_a_hall_is_not():
     low, high, up = np.full(3, -0.1), np.full(3, 0.1), np.array([0.0, 1.0, 0.0])
 
     def view(radius):
-        shape = {"center": np.zeros(3), "radius": radius, "inside": True}
-        bowl = RecordedObstacle("bowl", "Sphere", shape, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
+        bowl = sp.obstacles.Sphere(radius=radius, inside=True, name="bowl")
         return view_of_scene(box_corners(low, high), up, [bowl])
 
     np.testing.assert_allclose([view(0.2).low[0], view(0.2).high[0]], [-0.2, 0.2], rtol=0.02)

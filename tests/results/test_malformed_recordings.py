@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import shutil
@@ -31,17 +32,17 @@ def _set(path, value):
 
 
 def _claim_many_values(file):
-    del file["supple/masses"]
-    file.create_dataset("supple/masses", (1 << 40,), "f8", chunks=(1 << 16,))
+    del file["supple/scene/bodies/0/skin/vertices"]
+    file.create_dataset("supple/scene/bodies/0/skin/vertices", (1 << 40,), "f8", chunks=(1 << 16,))
 
 
 def _claim_many_rows(file):
-    del file["supple/rest_positions"]
-    file.create_dataset("supple/rest_positions", (1 << 40, 3), "f8", chunks=(1 << 10, 3))
+    del file["supple/scene/bodies/0/mesh/vertices"]
+    file.create_dataset("supple/scene/bodies/0/mesh/vertices", (1 << 40, 3), "f8", chunks=(1 << 10, 3))
 
 
 def _far_triangle(file):
-    file["supple/bodies/0/triangles"][0, 0] = 10_000
+    file["supple/scene/bodies/0/skin/triangles"][0, 0] = 10_000
 
 
 def _delete(path):
@@ -58,6 +59,22 @@ def _of_format(version):
     return change
 
 
+def _in_header(change):
+    def rewrite(file):
+        tree = json.loads(file["supple/header"][()])
+        change(tree["fields"]["scene"]["fields"])
+        del file["supple/header"]
+        file["supple/header"] = json.dumps(tree)
+
+    return rewrite
+
+
+def _of_class(part, name):
+    return _in_header(lambda scene: scene[part]["tuple"][0].update({"class": name}))
+
+
+_function = _in_header(lambda scene: scene["obstacles"]["tuple"][0]["fields"].update({"motion": {"function": 7}}))
+
 DAMAGES = {
     "more frames than rows": (_set("supple/frames_written", np.int64(26)), "26 frames need"),
     "no frames": (_set("supple/frames_written", np.int64(0)), "number of frames is 0"),
@@ -65,33 +82,31 @@ DAMAGES = {
     "huge count": (_set("supple/frames_written", np.int64(1 << 62)), "frames need"),
     "huge array": (_claim_many_values, "claims more data than the file can contain"),
     "huge rest shape": (_claim_many_rows, "claims more data than the file can contain"),
-    "triangle out of range": (_far_triangle, "points to row 10000"),
-    "rows out of range": (_scene("bodies/0/vertices", slice(0, 10_000)), "outside of 54 vertices"),
-    "rows of another body": (_scene("bodies/0/vertices", slice(0, 2)), "points to row"),
+    "triangle out of range": (_far_triangle, "10000"),
     "no header": (_delete("supple/header"), "supple/header is missing"),
     "header is no JSON": (_set("supple/header", "{"), "its description of the scene"),
     "header is a number": (_set("supple/header", 3.0), "is not a text"),
     "header is deep": (_set("supple/header", '{"tuple": [' * 60 + "]}" * 60), "nested too deeply"),
     "header of another class": (_set("supple/header", '{"class": "System", "fields": {}}'), "'System'"),
-    "no bodies": (_scene("bodies", ()), "no bodies"),
+    "no scene": (_scene("scene", None), "scene is 'None', not of the type Scene"),
+    "no bodies": (_scene("scene/bodies", ()), "bodies are missing"),
     "no time step": (_scene("dt", 0.0), "no time step"),
     "time step of text": (_scene("dt", "1"), "dt is '1', not of the type float"),
-    "bodies are no bodies": (_scene("bodies", (1, 2)), "bodies/0 is '1', not of the type RecordedBody"),
-    "obstacles are none": (_scene("obstacles", (None,)), "obstacles/0 is 'None'"),
-    "obstacles of no known kind": (
-        _scene("obstacles/0/kind", "Cone"),
-        "is of an unknown kind, 'Cone'; register",
-    ),
-    "obstacles with impossible numbers": (_scene("obstacles/1/parameters/radius", -1), "radius"),
-    "a skin of integers": (_set("supple/bodies/0/skin/weights", np.zeros((1, 4), dtype=int)), "holds int64, not float"),
-    "an array that is missing": (_delete("supple/tets"), "supple/tets is missing"),
+    "bodies are no bodies": (_scene("scene/bodies", (1, 2)), "bodies[0] is a int; give a Body or RigidBody"),
+    "obstacles are none": (_scene("scene/obstacles", (None,)), "obstacles[0] is a NoneType; give a Obstacle"),
+    "obstacles of no known kind": (_of_class("obstacles", "Cone"), "the class 'Cone' is not known here"),
+    "obstacles of another kind": (_of_class("obstacles", "Pin"), "Pin has other fields in this version"),
+    "obstacles with impossible numbers": (_scene("scene/obstacles/1/radius", -1), "radius"),
+    "a function of time without values": (_function, "a function of time without values"),
+    "a mesh of integers": (_set("supple/scene/bodies/0/mesh/tets", np.zeros((1, 4), dtype=int)), "with a vertex twice"),
+    "an array that is missing": (_delete("supple/scene/bodies/0/mesh/tets"), "mesh/tets is missing"),
     "no points": (_delete("VTKHDF/Points"), "VTKHDF/Points is missing"),
     "points of text": (_set("VTKHDF/Points", "here"), "has shape"),
     "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),
     "times are not finite": (_set("supple/frames/time", np.full(25, np.nan)), "time is not finite"),
     "unknown status": (_set("supple/frames/status", np.full(25, len(Status), dtype=np.uint8)), "another version"),
-    "newer format": (_of_format(99), "another version (format 99, this one reads 6); simulate it again"),
-    "earlier format": (_of_format(3), "another version (format 3, this one reads 6); simulate it again"),
+    "newer format": (_of_format(99), "another version (format 99, this one reads 7); simulate it again"),
+    "earlier format": (_of_format(3), "another version (format 3, this one reads 7); simulate it again"),
     "another program's": (_delete("supple"), "a VTKHDF UnstructuredGrid of another program"),
 }
 

@@ -80,8 +80,8 @@ def test_exports_have_the_ten_nodes(made, tmp_path):
         export(recording, "vtkhdf", tmp_path / "copy.vtkhdf")
         export(recording, "glb", tmp_path / "scene.glb")
     with sp.read_recording(tmp_path / "copy.vtkhdf") as copy:
-        np.testing.assert_array_equal(copy.nodes_of(copy.body("bar")), bar.nodes + 8)
-        assert copy.nodes_of(copy.body("cube")).shape == (6, 4)
+        np.testing.assert_array_equal(copy.body("bar").body.mesh.nodes, bar.nodes)
+        assert copy.body("cube").body.mesh.nodes.shape == (6, 4)
 
 
 def test_the_check_passes(made):
@@ -119,14 +119,14 @@ def test_the_check_finds_a_fold_between_positive_corners(made, tmp_path):
 @pytest.mark.parametrize(
     ("name", "change", "expected"),
     [
-        ("rows", lambda rows: rows - 1, "not ascending rows of its tets, with their corners"),
-        ("rows", lambda rows: rows[::-1], "not ascending rows of its tets"),
-        ("nodes", lambda nodes: nodes + 1000, "points to row"),
+        ("tets", lambda nodes: nodes + 1000, "but vertex indices run from 0 to"),
+        ("tets", lambda nodes: nodes[:, [0, 1, 2, 3, 5, 4, 6, 7, 8, 9]], "node"),
+        ("tets", lambda nodes: nodes[:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]], "are inverted at rest"),
     ],
 )
 def test_contradictory_nodes_are_refused(made, tmp_path, name, change, expected):
     def contradict(file):
-        data = file[f"supple/quadratic/{name}"]
+        data = file[f"supple/scene/bodies/1/mesh/{name}"]
         data[...] = change(data[...])
 
     with pytest.raises(OutputError, match=expected):

@@ -8,6 +8,7 @@ import pytest
 
 import supple as sp
 from supple.errors import OutputError
+from supple.kinds.kind import declared
 from supple.model.state import Status
 from supple.results.recording import recorder as recording_module
 from supple.results.recording.reader import read_recording
@@ -48,12 +49,12 @@ def test_the_scene_reads_back_equal(recorded, recording):
         (b.name, b.vertices, b.tets) for b in system.bodies
     ]
     cube, slab = recording.bodies
-    np.testing.assert_array_equal(slab.triangles, system.bodies[1].body.mesh.surface.triangles)
-    assert "youngs=1e4" in cube.material.replace("10000.0", "1e4")
+    np.testing.assert_array_equal(slab.boundary, system.bodies[1].body.mesh.surface.triangles)
+    assert cube.body.material.youngs == 1e4
     assert slab.skin is None
     skin = system.bodies[0].body.skin
     np.testing.assert_allclose(cube.skin.positions(recording.rest_positions[cube.vertices]), skin.vertices, atol=1e-12)
-    assert [o.kind for o in recording.obstacles] == ["HalfSpace", "Sphere", "Box", "TriangleObstacle"]
+    assert [type(o).__name__ for o in recording.obstacles] == ["HalfSpace", "Sphere", "Box", "TriangleObstacle"]
     assert recording.scene_text == "bodies: []\n"
     assert recording.solver == "Prescribed()"
     assert recording.supple_version == sp.__version__
@@ -81,10 +82,13 @@ def test_every_kind_of_obstacle_reads_back_equal(tmp_path, tools):
     path = tmp_path / "kinds.vtkhdf"
     list(simulate(scene, tools.Prescribed(), 1 / 30, 1, sinks=[Recorder(path)]))
     with read_recording(path) as recording:
-        found = [one.obstacle for one in recording.obstacles]
+        found = recording.obstacles
     for one, other in zip(found, scene.obstacles, strict=True):
         assert type(one) is type(other)
-        assert (one.name, one.friction, one.values()) == (other.name, other.friction, other.values())
+        assert (one.name, one.summary()) == (other.name, other.summary())
+        for field in declared(type(one)):
+            if field not in ("surface", "motion", "name"):
+                np.testing.assert_array_equal(getattr(one, field), getattr(other, field))
     np.testing.assert_array_equal(found[-1].triangles()[0], obstacles[-1].triangles()[0])
 
 
@@ -152,7 +156,7 @@ def test_a_simulation_that_stops_early_leaves_no_unused_room(tmp_path, tools):
     with h5py.File(path) as file:
         assert file["VTKHDF/Steps"].attrs["NSteps"] == 4
         assert len(file["VTKHDF/Steps/Values"]) == 4
-        assert len(file["VTKHDF/Points"]) == 4 * len(file["supple/rest_positions"])
+        assert len(file["VTKHDF/Points"]) == 4 * int(file["VTKHDF/NumberOfPoints"][0])
     assert [p.name for p in tmp_path.iterdir()] == ["blocked.vtkhdf"]
 
 

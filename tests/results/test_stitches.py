@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from tests.recordings import set_in_scene
 
 import supple as sp
 from supple.model.system import initial_state
@@ -132,6 +133,6 @@ def test_invalid_stitches_in_a_recording_are_an_error(recorded, tmp_path):
     path = tmp_path / "broken.vtkhdf"
     path.write_bytes(recorded[0].read_bytes())
     with h5py.File(path, "r+") as file:
-        file["supple/stitches/nodes"][0, 0] = 10_000
-    with pytest.raises(sp.OutputError, match="a stitch joins node 10000 of"):
+        set_in_scene(file, "scene/stitches/1", sp.VertexVertexStitch("high", "low", pairs=[(10_000, 0)], stiffness=1.0))
+    with pytest.raises(sp.OutputError, match="10000"):
         sp.read_recording(path)

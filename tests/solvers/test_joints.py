@@ -208,6 +208,6 @@ def test_swing_and_twist_of_a_ball_are_limited_and_the_check_finds_larger_ones(s
     torque = frames[-1].report.joints["ball"].torque
     assert torque @ (0, 0, 1) == pytest.approx(TORQUE * directions[-1, 0], rel=0.02)
     with h5py.File(path, "r+") as file:
-        set_in_scene(file, "joints/0/conditions/functions/1/limits", (-0.1, 0.4))
+        set_in_scene(file, "scene/joints/0/twist_limits", (-0.1, 0.4))
     found = sp.check_recording(path)["joints"]
     assert (found.verdict, found.worst) == ("fail", pytest.approx(0.1, abs=slack))

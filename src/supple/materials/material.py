@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Number, NumberPerTet
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name, Number, NumberPerTet
 from supple.kinds.kind import Kind
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.laws.internal import add_resting_densities, add_resting_hessians, add_resting_piolas
 from supple.materials.laws.pointwise import densities_at, hessians_at, piolas_at
-from supple.materials.per_tet import TetMaterial, one_per_tet
+from supple.materials.per_tet import NOT_ELASTIC, TetMaterial, one_per_tet
 from supple.materials.stretch_energies.stretches import StretchFunctions
 
 
@@ -70,6 +70,13 @@ class Material(Kind, ABC):
         """The name of the material in messages."""
         return type(self).__name__
 
+    @property
+    def otherwise(self) -> Material | None:
+        """What stands for a material of a user in a recording, where its class is not known."""
+        name = type(self).__name__
+        ours = type(self).__module__.startswith("supple.")
+        return None if ours else NotRecorded(name=name, density=self.density, damping=self.damping)
+
     @abstractmethod
     def per_tet(self, n_tets: int) -> TetMaterial:
         """The parameters of this material, one row per tet of a body.
@@ -92,6 +99,21 @@ class Material(Kind, ABC):
             mu=one_per_tet(mu, n_tets, f"{name}: mu"),
             lam=one_per_tet(lam, n_tets, f"{name}: lam"),
         )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NotRecorded(Material):
+    """The material of a recorded body whose law the recording does not have.
+
+    Parameters
+    ----------
+    name : of the class that the body was simulated with
+    """
+
+    name: Annotated[str, Name()]
+
+    def per_tet(self, n_tets: int) -> TetMaterial:
+        return self._tet_material(n_tets, NOT_ELASTIC, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

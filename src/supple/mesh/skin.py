@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, vertex_array
 from supple.mesh.quadratic import node_weights
+from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.runtime.kernel_cache import njit
 
@@ -78,6 +79,35 @@ class Embedding:
         if x.shape != (self.vertex_count, 3):
             raise MeshError(f"Embedding: positions have shape {x.shape}; they must have shape ({self.vertex_count}, 3)")
         return mixed(self.corners, self.weights, np.ascontiguousarray(x))
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Triangles whose vertices follow the vertices of a body.
+
+    Attributes
+    ----------
+    corners : (k, 4) int32, rows of the body's vertices: the tet that carries each surface vertex; (k, 10) the nodes of
+        a quadratic one
+    weights : (k, 4) barycentric coordinates in it, or (k, 10) shape functions, summing to one; negative
+        where the vertex lies outside
+    triangles : (t, 3) int32, rows of `corners`
+    """
+
+    corners: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, mesh: TetMesh, surface: SurfaceMesh) -> Skin:
+        """A surface in the coordinates of the mesh, without vertices that no triangle uses."""
+        used = surface.compact()
+        held = Embedding.of(mesh, used.vertices)
+        return cls(held.corners, held.weights, used.triangles)
+
+    def positions(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where the surface's vertices (k, 3) are when the body's are at x (n, 3) [m]."""
+        return mixed(self.corners, self.weights, np.ascontiguousarray(x, dtype=np.float64))
 
 
 @njit(cache=True)

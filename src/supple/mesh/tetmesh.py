@@ -6,6 +6,7 @@ import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,6 +83,8 @@ class TetMesh(Showable):
     tets: NDArray[np.int32]
     nodes: NDArray[np.int32]
     turned: int
+
+    _arguments: ClassVar[dict[str, str]] = {"vertices": "vertices", "tets": "nodes"}  # see `supple.kinds.codec`
 
     def __init__(self, vertices: ArrayLike, tets: ArrayLike) -> None:
         points = vertex_array(vertices, "TetMesh")

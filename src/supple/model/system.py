@@ -27,35 +27,24 @@ from supple.model.loads.applied import ActiveLoad, AppliedLoad, Setting
 from supple.model.loads.build import applied, applied_force
 from supple.model.state import State
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
-from supple.scene.body import PlacedBody
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.joints.welding import Welding, linked_pieces
 from supple.scene.motion import Motion, moved_points, points_at_origin, rigid_pose
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rows import BodyRows
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching
 
 
 @dataclass(frozen=True, eq=False)
-class BodyRange:
+class BodyRange(BodyRows):
     """The rows of the System's arrays that belong to one body."""
 
-    body: PlacedBody
-    vertices: slice
-    tets: slice
     edges: slice
     triangles: slice
     points: slice
-
-    @property
-    def name(self) -> str:
-        return self.body.name
-
-    @property
-    def rigid(self) -> bool:
-        return isinstance(self.body, RigidBody)
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +213,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         embedded, surface = body.touching
         counts = len(mesh.vertices), len(mesh.tets), len(mesh.edges), len(surface), len(embedded)
         rows = [slice(begin, begin + count) for begin, count in zip((n, m, e, t, p), counts, strict=True)]
-        ranges.append(BodyRange(body, *rows))
+        ranges.append(BodyRange(body, len(ranges), *rows))
         rest.append(mesh.vertices)
         masses.append(body.lumped_masses())
         tets.append(mesh.tets + n)

@@ -7,20 +7,16 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import NDArray
 
-from supple.kinds.suggestion import Named
-from supple.materials.elastic_tets.laws import TetLaws
 from supple.model.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
 from supple.model.crushed import HELD, crushed_message, crushed_tets
 from supple.model.diagnostics import Diagnostics, measure
 from supple.model.energy_balance import completed_works
 from supple.model.state import ContactPoints, SolverDetails, State, Status, StepReport
-from supple.model.system import BodyRange, System
+from supple.model.system import System
 from supple.results.readings.frame_readings import FrameReadings, JointReading, joint_readings
 from supple.runtime.displayed import DisplayedReport
-from supple.scene.rigid.pose import Pose, pose_of
 
 if TYPE_CHECKING:
     from supple.solvers.solver import Solver
@@ -100,43 +96,9 @@ class Frame(FrameReadings):
         return self.state.time
 
     @cached_property
-    def positions(self) -> dict[str, NDArray[np.float64]]:
-        """By body name, (n, 3) [m]; of a rigid body, of its surface's vertices."""
-        return self.system.split(self.state.positions)
-
-    @cached_property
-    def velocities(self) -> dict[str, NDArray[np.float64]]:
-        """By body name, (n, 3) [m/s]."""
-        return self.system.split(self.state.velocities)
-
-    @cached_property
-    def poses(self) -> dict[str, Pose]:
-        """Of the rigid bodies, by name."""
-        x, v, rest = self.state.positions, self.state.velocities, self.system.rest_positions
-        rows = {part.name: part.vertices for part in self.system.rigid_bodies}
-        poses = {name: pose_of(rest[part], x[part], v[part]) for name, part in rows.items()}
-        return Named("rigid body", poses)
-
-    @cached_property
     def contacts(self) -> ContactPoints | None:
         """All contacts, one by one; None where no step led to the frame, or `Implicit` has contact=None."""
         return None if self.find_contacts is None else self.find_contacts()
-
-    @property
-    def _x(self) -> NDArray[np.float64]:
-        return self.state.positions
-
-    @cached_property
-    def _laws(self) -> TetLaws:
-        return self.system.laws_at(self.state.time)
-
-    @property
-    def _internal(self) -> NDArray[np.float64]:
-        return self.state.internal
-
-    @property
-    def _bodies(self) -> tuple[BodyRange, ...]:
-        return self.system.bodies
 
 
 def completed_report(

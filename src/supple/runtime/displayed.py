@@ -74,7 +74,7 @@ class DisplayedFrame(Showable):
         return {
             "index": str(this.index),
             "time": f"{this.time:.6g} s",
-            "bodies": short_list(body.name for body in this._bodies),
+            "bodies": short_list(body.name for body in this.system.bodies),
             "status": str(report.status),
             "smallest J": f"{report.min_det_F:.4g}",
         }

@@ -16,7 +16,7 @@ from supple.kinds.kind import Kind
 from supple.materials.material import Material
 from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.quadratic import node_volumes
-from supple.mesh.skin import Embedding
+from supple.mesh.skin import Skin
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -84,6 +84,11 @@ class PlacedBody(Kind):
     def touching(self) -> tuple[EmbeddedPoints, NDArray[np.int32]]:
         """The points of contact as combinations of the mesh's vertices, and triangles (t, 3) of them."""
         return self.embedded, self.triangles
+
+    @cached_property
+    def attached_skin(self) -> Skin | None:
+        """`skin`, whose vertices follow those of the mesh."""
+        return None if self.skin is None else Skin.of(self.mesh, self.skin)
 
     @property
     def touches_with_skin(self) -> bool:
@@ -197,11 +202,10 @@ class Body(PlacedBody):
 
     @cached_property
     def touching(self) -> tuple[EmbeddedPoints, NDArray[np.int32]]:
-        if self.collide == "tets" or self.skin is None:
+        skin = self.attached_skin
+        if self.collide == "tets" or skin is None:
             return super().touching
-        skin = self.skin.compact()
-        attached = Embedding.of(self.mesh, skin.vertices)
-        return EmbeddedPoints.in_rows(attached.corners, attached.weights), skin.triangles
+        return EmbeddedPoints.in_rows(skin.corners, skin.weights), skin.triangles
 
     @property
     def touches_with_skin(self) -> bool:

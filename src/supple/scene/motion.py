@@ -63,10 +63,11 @@ class Keyframes(Kind):
         if self.angles is not None and self.rotations is not None:
             raise SceneError("Keyframes: angles and rotations are both given; give one of them")
         displacements = np.zeros((k, 3)) if self.displacements is None else self.displacements
-        angles = np.zeros(k) if self.angles is None else self.angles
         object.__setattr__(self, "displacements", self._array("displacements", displacements, (k, 3)))
-        object.__setattr__(self, "angles", self._array("angles", angles, (k,)))
-        if self.rotations is not None:
+        if self.rotations is None:
+            angles = np.zeros(k) if self.angles is None else self.angles
+            object.__setattr__(self, "angles", self._array("angles", angles, (k,)))
+        else:
             self._array("rotations", self.rotations, (k, 3))
 
     @staticmethod

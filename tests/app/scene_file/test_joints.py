@@ -114,8 +114,8 @@ def test_info_run_recording_and_check_know_joints(scene_file, tmp_path, capsys):
         details = recording[-1].report.details
         assert set(details.joint_forces) == {"shoulder", "HingeJoint 1", "SliderJoint 1", "FixedJoint 1"}
         assert recording[-1].report.joints["SliderJoint 1"].motor_force == 30.0
-        assert recording.physics.held_joints == 1
-        assert recording.physics.motors == 2
+        assert [joint.second for joint in recording.scene.joints].count(None) == 1
+        assert len(recording.scene.motors) == 2
     results = {result.name: result for result in sp.check_recording(out / "recording.vtkhdf").results}
     assert results["momentum"].message == "joints hold bodies"
     assert (results["energy"].verdict, results["balance"].verdict) == ("pass", "pass")

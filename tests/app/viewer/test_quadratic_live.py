@@ -18,7 +18,7 @@ def test_it_falls_and_is_drawn():
     assert live.step().status == "converged"
     described = describe(live)
     (shown,) = described.bodies
-    np.testing.assert_array_equal(shown.nodes, ball.nodes)
+    np.testing.assert_array_equal(shown.body.mesh.nodes, ball.nodes)
     model = MomentBuilder()._model_of(described)
     np.testing.assert_array_equal(model.tets, ball.tets)
     (drawn,) = model.bodies

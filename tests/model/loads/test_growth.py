@@ -124,14 +124,14 @@ def test_gradient_and_hessian_have_slope_two():
 
 @pytest.mark.parametrize(
     ("described", "message"),
-    [("melting", "'melting' that this version does not know"), (3, "active/0/kind is '3'")],
+    [("melting", "stretch is not an array of numbers|stretch is 'melting'"), (-3.0, "stretch is -3; it must be from")],
 )
 def test_recordings_of_what_is_not_known_are_refused(tmp_path, described, message):
     path = tmp_path / "run.vtkhdf"
     scene = sp.Scene([sp.Body("bar", BAR, RUBBER)], loads=[sp.Growth("bar", 1.1)], **STILL)
     last_of(scene, sp.XPBD(substeps=1, contact=None), 1, sinks=[sp.Recorder(path)])
     with h5py.File(path, "r+") as file:
-        set_in_scene(file, "physics/active/0/kind", described)
+        set_in_scene(file, "scene/loads/0/stretch", described)
     with pytest.raises(OutputError, match=message):
         read_recording(path)
 

@@ -73,7 +73,7 @@ def corrupted(tmp_path):
         copy = tmp_path / "corrupted.vtkhdf"
         shutil.copy(path, copy)
         with h5py.File(copy, "r+") as file:
-            change(file, len(file["supple/rest_positions"]))
+            change(file, int(file["VTKHDF/NumberOfPoints"][0]))
         return copy
 
     return corrupt

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.recordings import replace_array, set_in_scene
+from tests.recordings import set_in_scene, system_in
 
 import supple as sp
+from supple.results.check.recorded import RecordedTrajectory
 from supple.results.check.surfaces import Surfaces
 
 from .conftest import JELLY, X, failures, octahedron, recorded
@@ -20,8 +21,8 @@ def apart(file, n, frame, gap):
     half = n // 2
     x[half:, 0] += x[:half, 0].max() + gap - x[half:, 0].min()
     # Straight faces: the block's own shape decides nothing here.
-    x[:half] = file["supple/rest_positions"][:half]
-    x[half:] = file["supple/rest_positions"][half:] + np.array([1.0 + gap, 0.0, 0.0])
+    x[:half] = system_in(file).rest_positions[:half]
+    x[half:] = system_in(file).rest_positions[half:] + np.array([1.0 + gap, 0.0, 0.0])
     file[X][frame * n : (frame + 1) * n] = x
 
 
@@ -42,7 +43,7 @@ def test_a_body_that_meets_itself(free, corrupted):
     def change(file, n):
         # The left block's end is pulled through its middle.
         x = file[X][n : 2 * n]
-        rest = file["supple/rest_positions"][: n // 2]
+        rest = system_in(file).rest_positions[: n // 2]
         end = rest[:, 0] == rest[:, 0].max()
         x[: n // 2][end] -= [1.0, 0.1, 0.1]
         file[X][n : 2 * n] = x
@@ -86,7 +87,7 @@ def test_a_body_completely_inside_another(free, corrupted):
 def test_excluded_pairs_are_left_out(free, corrupted):
     def overlap(file, n):
         apart(file, n, 2, -0.1)
-        set_in_scene(file, "untouching", ((1, 0),))
+        set_in_scene(file, "scene/contact_pairs", (sp.ContactPair("right", "left", collide=False),))
 
     assert failures(corrupted(free, overlap), only=CONTACT) == {}
 
@@ -94,21 +95,17 @@ def test_excluded_pairs_are_left_out(free, corrupted):
 def test_vertices_that_may_touch_a_triangle_are_left_out(free, corrupted):
     def touch(file, n, exempt):
         """One vertex of the right block on the middle of a triangle of the left one."""
-        left, right = (file[f"supple/bodies/{k}/triangles"][:] for k in (0, 1))
+        left, right = (body.boundary for body in system_in(file).bodies)
         x = file[X][2 * n : 3 * n]
-        rest = file["supple/rest_positions"][: n // 2]
+        rest = system_in(file).rest_positions[: n // 2]
         facing = [row for row in left if (rest[row, 0] == rest[:, 0].max()).all()]
-        vertex = n // 2 + int(right.min()) + int(np.argmin(file["supple/rest_positions"][n // 2 :, 0]))
+        vertex = n // 2 + int(right.min()) + int(np.argmin(system_in(file).rest_positions[n // 2 :, 0]))
         x[vertex] = x[facing[0]].mean(axis=0) - [1e-6, 0, 0]
         file[X][2 * n : 3 * n] = x
         if exempt:
-            stitch = {
-                "nodes": np.array([[vertex, *facing[0]]], dtype=np.int32),
-                "weights": np.full((1, 3), 1 / 3),
-                "laws/springs": np.ones((1, 2)),
-            }
-            for name, values in stitch.items():
-                replace_array(file, f"stitches/{name}", values)
+            row = next(k for k, corners in enumerate(left) if (corners == facing[0]).all())
+            seam = sp.SoftVertexTriangleStitch("right", "left", pairs=[(vertex - n // 2, row)], youngs=1.0, poisson=0.3)
+            set_in_scene(file, "scene/stitches", (seam,))
 
     assert failures(corrupted(free, lambda file, n: touch(file, n, False)), only=["intersection"]) == {
         "intersection": 2
@@ -174,7 +171,7 @@ def test_a_body_that_meets_an_obstacle_made_of_triangles(around, corrupted, lowe
 )
 def test_bodies_inside_obstacles_and_obstacles_inside_bodies(around, corrupted, lowest, size, where):
     def change(file, n):
-        x = file["supple/rest_positions"][:]
+        x = system_in(file).rest_positions
         x = (x - x.min(axis=0)) * size + np.asarray(lowest)
         file[X][5 * n : 6 * n] = x
 
@@ -218,7 +215,8 @@ def test_excluded_and_stitched_pairs_are_recorded(tmp_path):
     )
     path = tmp_path / "r.vtkhdf"
     with sp.read_recording(recorded(path, scene, sp.XPBD(substeps=2))) as recording:
-        untouching = recording.untouching
+        trajectory = RecordedTrajectory(recording)
+        untouching = trajectory.untouching
         n = len(recording.rest_positions)
         assert {(0, 1), (0, 2), (1, 2), (2, 2)} <= set(untouching)
         assert not {(0, 0), (1, 1), (0, 3), (3, 4)} & set(untouching)
@@ -229,10 +227,10 @@ def test_excluded_and_stitched_pairs_are_recorded(tmp_path):
         ]
         assert recording.stitches.nodes[:, 0].tolist() == [2 * n // 3, n // 3 + 1]
         np.testing.assert_array_equal(recording.stitches.anchor_owners, [1])
-        np.testing.assert_array_equal(recording.stitches.anchors, recording.obstacles[1].vertices[[4]])
-        surfaces = Surfaces(recording)
+        np.testing.assert_array_equal(recording.stitches.anchors, recording.obstacles[1].surface.vertices[[4]])
+        surfaces = Surfaces(trajectory)
         at = surfaces.place(recording[0].state.positions, recording[0].obstacle_poses)
-        np.testing.assert_array_equal(at[surfaces.stitched[1, 1]], recording.obstacles[1].vertices[4])
+        np.testing.assert_array_equal(at[surfaces.stitched[1, 1]], recording.obstacles[1].surface.vertices[4])
         assert len(recording.stitches) == 2
     # a and b overlap, and may.
     assert failures(path, only=CONTACT) == {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.recordings import system_in
 
 import supple as sp
 
@@ -12,7 +13,7 @@ from .conftest import V, X, failures
 
 def consistently(file, n, frame, velocities):
     """Replace the velocities of a frame, and what was measured on them."""
-    m, x = file["supple/masses"][:], file[X][frame * n : (frame + 1) * n]
+    m, x = system_in(file).masses, file[X][frame * n : (frame + 1) * n]
     file[V][frame * n : (frame + 1) * n] = velocities
     P, center = m @ velocities, m @ x / m.sum()
     file["supple/frames/kinetic_energy"][frame] = 0.5 * m @ (velocities**2).sum(axis=1)
@@ -30,7 +31,7 @@ def test_momentum_without_a_force(free, corrupted):
 def test_spin_without_a_torque(free, corrupted):
     def turn(file, n):
         x, v = file[X][6 * n : 7 * n], file[V][6 * n : 7 * n]
-        m = file["supple/masses"][:]
+        m = system_in(file).masses
         consistently(file, n, 6, v + np.cross([0, 1e-3, 0], x - m @ x / m.sum()))
 
     assert failures(corrupted(free, turn)) == {"spin": 6, "balance": 6}

@@ -7,10 +7,10 @@ import pytest
 
 import supple as sp
 from supple.results.check.checks.works import Works
-from supple.results.check.load_forces import load_forces
+from supple.results.check.load_forces import LoadPattern, load_forces
+from supple.results.check.recorded import RecordedTrajectory
 from supple.results.check.settings import CheckSettings
-from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.recording.scene import RecordedLoad
+from supple.results.check.snapshot import Scene
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.4, damping=0.02)
 
@@ -102,8 +102,8 @@ def test_the_work_of_pins_is_of_second_order(tmp_path):
         solver = sp.Implicit(integrator="static")
         path = recorded(tmp_path / f"{steps}.vtkhdf", scene, solver, 1.0 / steps, steps)
         with sp.read_recording(path) as recording:
-            check = Works(Scene(recording), CheckSettings())
-            frames = [Snapshot.of(check.scene, frame) for frame in recording]
+            check = Works(Scene(RecordedTrajectory(recording)), CheckSettings())
+            frames = [check.scene.snapshot(k) for k in range(len(recording))]
             for frame in frames:
                 check.see(frame)
             work = sum(found[0][0] for found in check.frames)
@@ -210,9 +210,9 @@ def test_works_of_loads_converge_to_the_changes_of_their_potentials():
     mesh = sp.shapes.box((0.3, 0.1, 0.1), (2, 1, 1))
     ends = mesh.vertices, mesh.vertices + 0.02 * np.random.default_rng(3).normal(size=mesh.vertices.shape)
     vertices, weights = np.array([0, 5, 9], dtype=np.int32), np.array([0.7, 0.3, -1.0])
-    spring = RecordedLoad("spring", "springs", vertices, weights, (0.1, 0.0, 0.05), 30.0)
-    pressure = RecordedLoad("pressure", "pressures", mesh.surface.triangles, np.ones(len(mesh.surface.triangles)))
-    dead = RecordedLoad("vector", "tractions", vertices, weights)
+    spring = LoadPattern("spring", "springs", vertices, weights, np.array([0.1, 0.0, 0.05]), 30.0)
+    pressure = LoadPattern("pressure", "pressures", mesh.surface.triangles)
+    dead = LoadPattern("vector", "tractions", vertices, weights)
     loads = {"a": spring, "b": pressure, "c": dead}
     values = {"a": 0.05, "b": 4e3, "c": np.array([1.0, 2.0, -3.0])}
     lengths = [np.linalg.norm(weights @ x[vertices] + spring.offset) for x in ends]
@@ -240,7 +240,7 @@ def test_a_force_of_places_is_not_computed(tmp_path):
     scene = sp.Scene([bar], loads=[sp.BodyForce(lambda x, t: -x), sp.BodyForce((0, 0, 1))])
     path = recorded(tmp_path / "r.vtkhdf", scene, sp.Implicit(contact=None), 1 / 60, 3)
     with sp.read_recording(path) as recording:
-        assert recording.other_loads == {"body_forces"}
+        assert RecordedTrajectory(recording).other_loads == {"body_forces"}
     assert checked(path)["works"].message.startswith("pins: nothing is pinned; contact: ")
 
 

@@ -7,9 +7,9 @@ import pytest
 
 import supple as sp
 from supple.errors import OutputError
+from supple.kinds.codec import encoded
 from supple.model.state import State
 from supple.results.checkpoint.file import MEMORIES, Checkpoint, RunFacts, read_checkpoint, write_checkpoint
-from supple.results.checkpoint.values import encoded
 from supple.solvers.implicit.stepping.integrators import INTEGRATORS, History
 
 RUN = RunFacts(0, 10, 0.1, "abc", (0.0, 1.0), "XPBD()")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from supple.errors import OutputError
-from supple.results.checkpoint.values import decoded, described, encoded, restored
+from supple.kinds.codec import decoded, described, encoded, restored
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ def test_looks_reach_recordings_and_glb(tmp_path):
     sink = sp.Recorder(tmp_path / "r.vtkhdf")
     list(sp.simulate(sp.Scene(bodies, gravity=(0, 0, 0)), sp.XPBD(substeps=1), 0.01, 1, sinks=[sink]))
     with sp.read_recording(sink.path) as recording:
-        assert [body.look for body in recording.bodies] == ["gummy", "foam", "steel"]
+        assert [body.body.drawn_look for body in recording.bodies] == ["gummy", "foam", "steel"]
         red, green, blue = surfaces_of(model_of_recording(recording))[2].color
         assert max(red, green, blue) - min(red, green, blue) < 80  # metal is nearly grey
         data = export(recording, "glb").read_bytes()

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from supple.results.recording.actions import recorded_stitches
 
 import supple as sp
 from supple.model.stitched_points import stitched_state, with_stitched_points
 from supple.model.system import build_system, initial_state
-from supple.results.recording.actions import recorded_stitches
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.stitches import StitchEnergy
 from supple.solvers.implicit.newton.reduction import Reduction

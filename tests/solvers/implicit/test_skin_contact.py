@@ -39,7 +39,7 @@ def test_a_body_rests_on_its_skin_and_its_tets_reach_through_the_floor(tmp_path)
         (body,) = recording.bodies
         skin = body.skin.positions(recording[-1].state.positions)
         assert 0.0 < skin[:, 1].min() < 1e-3
-        assert body.touches_with_skin
+        assert body.body.touches_with_skin
         assert not body.rigid
         assert np.isnan(recording[-1].contact_force["ball"]).all()  # there are no fields of skins
     report = sp.check_recording(path)

@@ -98,7 +98,7 @@ class Measure(Kind):
         return float(IN_TIME[self.time](numbers))
 
     def _of_body(self, recording: Recording, name: str) -> Array:
-        count = recording.body(name).point_count
+        count = len(recording.body(name).body.points)
         if self.vertices is not None and max(self.vertices) >= count:
             raise StudyError(f"{name!r} has {count} vertices; vertex {max(self.vertices)} does not exist")
         rows: Any = slice(None) if self.vertices is None else list(self.vertices)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import zlib
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.viewer.protocol.snapshots import RIGID, BodyDescription, SceneDescription, Snapshot
-from supple.mesh.skin import Embedding
-from supple.mesh.tetmesh import TetMesh
-from supple.results.recording.scene import SkinnedSurface
+from supple.app.viewer.protocol.snapshots import BodyDescription, SceneDescription, Snapshot
 from supple.results.view.bounds import box_corners, view_of_scene
-from supple.results.view.model import Model, ModelBody, Moment
+from supple.results.view.model import Model, Moment
+from supple.scene.obstacles.obstacle import Obstacle
 
 
 class MomentBuilder:
@@ -22,7 +17,6 @@ class MomentBuilder:
     def __init__(self) -> None:
         self._generation: int | None = None
         self._model: Model | None = None
-        self._skins: dict[tuple[int, int], SkinnedSurface] = {}
 
     def moment(self, snapshot: Snapshot) -> Moment:
         """The moment of a snapshot."""
@@ -49,42 +43,13 @@ class MomentBuilder:
         )
 
     def _model_of(self, scene: SceneDescription) -> Model:
-        bodies = tuple(
-            ModelBody(
-                body.name,
-                body.vertices,
-                body.tet_rows,
-                body.triangles,
-                self._skin_of(body),
-                i,
-                body.material == RIGID,
-                body.look,
-                body.touches_with_skin,
-            )
-            for i, body in enumerate(scene.bodies)
-        )
-        tets = np.concatenate([body.nodes[:, :4] + body.vertices.start for body in scene.bodies])
+        tets = np.concatenate([body.body.mesh.tets + body.vertices.start for body in scene.bodies])
         return Model(
-            bodies,
+            scene.bodies,
             scene.obstacles,
-            np.concatenate([body.rest_positions for body in scene.bodies]),
+            np.concatenate([body.body.mesh.vertices for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
             view_of_scene(box_corners(scene.low, scene.high), np.asarray(scene.up), scene.obstacles),
             scene.stitches,
             joints=scene.joints,
         )
-
-    def _skin_of(self, body: BodyDescription) -> SkinnedSurface | None:
-        """The fine surface with the tet of each of its vertices; cached, so that a body is searched once."""
-        if body.skin is None:
-            return None
-        vertices, triangles = body.skin
-        key = _fingerprint(vertices), _fingerprint(body.rest_positions)
-        if key not in self._skins:
-            held = Embedding.of(TetMesh(body.rest_positions, body.nodes), vertices)
-            self._skins[key] = SkinnedSurface(held.corners, held.weights, np.asarray(triangles, dtype=np.int32))
-        return self._skins[key]
-
-
-def _fingerprint(values: NDArray[Any]) -> int:
-    return zlib.crc32(np.ascontiguousarray(values).tobytes())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import permutations
 from typing import Annotated, Any
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.forms import NON_NEGATIVE, Choice, Form, NumberPerTet
 from supple.materials.by_law import ByLaw
+from supple.materials.material import Material, NotRecorded
 from supple.materials.own.derivation import (
     OwnLaw,
     compiled_law,
@@ -21,7 +22,8 @@ from supple.materials.own.derivation import (
     moduli_at_rest,
     stress_at_rest,
 )
-from supple.materials.own.formula import VARIABLES
+from supple.materials.own.formula import VARIABLES, Formula
+from supple.materials.own.formula_law import FormulaLaw
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class FormulaText(Form):
     """A formula as a text, or a function of symbols."""
 
     def checked(self, value: Any, what: str) -> Any:
-        if not callable(value) and not isinstance(value, str):
+        if not callable(value) and not isinstance(value, str | Formula):
             raise SceneError(f"{what} is a {type(value).__name__}; give a formula or a function")
         return value
 
@@ -79,7 +81,20 @@ class EnergyMaterial(ByLaw):
 
     shear_formula = "that of psi"
 
+    def recorded(self) -> Material:
+        """The same with its formula as text, which needs neither SymPy nor a compiler to be read."""
+        formula = getattr(self.law(), "formula", None)
+        if formula is None:
+            return NotRecorded(name=type(self).__name__, density=self.density, damping=self.damping)
+        return self if self.psi is formula else replace(self, psi=formula)
+
     def _check(self) -> None:
+        if isinstance(self.psi, Formula):
+            if (self.psi.of, self.psi.parameters) != (self.of, self._names):
+                raise SceneError("EnergyMaterial: psi is a formula of other variables or parameters")
+            object.__setattr__(self, "formula", self.psi.text)
+            object.__setattr__(self, "_law", FormulaLaw(self.psi))
+            return
         expression = expression_of(self.psi, self.of, self._names)
         object.__setattr__(self, "formula", str(expression))
         object.__setattr__(self, "_expression", expression)
@@ -114,6 +129,8 @@ class EnergyMaterial(ByLaw):
     def rest_moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         columns = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for _, value in self.law_parameters()))
         rows = np.column_stack([np.ravel(column) for column in columns])
+        if isinstance(self.psi, Formula):
+            return self._measured_moduli(rows) if columns[0].ndim else tuple(self._measured_moduli(rows)[:, 0])
         expression: Any = self._expression  # pyright: ignore[reportAttributeAccessIssue]
         try:
             mu, bulk = moduli_at_rest(expression, self.of, self._names, rows[:, 1:]).T
@@ -122,7 +139,19 @@ class EnergyMaterial(ByLaw):
         bulk = bulk + rows[:, 0]
         return (mu, bulk) if columns[0].ndim else (mu[0], bulk[0])
 
-    def law(self) -> OwnLaw:
+    def _measured_moduli(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(2, k) from stresses of small shears and dilations."""
+        count, strain, E = len(rows), 1e-4, np.eye(3)
+        shear = np.outer(E[0], E[1]) + np.outer(E[1], E[0])
+        ends = [
+            self.law().models(np.tile(E + sign * strain * part, (count, 1, 1)), rows, False, False)[1]
+            for part in (shear, E)
+            for sign in (1.0, -1.0)
+        ]
+        mu = (ends[0] - ends[1])[:, 0, 1] / (4.0 * strain)
+        return np.array([mu, np.trace(ends[2] - ends[3], axis1=1, axis2=2) / (18.0 * strain)])
+
+    def law(self) -> OwnLaw | FormulaLaw:
         return self._law  # pyright: ignore[reportAttributeAccessIssue]
 
     def law_parameters(self) -> tuple[tuple[str, ArrayLike], ...]:

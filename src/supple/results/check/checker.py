@@ -21,11 +21,13 @@ from supple.results.check.checks.tets import Inversion, RestShape, Rigidity, Vol
 from supple.results.check.checks.tunnelling import GoingOn, Tunnelling
 from supple.results.check.checks.works import Works
 from supple.results.check.frame_check import UNKNOWN, FrameCheck, skipped
+from supple.results.check.recorded import RecordedTrajectory
 from supple.results.check.report import CheckReport, CheckResult, Verdict
-from supple.results.check.series_recording import Given, SeriesRecording
+from supple.results.check.series import Given, SeriesTrajectory
 from supple.results.check.settings import CheckSettings
 from supple.results.check.shown import place_of
 from supple.results.check.snapshot import Scene
+from supple.results.check.trajectory import Trajectory
 from supple.results.recording.reader import Recording, opened
 
 CHECKS: tuple[type[FrameCheck], ...] = (
@@ -78,7 +80,7 @@ def check_recording(
     """
     wanted = CheckSettings(**settings)
     with opened(recording) as source:
-        return _checked(source, wanted, progress)
+        return _checked(RecordedTrajectory(source), wanted, progress)
 
 
 def check_series(
@@ -109,12 +111,10 @@ def check_series(
     """
     wanted = CheckSettings(**settings)
     opened_series = series if isinstance(series, Series) else open_series(series)
-    return _checked(SeriesRecording(opened_series, given or Given()), wanted, progress)
+    return _checked(SeriesTrajectory(opened_series, given or Given()), wanted, progress)
 
 
-def _checked(
-    source: Recording | SeriesRecording, wanted: CheckSettings, progress: Callable[[int, int], None] | None
-) -> CheckReport:
+def _checked(source: Trajectory, wanted: CheckSettings, progress: Callable[[int, int], None] | None) -> CheckReport:
     with np.errstate(all="ignore"):
         scene = Scene(source)
         sound = all(np.isfinite(getattr(source, name)).all() for name in CONSTANTS)
@@ -138,7 +138,7 @@ def _checked(
         if "times" not in source.knows:
             results = tuple(replace(result, time=None) for result in results)
         failures = [result for result in results if result.verdict is Verdict.FAIL]
-        place, unfinished = place_of(scene, failures), getattr(source, "unfinished", "")
+        place, unfinished = place_of(scene, failures), source.unfinished
         return CheckReport(source.path, len(source), len(numbers), results, source.notes, place, unfinished)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from supple.results.check.stored_energies import stiffness_scale, stitch_scale
-from supple.results.recording.reader import Recording
+from supple.results.check.trajectory import Trajectory
 
 # Of L: what bodies move in a step, fall or are strained by, so that it does not count.
 _UNSEEN = 1e-6
@@ -28,7 +28,7 @@ class Floors:
     size : longest extent of the largest body at rest [m]; reach : largest coordinate [m]
     """
 
-    def __init__(self, recording: Recording, size: float, reach: float) -> None:
+    def __init__(self, recording: Trajectory, size: float, reach: float) -> None:
         self._dt, self._size, self._reach, self._mass = recording.dt, size, reach, float(recording.masses.sum())
         self._weight = self._mass * float(np.linalg.norm(recording.gravity))
         self._stiffness = 1e3 * (stiffness_scale(recording) + stitch_scale(recording))

@@ -3,18 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
-from supple.results.recording.actions import RecordedCable, RecordedCavity
-from supple.results.recording.scene import RecordedLoad
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPattern:
+    """How the forces of a load follow from one value.
+
+    Attributes
+    ----------
+    kind : "vector", a force w_i f on each vertex, with the value f (3,); "pressure", a third of -p A on each corner of
+        a triangle of area vector A, with the value p; "spring", the forces of k / 2 (l - l0)^2,
+        l = |sum w_i x_i + offset|, with the value l0; "drag", c / 3 (w - v_i) on each corner of a triangle, with the
+        value w (3,), see `_add_drag`
+    work : the name under which its work is counted
+    vertices : (v,), or (t, 3) triangles of a pressure or a drag
+    weights : (v,) w; none of triangles
+    offset : (3,) [m]; stiffness : k [N/m]; of a drag, density times coefficient [kg/m^3]
+    """
+
+    kind: Literal["vector", "pressure", "spring", "drag"]
+    work: str
+    vertices: NDArray[np.integer]
+    weights: Floats = field(default_factory=lambda: np.zeros(0))
+    offset: Floats = field(default_factory=lambda: np.zeros(3))
+    stiffness: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class CavitySurface:
+    """A cavity; triangles : (t, 3) vertices of the surface around it, seen counter-clockwise from inside."""
+
+    name: str
+    triangles: NDArray[np.integer]
+
+
+@dataclass(frozen=True, eq=False)
+class CablePath:
+    """A cable through points W x + offset, of some vertices (v,); weights : (p, v); offsets : (p, 3) [m]."""
+
+    name: str
+    vertices: NDArray[np.integer]
+    weights: Floats
+    offsets: Floats
 
 
 def load_forces(
-    loads: Mapping[str, RecordedLoad],
+    loads: Mapping[str, LoadPattern],
     values: Mapping[str, NDArray[np.float64] | float],
     x: NDArray[np.float64],
     v: NDArray[np.float64],
@@ -32,7 +75,7 @@ def load_forces(
 
 
 def _add_forces(
-    load: RecordedLoad, value: NDArray[np.float64], x: NDArray[np.float64], out: NDArray[np.float64]
+    load: LoadPattern, value: NDArray[np.float64], x: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
     if load.kind == "pressure":
         a, b, c = (x[corner] for corner in load.vertices.T)
@@ -43,14 +86,14 @@ def _add_forces(
         return
     force = value
     if load.kind == "spring":
-        r = load.weights @ x[load.vertices] + np.asarray(load.offset)
+        r = load.weights @ x[load.vertices] + load.offset
         length = float(np.linalg.norm(r))
         force = -load.stiffness * (length - value) * (r / length if length > 0.0 else np.zeros(3))
     np.add.at(out, load.vertices, load.weights[:, None] * force)
 
 
 def _add_drag(
-    load: RecordedLoad,
+    load: LoadPattern,
     flow: NDArray[np.float64],
     motion: tuple[NDArray[np.float64], NDArray[np.float64]],
     out: NDArray[np.float64],
@@ -91,9 +134,6 @@ def add_muscle_forces(
             np.add.at(out, tets[each.rows, corner], -c[:, None] * along)
 
 
-Floats = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class ActuatorState:
     """An actuator in one frame: a force Q that acts on a coordinate s, so that its work is Q ds.
@@ -109,7 +149,7 @@ class ActuatorState:
     work: str
     coordinate: float
     force: float
-    vertices: NDArray[np.int32]
+    vertices: NDArray[np.integer]
     gradient: Floats
 
     def rate(self, velocities: Floats) -> float:
@@ -118,8 +158,8 @@ class ActuatorState:
 
 
 def actuator_states(
-    cavities: tuple[RecordedCavity, ...],
-    cables: tuple[RecordedCable, ...],
+    cavities: Sequence[CavitySurface],
+    cables: Sequence[CablePath],
     pressures: Mapping[str, float],
     tensions: Mapping[str, float],
     x: Floats,
@@ -137,7 +177,7 @@ def actuator_states(
     return states
 
 
-def _cavity(cavity: RecordedCavity, pressure: float, x: Floats) -> ActuatorState:
+def _cavity(cavity: CavitySurface, pressure: float, x: Floats) -> ActuatorState:
     """The volume is the sum of the tetrahedra between its triangles and their center, seen from inside."""
     corners = x[cavity.triangles]
     a, b, c = (corners - corners.mean(axis=(0, 1))).transpose(1, 0, 2)

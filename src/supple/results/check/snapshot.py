@@ -2,40 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
-from supple.materials.laws.internal import NEVER_FLOWED
+from supple.materials.elastic_tets.active import MUSCLE
 from supple.results.check.floors import Floors
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.results.check.geometry.orientation import volume_signs
 from supple.results.check.geometry.surface_pairs import meeting_pairs
 from supple.results.check.load_forces import ActuatorState, actuator_states, add_muscle_forces, load_forces
-from supple.results.check.series_recording import SeriesRecording
 from supple.results.check.stored_energies import elastic_energy, stitch_energies
 from supple.results.check.surfaces import Surfaces, seam_keys
-from supple.results.recording.frame import RecordedFrame
-from supple.results.recording.reader import Recording
+from supple.results.check.trajectory import Moment, Trajectory
 
 _MOST_PAIRS = 1000
 
 
 class Scene:
-    """The data that all frames of a recording or series share. Seams are among the surfaces' ignored pairs."""
+    """What all frames of a trajectory share. Seams are among the surfaces' ignored pairs."""
 
-    def __init__(self, source: Recording | SeriesRecording) -> None:
-        # A series has the attributes of a recording that the checks of what it `knows` use.
-        self.recording = recording = cast(Recording, source)
-        self._source = source
-        self.surfaces = Surfaces(recording)
-        self.surfaces.ignored = np.union1d(self.surfaces.ignored, seam_keys(recording, self.surfaces))
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.recording = trajectory
+        self.surfaces = Surfaces(trajectory)
+        self.surfaces.ignored = np.union1d(self.surfaces.ignored, seam_keys(trajectory, self.surfaces))
 
     @cached_property
     def rest_inverse(self) -> NDArray[np.float64]:
@@ -65,17 +59,9 @@ class Scene:
         """Below which numbers are not judged."""
         return Floors(self.recording, self.size, self.reach)
 
-    @property
-    def file_steps(self) -> NDArray[np.int64] | None:
-        """(frames,) numbers in the names of a series' files, or None."""
-        return self._source.numbers if isinstance(self._source, SeriesRecording) else None
-
     def snapshot(self, number: int) -> Snapshot:
         """A frame."""
-        source = self._source
-        if isinstance(source, SeriesRecording):
-            return Snapshot.of_series(self, source, number)
-        return Snapshot.of(self, source[number])
+        return Snapshot(**vars(self.recording.moment(number)), scene=self)
 
     def name(self, kind: Literal["vertex", "tet"], row: int) -> str:
         """A vertex or tet as messages call it: its number within its body, or the file; of a skin, within that."""
@@ -91,65 +77,11 @@ class Scene:
         return f"{kind} {row}"
 
 
-@dataclass(frozen=True, eq=False)
-class Snapshot:
-    """One frame.
-
-    Attributes
-    ----------
-    scene : of the frame; number, time : of the frame, [s]
-    positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
-    internal : (k, 11) internal variables of materials that flow, see `State`; active : growths and muscles
-    load_values : vectors and numbers of the recorded loads, by name
-    pressures, tensions : of cavities [Pa], and of spans of cables [N], by name
-    broken, latest : (b,) pairs of stitches that have broken, and those of them that broke since the frame before
-    other : why it cannot be compared with the other frames of a series, or None
-    """
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Snapshot(Moment):
+    """One frame, with what is measured on it."""
 
     scene: Scene
-    number: int
-    time: float
-    positions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    det_F: NDArray[np.float64]
-    poses: NDArray[np.float64]
-    internal: NDArray[np.float64]
-    active: tuple[ActiveTets, ...] = ()
-    load_values: Mapping[str, NDArray[np.float64] | float] = field(default_factory=dict)
-    pressures: Mapping[str, float] = field(default_factory=dict)
-    tensions: Mapping[str, float] = field(default_factory=dict)
-    broken: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    latest: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    other: str | None = None
-
-    @classmethod
-    def of_series(cls, scene: Scene, series: SeriesRecording, number: int) -> Snapshot:
-        frame = series.frame(number)
-        nothing = np.zeros(0), np.zeros((0, 3, 4)), NEVER_FLOWED
-        time, velocities = float(series.times[number]), series.velocities(number)
-        return cls(scene, number, time, frame.positions, velocities, *nothing, other=frame.other)
-
-    @classmethod
-    def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
-        x, v = frame.state.positions, frame.state.velocities
-        details, recording = frame.report.details, frame.recording
-        broken = recording.broken_stitches(frame.number)
-        return cls(
-            scene,
-            frame.number,
-            frame.time,
-            np.ascontiguousarray(x),
-            v,
-            frame.det_F,
-            frame.obstacle_poses,
-            frame.state.internal,
-            frame.active,
-            {**details.load_vectors, **details.load_values},
-            details.cavity_pressure,
-            details.cable_tension,
-            broken,
-            np.setdiff1d(broken, recording.broken_stitches(max(frame.number - 1, 0))),
-        )
 
     @cached_property
     def finite(self) -> bool:

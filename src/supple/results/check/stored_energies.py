@@ -16,14 +16,13 @@ from supple.materials.kinds import has_volume_term, needs_positive_volume
 from supple.materials.per_tet import BY_LAW, LawTets, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.results.check.geometry.quadratic_tets import at_quadrature_points
-from supple.results.recording.physics import RecordedPhysics
-from supple.results.recording.reader import Recording
+from supple.results.check.trajectory import Trajectory
 
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 
 def elastic_energy(
-    recording: Recording,
+    recording: Trajectory,
     x: NDArray[np.float64],
     J: NDArray[np.float64],
     rest_inverse: NDArray[np.float64],
@@ -37,22 +36,22 @@ def elastic_energy(
     x : (n, 3) positions [m]; J : (m,) determinants of F; rest_inverse : (m, 3, 3) Dm^-1 [1/m]
     internal : (k, 11) internal variables of the frame, see `State`; active : growths of the frame
     """
-    physics = recording.physics
+    material = recording.material
     grown, ratios = growth_of(active, len(J))
     rest_inverse, J, all_volumes = rest_inverse @ grown, J / ratios, recording.rest_volumes * ratios
-    total = _flowing(recording, physics, x, rest_inverse, internal, (grown, ratios))
+    total = _flowing(recording, x, rest_inverse, internal, (grown, ratios))
     for k, body in enumerate(recording.bodies):
-        if not physics.knows_law(k, body.tets):
+        if not recording.knows_law(k):
             return None
         tets = np.ascontiguousarray(recording.tets[body.tets])
         volumes = all_volumes[body.tets]
-        pair = physics.compliances[k]
+        pair = recording.compliances[k]
         nodes = recording.nodes_of(body)
         if nodes.shape[1] == 10:
             F, parts = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
             F, parts = F @ grown[body.tets, None], parts * ratios[body.tets, None]
-            laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
-            own = [_of_body(part, body.tets) for part in physics.laws if part.flow is None]
+            laws = material.kind[body.tets], material.mu[body.tets], material.lam[body.tets]
+            own = [_of_body(part, body.tets) for part in material.elastic_laws]
             share = _mean_share(laws, own)
             of_points = np.empty(parts.size)
             lowered = laws[0], laws[1], laws[2] - share
@@ -72,9 +71,9 @@ def elastic_energy(
             continue
         if pair is None:
             out = np.empty(len(tets))
-            laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
+            laws = material.kind[body.tets], material.mu[body.tets], material.lam[body.tets]
             element_energies(x, tets, rest_inverse[body.tets], volumes, *laws, out)
-            own = [_of_body(part, body.tets) for part in physics.laws if part.flow is None]
+            own = [_of_body(part, body.tets) for part in material.elastic_laws]
             out[laws[0] == BY_LAW] = 0.0
             F = _gradients(x, tets, rest_inverse[body.tets])
             for part in own:
@@ -109,15 +108,13 @@ def _gradients(x, tets, rest_inverse):
     return np.einsum("eki,ekj->eij", x_of[:, 1:] - x_of[:, :1], rest_inverse)
 
 
-def _flowing(recording: Recording, physics: RecordedPhysics, x, rest_inverse, internal, growth) -> float:
+def _flowing(recording: Trajectory, x, rest_inverse, internal, growth) -> float:
     """The energy of what is left of F after growth and flow, F F_g^-1 F_i^-1; rest_inverse is that after growth."""
     total, begin = 0.0, 0
     grown, ratios = growth
     F = _gradients(x, recording.tets, rest_inverse)[:, None]
     parts = (recording.rest_volumes * ratios)[:, None]
-    for part in physics.laws:
-        if part.flow is None:
-            continue
+    for part, _ in recording.material.flowing_laws:
         of, volumes = F[part.rows], parts[part.rows]
         if part.points > 1 and recording.quadratic is not None:
             rows, all_nodes = recording.quadratic
@@ -150,21 +147,23 @@ def _mean_share(laws, own: list[LawTets]) -> NDArray[np.float64]:
     return np.minimum(share, at_most)
 
 
-def stiffness_scale(recording: Recording) -> float:
+def stiffness_scale(recording: Trajectory) -> float:
     """An energy [J] that round-off of the elastic energy is measured by: of strains of a few percent everywhere."""
-    physics = recording.physics
-    return 1e-3 * float((np.abs(physics.mu) + np.abs(physics.lam)) @ recording.rest_volumes)
+    material = recording.material
+    return 1e-3 * float((np.abs(material.mu) + np.abs(material.lam)) @ recording.rest_volumes)
 
 
-def stitch_energies(recording: Recording, x: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def stitch_energies(recording: Trajectory, x: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """(k,) of each pair, as if it held [J], zero at rest.
 
     Parameters
     ----------
     x : (n, 3) positions [m]; poses : (obstacles, 3, 4) of the obstacles that bodies are stitched to
     """
-    stitches, laws = recording.stitches, recording.stitches.laws
-    corners = stitches.corners(x, poses)
+    laws = recording.stitches
+    if laws is None:
+        return np.zeros(0)
+    corners = laws.ends.corners(x, poses)
     count = len(laws.moduli)
     edges = (corners[:count, 1:] - corners[:count, :1]).transpose(0, 2, 1)
     F = edges @ laws.rest_shape_inverse
@@ -172,16 +171,18 @@ def stitch_energies(recording: Recording, x: NDArray[np.float64], poses: NDArray
     growth = np.einsum("ij,ij->i", a, np.cross(b, c)) - 1.0
     mu, lam = laws.moduli.T
     density = 0.5 * mu * (np.einsum("tij,tij->t", F, F) - 3.0) - mu * growth + 0.5 * lam * growth * growth
-    places = np.einsum("kc,kci->ki", stitches.weights[count:], corners[count:, 1:])
+    places = np.einsum("kc,kci->ki", laws.ends.weights[count:], corners[count:, 1:])
     stiffness, rest = laws.springs.T
     extension = np.linalg.norm(corners[count:, 0] - places, axis=1) - rest
     of_tets = density * _volumes(laws.rest_shape_inverse)
     return np.concatenate([of_tets, 0.5 * stiffness * extension * extension])
 
 
-def stitch_scale(recording: Recording) -> float:
+def stitch_scale(recording: Trajectory) -> float:
     """An energy [J] that round-off of the stitch energy is measured by: of strains of a few percent everywhere."""
-    laws = recording.stitches.laws
+    laws = recording.stitches
+    if laws is None:
+        return 0.0
     stiffness, rest = laws.springs.T
     return 1e-3 * float(np.abs(laws.moduli).sum(axis=1) @ _volumes(laws.rest_shape_inverse) + stiffness @ (rest * rest))
 

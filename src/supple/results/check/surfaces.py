@@ -11,8 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.results.check.geometry.surface_pairs import meeting_pairs
-from supple.results.recording.reader import Recording
-from supple.results.recording.scene import RecordedBody
+from supple.results.check.trajectory import Part, Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +44,12 @@ class Surfaces:
     pieces : see `Piece`; closed : whether all pieces of an owner are
     """
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Trajectory) -> None:
         self.bodies, self._file_numbers = len(recording.bodies), recording.file_numbers
-        self.names = tuple(thing.name for thing in (*recording.bodies, *recording.obstacles))
+        self.names = tuple(str(thing.name) for thing in (*recording.bodies, *recording.obstacles))
         triangles: list[NDArray[np.int64]] = []
         self.fixed: list[tuple[int, NDArray[np.float64], int]] = []
-        self.skins: list[tuple[RecordedBody, int]] = []
+        self.skins: list[tuple[Part, int]] = []
         row = len(recording.rest_positions)
         for body in recording.bodies:
             if body.touches_with_skin and body.skin is not None:
@@ -62,8 +61,8 @@ class Surfaces:
         counts = [len(part) for part in triangles]
         for j, obstacle in enumerate(recording.obstacles):
             points, faces = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
-            if obstacle.obstacle.checked_by_triangles:  # others are checked by their formula
-                points, faces = obstacle.obstacle.triangles()
+            if obstacle.checked_by_triangles:  # others are checked by their formula
+                points, faces = obstacle.triangles()
                 self.fixed.append((j, points, row))
             triangles.append(faces.astype(np.int64) + row)
             counts.append(len(faces))
@@ -90,9 +89,11 @@ class Surfaces:
             x[row : row + len(points)] = moved(points, poses[obstacle])
         return x
 
-    def _stitched_points(self, recording: Recording) -> NDArray[np.int64]:
+    def _stitched_points(self, recording: Trajectory) -> NDArray[np.int64]:
         """The nodes of the stitches, of which those on rigid bodies and obstacles are the points at the same place."""
-        stitches = recording.stitches
+        if recording.stitches is None:
+            return np.zeros((0, 4), dtype=np.int64)
+        stitches = recording.stitches.ends
         number = list(range(len(recording.rest_positions)))
         skins = {body.vertices.start: (body.skin, row) for body, row in self.skins}
         for control, weights in zip(stitches.rigid_control.tolist(), stitches.rigid_weights, strict=True):
@@ -105,7 +106,7 @@ class Surfaces:
             number.append(row + int(np.argmin(np.linalg.norm(points - anchor, axis=1))))
         return np.array(number, dtype=np.int64)[stitches.nodes]
 
-    def _welded_keys(self, recording: Recording) -> NDArray[np.int64]:
+    def _welded_keys(self, recording: Trajectory) -> NDArray[np.int64]:
         """Welds as pairs of triangles that may meet: those with a welded corner, with those of the rigid body."""
         keys = [np.zeros(0, dtype=np.int64)]
         for weld in recording.welds:
@@ -140,7 +141,7 @@ def moved_back(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArra
     return points if np.array_equal(R, np.eye(3)) and not t.any() else (points - t) @ R
 
 
-def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_]:
+def _allowed(recording: Trajectory, bodies: int, owners: int) -> NDArray[np.bool_]:
     """(p, p) which owners must stay apart: all but two obstacles, and pairs that the scene excludes."""
     is_body = np.arange(owners) < bodies
     allowed = is_body[:, None] | is_body[None, :]
@@ -170,7 +171,7 @@ def _ignored_keys(stitched: NDArray[np.int64], triangles: NDArray[np.int64]) -> 
 
 
 def _pieces(
-    recording: Recording, triangles: NDArray[np.int64], owners: NDArray[np.int64], points: int
+    recording: Trajectory, triangles: NDArray[np.int64], owners: NDArray[np.int64], points: int
 ) -> tuple[Piece, ...]:
     """Pieces of bodies are connected by tets, so that cavities belong to them; those of obstacles by triangles."""
     tets = recording.tets.astype(np.int64)
@@ -193,20 +194,16 @@ def _is_closed(triangles: NDArray[np.int64]) -> bool:
     return bool((np.unique(sides, axis=0, return_counts=True)[1] % 2 == 0).all())
 
 
-def seam_keys(recording: Recording, surfaces: Surfaces) -> NDArray[np.int64]:
+def seam_keys(recording: Trajectory, surfaces: Surfaces) -> NDArray[np.int64]:
     """Keys, as in `Surfaces.ignored`, of the pairs of triangles that meet in the first frame, belong to two things that
     are stitched to each other, and have a stitched corner."""
     stitched = surfaces.stitched
     if not len(stitched):
         return np.zeros(0, dtype=np.int64)
-    frame = recording[0]
-    if not np.isfinite(frame.state.positions).all() or not np.isfinite(frame.obstacle_poses).all():
+    frame = recording.moment(0)
+    if not np.isfinite(frame.positions).all() or not np.isfinite(frame.poses).all():
         return np.zeros(0, dtype=np.int64)
-    x, triangles, owners = (
-        surfaces.place(frame.state.positions, frame.obstacle_poses),
-        surfaces.triangles,
-        surfaces.owners,
-    )
+    x, triangles, owners = surfaces.place(frame.positions, frame.poses), surfaces.triangles, surfaces.owners
     thing = np.full(len(x), -1)
     thing[triangles] = owners[:, None]
     joined = np.zeros_like(surfaces.allowed)

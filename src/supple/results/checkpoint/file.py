@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
+from supple.kinds.codec import Known, check, decoded, described, encoded, restored
 from supple.materials.laws.internal import COLUMNS
 from supple.model.state import State
-from supple.results.checkpoint.values import Known, check, decoded, described, encoded, restored
 from supple.runtime.replacing import whole_file
 from supple.solvers.implicit.stepping.conservation import EnergyMade
 from supple.solvers.implicit.stepping.integrators import History

@@ -7,7 +7,6 @@ from pathlib import Path
 from supple.errors import OutputError
 from supple.results.recording.file import rewrite
 from supple.results.recording.reader import Recording
-from supple.results.recording.recorder import frame_layout
 from supple.runtime.replacing import whole_file
 
 
@@ -18,18 +17,9 @@ def write_vtkhdf(recording: Recording, output: Path) -> None:
     ------
     OutputError : where the recording is damaged, or the file cannot be written.
     """
-    layout = frame_layout(
-        len(recording.rest_positions),
-        len(recording.tets),
-        len(recording.obstacles),
-        recording.details,
-        recording.fields,
-        recording.sensors,
-        recording.internal_rows,
-    )
     with whole_file(output) as fresh:
         try:
-            rewrite(recording.path, fresh, layout, None, compress=True)
+            rewrite(recording.path, fresh, recording.layout, None, compress=True)
         except (KeyError, RuntimeError, TypeError, ValueError) as error:
             reason = " ".join(str(error).split())
             raise OutputError(f"{recording.path}: is damaged: {reason}; copy or record it again") from None

@@ -27,7 +27,7 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
             triangles.append(body.skin.triangles + starts[i])
             of_triangle += [i] * len(body.skin.triangles)
         else:
-            nodes = recording.nodes_of(body) - body.vertices.start + starts[i]
+            nodes = body.body.mesh.nodes + starts[i]
             tets.append(body.tets)
             kind = "tetra" if nodes.shape[1] == 4 else "tetra10"
             parts.append((kind, nodes, frame.det_F[body.tets], np.full(len(nodes), i, dtype=np.int32)))

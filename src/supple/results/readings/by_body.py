@@ -4,26 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.kinds.suggestion import suggestion
-
-
-class BodyRows(Protocol):
-    """A body, and its rows of the arrays of all bodies."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def vertices(self) -> slice: ...
-    @property
-    def tets(self) -> slice: ...
-    @property
-    def rigid(self) -> bool: ...
+from supple.scene.rows import BodyRows
 
 
 class ByBody(Mapping[str, NDArray[Any]]):

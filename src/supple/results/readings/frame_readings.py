@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from supple.errors import SceneError
 from supple.kinds.suggestion import Named
 from supple.model.pin_reactions import pin_labels
-from supple.model.state import ContactPoints, SolverDetails, State
-from supple.model.system import System
+from supple.model.state import ContactPoints, SolverDetails
 from supple.results.readings.by_body import ByBody
 from supple.results.readings.driven import driven_readings
 from supple.results.readings.reading import Reading
@@ -95,8 +94,6 @@ def contact_pressures(
 class FrameReadings(TetReadings):
     """Fields on tets (`TetReadings`), contact on surfaces, sensors, and reactions of pins."""
 
-    state: State
-    system: System
     report: Any
 
     @cached_property
@@ -115,7 +112,7 @@ class FrameReadings(TetReadings):
     @cached_property
     def contact_pressure(self) -> ByBody:
         """Normal force of contacts per area at each vertex: by body name, (n,) [Pa]; 0 where nothing touches."""
-        x = self.system.points.positions(self._x)
+        x = self.system.points.positions(self.state.positions)
         return self._by_vertex(contact_pressures(self.contacts, x, self.system.triangles))
 
     @cached_property
@@ -143,7 +140,7 @@ class FrameReadings(TetReadings):
         pin, a pin without a name being "BODY.pin"."""
         contacts = self.contacts if self.system.scene.sensors else None
         driven = driven_readings(self.system, self.state, self.report.details)
-        return sensor_readings(self.system, self._x, contacts) | driven
+        return sensor_readings(self.system, self.state.positions, contacts) | driven
 
     def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:
         return ByBody(values, {part.name: part.points for part in self.system.bodies}, {})

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.materials.elastic_tets.edge_springs import EdgeSprings
-from supple.materials.elastic_tets.laws import TetLaws
-from supple.materials.elastic_tets.quadratic import QuadraticTets
-from supple.materials.per_tet import TetMaterial
+from supple.materials.elastic_tets.laws import joined_materials, tet_material
+from supple.materials.laws.internal import count_of
 from supple.model.state import Status
+from supple.model.system import System, build_system
 from supple.results.readings.fields import FIELDS, Field
 from supple.results.recording.checked_hdf5 import CheckedFile
+from supple.results.recording.description import Description, read_description
+from supple.results.recording.details import recorded_sensors
 from supple.results.recording.file import WRITTEN
-from supple.results.recording.physics import RecordedPhysics
+from supple.results.recording.functions import RecordedFunction
 from supple.results.recording.recorder import (
     BROKEN_STITCHES,
     INTERNAL,
@@ -28,63 +28,24 @@ from supple.results.recording.recorder import (
     field_series,
     frame_layout,
 )
-from supple.results.recording.scene import RecordedBody, RecordedScene, read_scene
-
-
-def recorded_laws(
-    physics: RecordedPhysics,
-    bodies: Sequence[RecordedBody],
-    rest_positions: NDArray[np.float64],
-    tets: NDArray[np.int32],
-    volumes: NDArray[np.float64],
-    quadratic: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None,
-) -> TetLaws:
-    """The laws of `tets` (m, 4).
-
-    Density and damping are not recorded: they are NaN.
-
-    Parameters
-    ----------
-    rest_positions : (n, 3) [m]; volumes : (m,) at rest [m^3]
-    quadratic : rows (k,) and nodes (k, 10) of the quadratic tets, or None
-    """
-    curved = None
-    if quadratic is not None:
-        curved = QuadraticTets.of(quadratic[0].astype(np.int64), quadratic[1], rest_positions)
-    m = len(tets)
-    corners = rest_positions[tets]
-    a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
-    with np.errstate(all="ignore"):
-        Dm_inv = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1) / (6.0 * volumes)[:, None, None]
-    tets, unknown = np.ascontiguousarray(tets, dtype=np.int32), np.full(m, np.nan)
-    kind = physics.tet_kinds
-    material = TetMaterial(unknown, unknown, kind, physics.mu, physics.lam, physics.laws)
-    springs = [
-        EdgeSprings.of(pair, body.tets, rest_positions, tets[body.tets], volumes[body.tets])
-        for body, pair in zip(bodies, physics.compliances, strict=True)
-        if pair is not None
-    ]
-    return TetLaws(tets, Dm_inv, volumes, material, tuple(springs), curved)
-
+from supple.scene.joints.placed import PlacedJoint, placed_joints
+from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.rows import BodyRows, rows_of
+from supple.scene.stitches.measures import StitchEnds
 
 _MESSAGE = "supple/frames/message"
 _READ_BY_FRAME = ("VTKHDF/Points", "VTKHDF/PointData/velocities", "VTKHDF/CellData/det_F", "supple/frames/poses")
 
 
-class RecordedContents(RecordedScene):
+class RecordedContents(Description):
     """The arrays and records of a recording's file; see `Recording` for its attributes."""
-
-    # All that a check may need; its messages number vertices, tets and triangles within bodies.
-    knows = frozenset({"recording", "tets", "times", "masses", "gravity", "material", "free"})
-    file_numbers: Mapping[str, NDArray[np.int64]] | None = None
-    notes: tuple[str, ...] = ()
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._file = CheckedFile(self.path)
         self._read_series: dict[str, NDArray[Any]] = {}
         try:
-            super().__init__(**vars(read_scene(self._file)))
+            super().__init__(**vars(read_description(self._file, partial(RecordedFunction, self))))
             self._open_series()
         except (OutputError, OSError, RuntimeError) as error:
             self._file.close()
@@ -93,17 +54,21 @@ class RecordedContents(RecordedScene):
             raise self._file.broken(str(error)) from None
 
     def _open_series(self) -> None:
-        file, flowing = self._file, self.internal_rows
+        file = self._file
+        self.bodies, self.sensors = rows_of(self.scene.bodies), recorded_sensors(self.scene)
+        materials = [tet_material(b.material, len(b.mesh.tets), b.mesh.order) for b in self.scene.bodies]
+        self.internal_rows = flowing = count_of(joined_materials(materials))
         self._count = int(file.array(WRITTEN))
         if self._count < 1:
             raise file.broken(f"its number of frames is {self._count}")
         if not set(self.field_names) <= FIELDS.keys():
             raise file.of_another_version("it has an unknown field")
         self.fields: tuple[Field, ...] = tuple(FIELDS[name] for name in self.field_names)
-        n, m = len(self.rest_positions), len(self.tets)
-        breakable = len(self.stitches) if self.stitches.names.breakable else 0
-        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors, flowing, breakable)
-        self._series = {series.path: series for series in layout.series}
+        n, m, names = self.bodies[-1].vertices.stop, self.bodies[-1].tets.stop, self.scene.stitching.names
+        breakable = len(names) if names.breakable else 0
+        given = self.details, self.fields, self.sensors, flowing, breakable, self.functions
+        self.layout = frame_layout(n, m, len(self.obstacles), *given)
+        self._series = {series.path: series for series in self.layout.series}
         own = [field_series(field, n, m).path for field in self.fields]
         more = [*([INTERNAL] if flowing else []), *([BROKEN_STITCHES] if breakable else [])]
         for path in (*_READ_BY_FRAME, *own, _MESSAGE, *more):
@@ -124,23 +89,49 @@ class RecordedContents(RecordedScene):
             return f"the solver stopped at frame {last} of {wanted} ({status})"
         return f"it ends at frame {last} of {wanted}" if last < wanted else ""
 
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        return tuple(self.scene.obstacles)
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        return np.asarray(self.scene.gravity, dtype=np.float64)
+
+    @cached_property
+    def system(self) -> System:
+        """The scene as flat arrays."""
+        return build_system(self.scene)
+
+    @property
+    def rest_positions(self) -> NDArray[np.float64]:
+        return self.system.rest_positions
+
+    @property
+    def masses(self) -> NDArray[np.float64]:
+        return self.system.masses
+
+    @property
+    def tets(self) -> NDArray[np.int32]:
+        return self.system.tets
+
+    @property
+    def rest_volumes(self) -> NDArray[np.float64]:
+        return self.system.rest_volumes
+
     @cached_property
     def triangles(self) -> NDArray[np.int32]:
         """(t, 3) boundaries of all bodies."""
-        return np.concatenate([body.triangles + np.int32(body.vertices.start) for body in self.bodies])
+        return np.concatenate([body.boundary + np.int32(body.vertices.start) for body in self.bodies])
 
     @cached_property
-    def laws(self) -> TetLaws:
-        """The elastic laws of all tets."""
-        of_tets = self.rest_positions, self.tets, self.rest_volumes
-        return recorded_laws(self.physics, self.bodies, *of_tets, self.quadratic)
+    def stitches(self) -> StitchEnds:
+        return StitchEnds.of(self.scene.stitching, self.scene.bodies)
 
-    @property
-    def internal_rows(self) -> int:
-        """How many rows of internal variables a frame has."""
-        return self.physics.internal
+    @cached_property
+    def joints(self) -> tuple[PlacedJoint, ...]:
+        return placed_joints(self.scene.bodies, self.scene.joints, self.scene.obstacles)
 
-    def body(self, name: str) -> RecordedBody:
+    def body(self, name: str) -> BodyRows:
         """The body of that name.
 
         Raises

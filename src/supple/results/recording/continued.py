@@ -10,7 +10,6 @@ import numpy as np
 from supple.errors import OutputError
 from supple.model.state import Status
 from supple.results.frame import Frame
-from supple.results.recording.details import RecordedDetails
 from supple.results.recording.file import RecordingFile, rewrite
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
@@ -40,13 +39,12 @@ class ContinuedRecorder(Recorder):
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Make room for `steps` frames after `first`."""
-        self._details = RecordedDetails.like(first.report.details)
-        self._next = self._number_of(first, dt) + 1
         fresh = temporary_name(self.path)
         try:
             with read_recording(self.path) as recording:
                 written, self._fields = len(recording), recording.fields
-            layout = self._layout(first.system)
+            layout = self._layout(first)
+            self._next = self._number_of(first, dt) + 1
             self._wanted = max(self._next + steps, written)
             capacity = self.first_capacity(layout, written)
             rewrite(self.path, fresh, layout, capacity)

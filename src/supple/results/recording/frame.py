@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.kinds.suggestion import Named
-from supple.materials.elastic_tets.active import ActiveTets
-from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.laws.internal import NEVER_FLOWED
 from supple.model.state import State
+from supple.model.system import System
 from supple.results.frame import Report
 from supple.results.readings.by_body import ByBody
 from supple.results.readings.fields import checked_fields
@@ -22,8 +20,6 @@ from supple.results.readings.reading import Reading
 from supple.results.readings.tet_readings import TetReadings
 from supple.results.recording.contents import RecordedContents
 from supple.results.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series
-from supple.results.recording.scene import RecordedBody
-from supple.scene.rigid.pose import Pose, pose_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,7 +47,7 @@ class RecordedFrame(TetReadings):
         """All vertices, in the order of the bodies."""
         internal = self._rows(INTERNAL) if self.recording.internal_rows else NEVER_FLOWED
         vertices = self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities")
-        measures = {joint.name: joint.conditions.coordinate for joint in self.recording.joints}
+        measures = {str(joint.name): joint.conditions().coordinate for joint in self.recording.scene.joints}
         joints = {name for name, measure in measures.items() if measure is not None and measure.form == "angle"}
         known = self.report.joints.items()
         angles = {name: one.coordinate for name, one in known if name in joints and one.coordinate is not None}
@@ -59,48 +55,15 @@ class RecordedFrame(TetReadings):
         more = {"hinge_angles": angles, "broken_stitches": broken, "parted_stitches": parted}
         return State(self.time, *vertices, internal=internal, **more)
 
-    @cached_property
-    def positions(self) -> dict[str, NDArray[np.float64]]:
-        """By body name, (n, 3) [m]; of a rigid body, of its surface's vertices."""
-        return Named("body", {body.name: body.points(self.state.positions) for body in self.recording.bodies})
-
-    @cached_property
-    def velocities(self) -> dict[str, NDArray[np.float64]]:
-        """By body name, (n, 3) [m/s]."""
-        return Named("body", {body.name: body.points(self.state.velocities) for body in self.recording.bodies})
+    @property
+    def system(self) -> System:
+        """The scene as flat arrays."""
+        return self.recording.system
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
         """(m,) J of every tet, in the order of the bodies."""
         return self._rows("VTKHDF/CellData/det_F")
-
-    @property
-    def _x(self) -> NDArray[np.float64]:
-        return self.state.positions
-
-    @cached_property
-    def _laws(self) -> TetLaws:
-        return replace(self.recording.laws, active=self.active) if self.active else self.recording.laws
-
-    @cached_property
-    def active(self) -> tuple[ActiveTets, ...]:
-        """Growths and muscles with their values in this frame."""
-        return tuple(map(ActiveTets.at, self.recording.physics.active, self.report.details.active.values()))
-
-    @property
-    def _internal(self) -> NDArray[np.float64]:
-        return self.state.internal
-
-    @property
-    def _bodies(self) -> tuple[RecordedBody, ...]:
-        return self.recording.bodies
-
-    @cached_property
-    def poses(self) -> dict[str, Pose]:
-        """Of the rigid bodies, by name."""
-        values = self.recording.rest_positions, self.state.positions, self.state.velocities
-        rigid = [body for body in self.recording.bodies if body.rigid]
-        return Named("rigid body", {body.name: pose_of(*(rows[body.vertices] for rows in values)) for body in rigid})
 
     @cached_property
     def obstacle_poses(self) -> NDArray[np.float64]:
@@ -129,8 +92,9 @@ class RecordedFrame(TetReadings):
             if field.name == name:
                 path = field_series(field, 0, 0).path
                 values = self._rows(path).reshape(-1, *field.shape).astype(np.float64)
-                rows = {body.name: body.tets if field.at == "tets" else body.vertices for body in self._bodies}
-                rigid = [body.name for body in self._bodies if body.rigid]
+                bodies = self.recording.bodies
+                rows = {body.name: body.tets if field.at == "tets" else body.vertices for body in bodies}
+                rigid = [body.name for body in bodies if body.rigid]
                 return ByBody(values, rows, dict.fromkeys(rigid, "is rigid: a recording has no fields of its surface"))
         raise OutputError(f"{self.recording.path}: {name} was not recorded; record it with Recorder(fields=[{name!r}])")
 
@@ -164,7 +128,7 @@ class RecordedFrame(TetReadings):
             largest_stitch_stretch=None if np.isnan(stretch) else stretch,
             message=self.recording._messages(self.number, self.number + 1)[0],
             details=self.recording.details.of_frame(self.number, self.recording._values),
-            broken_stitches=self.recording.stitches.names.named(broken if self.number > 0 else broken[:0]),
+            broken_stitches=self.recording.scene.stitching.names.named(broken if self.number > 0 else broken[:0]),
         )
 
     def _rows(self, path: str) -> NDArray[Any]:

@@ -7,23 +7,22 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
 from supple.materials.laws.internal import COLUMNS, count_of
 from supple.model.state import Status
-from supple.model.system import System
 from supple.results.frame import Frame
 from supple.results.readings.fields import Field, checked_fields, cost
+from supple.results.recording.description import Description, functions_of, write_description
 from supple.results.recording.details import RecordedDetails, RecordedSensor, recorded_sensors
 from supple.results.recording.file import TIMES, Layout, RecordingFile, Series, create, rewrite
-from supple.results.recording.from_system import recorded_scene, write_grid
-from supple.results.recording.scene import RecordedScene, write_scene
+from supple.results.recording.functions import Values, function_series, values_at
 from supple.runtime.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
 
 logger = logging.getLogger(__name__)
@@ -56,8 +55,10 @@ def frame_layout(
     sensors: Sequence[RecordedSensor] = (),
     internal: int = 0,
     breakable: int = 0,
+    functions: Values = (),
 ) -> Layout:
-    """The series of a recording with these details, chosen fields, sensors, rows of internal variables and stitches."""
+    """The series of a recording with these details, chosen fields, sensors, rows of internal variables, pairs of
+    stitches that may break, and functions, of which it gets the values at time 0."""
     numbers = (Series(f"supple/frames/{name}", 1) for name in REPORT_NUMBERS)
     vectors = (Series(f"supple/frames/{name}", 1, (3,)) for name in REPORT_VECTORS)
     series = (
@@ -77,6 +78,7 @@ def frame_layout(
         *(sensor.series for sensor in sensors),
         *([Series(INTERNAL, internal, (COLUMNS,))] if internal else []),
         *([Series(BROKEN_STITCHES, 1, (breakable,), "|u1")] if breakable else []),
+        *function_series(functions).values(),
     )
     return Layout(points, tets, series)
 
@@ -131,15 +133,28 @@ class Recorder:
         self._file: RecordingFile | None = None
         self._details = RecordedDetails()
         self._wanted = 0
+        self._functions: list[Callable[..., Any]] = []
+        self._at_start: Values = ()
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Create the file, with the frame at the start."""
+        from supple import __version__
+
         system = first.system
-        self._details = RecordedDetails.like(first.report.details)
-        # The limits of `check_recording` depend on the solver.
-        solver = first.solver.account if self._solver is None and first.solver is not None else self._solver
-        scene = recorded_scene(first, (dt, steps), solver, self._scene_text, self._fields)
-        layout = self._layout(system)
+        layout = self._layout(first)
+        description = Description(
+            supple_version=__version__,
+            dt=float(dt),
+            steps=int(steps),
+            # The limits of `check_recording` depend on the solver.
+            solver=first.solver.account if self._solver is None and first.solver is not None else self._solver,
+            scene_text=self._scene_text,
+            scene=system.scene,
+            functions=tuple(self._at_start),
+            details=self._details,
+            field_names=tuple(field.name for field in self._fields),
+            statuses_of_codes=tuple(str(status) for status in Status),
+        )
         if self._fields:
             sizes = len(system.rest_positions), len(system.tets)
             logger.info("%s: %s", self.path, cost(self._fields, *sizes, steps + 1))
@@ -148,7 +163,7 @@ class Recorder:
         parent_folder(self.path)
         fresh = temporary_name(self.path)
         try:
-            create(fresh, layout, capacity, lambda file: _write_static(file, system, scene))
+            create(fresh, layout, capacity, lambda file: write_description(file, description))
             self._file = RecordingFile(fresh, layout, capacity)
             self._put(first)
             self._file = self._file.moved(self.path)
@@ -161,11 +176,15 @@ class Recorder:
                 self._file = None
             fresh.unlink(missing_ok=True)
 
-    def _layout(self, system: System) -> Layout:
+    def _layout(self, first: Frame) -> Layout:
+        system = first.system
+        self._details = RecordedDetails.like(first.report.details)
+        self._functions = functions_of(system.scene)
+        self._at_start = values_at(self._functions, 0.0)
         sizes = len(system.rest_positions), len(system.tets), len(system.obstacles)
-        names = system.scene.stitching.names
+        names, sensors = system.scene.stitching.names, recorded_sensors(system.scene)
         counts = count_of(system.laws.material), len(names) if names.breakable else 0
-        return frame_layout(*sizes, self._details, self._fields, recorded_sensors(system.scene), *counts)
+        return frame_layout(*sizes, self._details, self._fields, sensors, *counts, self._at_start)
 
     def write(self, frame: Frame) -> None:
         """Add one frame."""
@@ -261,6 +280,11 @@ class Recorder:
         if names.breakable:
             rows, state = np.arange(len(names)), frame.state
             file.put(BROKEN_STITCHES, sum(np.isin(rows, of) for of in (state.broken_stitches, state.parted_stitches)))
+        values = values_at(self._functions, frame.time)
+        for number, series in function_series(self._at_start).items():
+            value = values[number]
+            same = value is not None and value.shape == series.row_shape
+            file.put(series.path, value if same else np.full(series.row_shape, np.nan))
         readings = frame.sensors
         for sensor in recorded_sensors(frame.system.scene):
             file.put(sensor.series.path, readings[sensor.name].numbers())
@@ -269,11 +293,6 @@ class Recorder:
             with np.errstate(over="ignore"):  # beyond single precision, a value is infinite
                 file.put(series.path, _recorded(field, frame).astype(np.float32))
         file.commit()
-
-
-def _write_static(file: h5py.File, system: System, scene: RecordedScene) -> None:
-    write_grid(file.require_group("VTKHDF"), system)
-    write_scene(file, scene)
 
 
 def _recorded(field: Field, frame: Frame) -> NDArray[np.float64]:

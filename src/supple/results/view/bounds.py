@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.recording.scene import RecordedObstacle
+from supple.scene.obstacles.obstacle import Obstacle
 
 # Obstacles that are larger than the bodies and the way between them by more than this factor are surroundings.
 _LARGEST = 2.0
@@ -45,23 +45,23 @@ class View:
         return max(0.5 * float(np.linalg.norm(self.high - self.low)), 1e-6)
 
 
-def view_of_scene(points: NDArray[np.float64], up: NDArray[np.float64], obstacles: Sequence[RecordedObstacle]) -> View:
+def view_of_scene(points: NDArray[np.float64], up: NDArray[np.float64], obstacles: Sequence[Obstacle]) -> View:
     """The view of bodies in the hull of points (k, 3) [m], of the floor not far below, and of obstacles about them.
 
     Obstacles that are much larger do not count. Of a room the lower half counts, which is drawn.
     """
     bodies = View(points.min(axis=0), points.max(axis=0), up, points)
     outline = [bodies.outline]
-    for recorded in obstacles:
-        plane = recorded.obstacle.plane
+    for obstacle in obstacles:
+        plane = obstacle.plane
         if plane is not None:
             below = float((bodies.center - plane[0]) @ up)
             if float(plane[1] @ up) > 0.99 and 0.0 < below < 4.0 * bodies.radius:
                 outline.append((bodies.center - below * up)[None])
             continue
-        drawn, _ = recorded.obstacle.drawn(bodies.center, bodies.radius)
+        drawn, _ = obstacle.drawn(bodies.center, bodies.radius)
         heights = drawn @ up
-        if recorded.obstacle.is_room:
+        if obstacle.is_room:
             drawn = drawn[heights <= 0.5 * (heights.min() + heights.max())]
         both = np.concatenate([points, drawn])
         if np.linalg.norm(np.ptp(both, axis=0)) < _LARGEST * 2.0 * bodies.radius:

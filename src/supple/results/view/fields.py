@@ -106,7 +106,7 @@ def nodal_values(moment: Moment, values: NDArray[np.float64]) -> NDArray[np.floa
     total, count = np.bincount(corners, own, minlength=n), np.bincount(corners, minlength=n)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     for body in model.bodies:  # a middle node is beside corners in the quarters of a side, but for the inner one
-        triangles = body.triangles + body.vertices.start
+        triangles = body.boundary + body.vertices.start
         unknown = np.asarray(np.isnan(mean[triangles]))
         mixed = np.any(unknown, axis=1) & ~np.all(unknown, axis=1)
         around = np.repeat(np.nanmean(mean[triangles[mixed]], axis=1), unknown[mixed].sum(axis=1))

@@ -76,7 +76,7 @@ class FloorShadow:
 def floor_shadow(model: Model, cells: int) -> FloorShadow | None:
     """On the highest floor of a model; None where it has no floor."""
     view = model.view
-    planes = [one.obstacle.plane for one in model.obstacles]
+    planes = [one.plane for one in model.obstacles]
     floors = [point for point, normal in filter(None, planes) if float(normal @ view.up) > 0.99]
     if not floors:
         return None

@@ -2,42 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
 from supple.results.view.bounds import View, box_corners, farthest, view_of_scene
-from supple.results.view.model import Model, ModelBody, Moment
+from supple.results.view.model import Model, Moment
 
 
 def model_of_recording(recording: Recording) -> Model:
     """The constant data of a recording."""
-    bodies = tuple(
-        ModelBody(
-            body.name,
-            body.vertices,
-            body.tets,
-            body.triangles,
-            body.skin,
-            i,
-            body.rigid,
-            body.look,
-            body.touches_with_skin,
-        )
-        for i, body in enumerate(recording.bodies)
-    )
-    tets = np.ascontiguousarray(recording.tets, dtype=np.int32)
-    return Model(
-        bodies,
-        recording.obstacles,
-        recording.rest_positions,
-        tets,
-        view_of(recording),
-        recording.stitches,
-        joints=recording.joints,
-    )
+    rest, tets = recording.rest_positions, recording.tets
+    view, stitches = view_of(recording), recording.stitches
+    return Model(recording.bodies, recording.obstacles, rest, tets, view, stitches, recording.joints)
 
 
 def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
@@ -50,8 +27,8 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
         frame.obstacle_poses,
         internal=frame.state.internal,
         broken_stitches=frame.state.broken_stitches,
-        laws=replace(frame.recording.laws, active=frame.active),
-        pinned=frame.recording.pinned_vertices.astype(np.int64),
+        laws=frame.laws,
+        pinned=frame.system.pinned_vertices.astype(np.int64),
     )
 
 

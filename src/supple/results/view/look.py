@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.scene.rows import BodyRows
+
 Color = tuple[int, int, int]
 
 
@@ -65,6 +67,12 @@ def body_color(number: int) -> tuple[int, int, int]:
     hue = (0.86 + 0.618034 * number) % 1.0
     r, g, b = colorsys.hls_to_rgb(hue, (0.58, 0.44, 0.7)[number % 3], (0.55, 0.7)[number % 2])
     return round(255 * r), round(255 * g), round(255 * b)
+
+
+def drawn_as(body: BodyRows) -> tuple[Color, Look]:
+    """The color (r, g, b) of a body, and how it reflects light."""
+    look = LOOKS[body.body.drawn_look]
+    return look.color(body_color(body.number)), look
 
 
 @dataclass(frozen=True)

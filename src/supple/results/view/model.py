@@ -16,48 +16,12 @@ from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.laws.internal import NEVER_FLOWED
 from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
-from supple.results.recording.actions import RecordedJoint, RecordedStitches, no_stitches
-from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
 from supple.results.view.bounds import View
-from supple.results.view.look import LOOKS, Look, body_color
 from supple.results.view.skin_contact import beyond_tets
-
-
-@dataclass(frozen=True, eq=False)
-class ModelBody:
-    """One body.
-
-    Attributes
-    ----------
-    name : of the body
-    vertices, tets : its rows in the arrays of the model
-    triangles : (t, 3) its boundary, numbered in the body, counter-clockwise from outside
-    skin : a finer surface that follows its tets, or None
-    number : place among the bodies, which selects the color
-    rigid : whether its vertices are the control points of a rigid body, whose surface is the skin
-    look_name : one of `LOOKS`
-    touches_with_skin : whether contact acts on the skin
-    """
-
-    name: str
-    vertices: slice
-    tets: slice
-    triangles: NDArray[np.int32]
-    skin: SkinnedSurface | None
-    number: int
-    rigid: bool = False
-    look_name: str = "rubber"
-    touches_with_skin: bool = False
-
-    @property
-    def look(self) -> Look:
-        """How it reflects light."""
-        return LOOKS[self.look_name]
-
-    @property
-    def color(self) -> tuple[int, int, int]:
-        """(r, g, b) from 0 to 255."""
-        return self.look.color(body_color(self.number))
+from supple.scene.joints.placed import PlacedJoint
+from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.rows import BodyRows
+from supple.scene.stitches.measures import StitchEnds
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +30,7 @@ class Model:
 
     Attributes
     ----------
-    bodies : see `ModelBody`
+    bodies : with their rows of the arrays
     obstacles : at time 0
     rest_positions : (n, 3) [m]; tets : (m, 4) rows of them
     view : bounds of the motion, and the up direction
@@ -74,18 +38,18 @@ class Model:
     joints : of rigid bodies
     """
 
-    bodies: tuple[ModelBody, ...]
-    obstacles: Sequence[RecordedObstacle]
+    bodies: Sequence[BodyRows]
+    obstacles: Sequence[Obstacle]
     rest_positions: NDArray[np.float64]
     tets: NDArray[np.int32]
     view: View
-    stitches: RecordedStitches = field(default_factory=no_stitches)
-    joints: tuple[RecordedJoint, ...] = ()
+    stitches: StitchEnds
+    joints: tuple[PlacedJoint, ...] = ()
 
     @cached_property
     def surface_vertices(self) -> NDArray[np.int64]:
         """(k,) vertices on the boundaries of all bodies, ascending."""
-        parts = [np.unique(body.triangles) + body.vertices.start for body in self.bodies]
+        parts = [np.unique(body.boundary) + body.vertices.start for body in self.bodies]
         return np.concatenate(parts).astype(np.int64)
 
     @cached_property
@@ -94,7 +58,7 @@ class Model:
         return {
             body.name: beyond_tets(body.skin, self.rest_positions[body.vertices])
             for body in self.bodies
-            if body.skin is not None and not body.touches_with_skin and body.skin.corners.shape[1] == 4
+            if body.skin is not None and not body.body.touches_with_skin and body.skin.corners.shape[1] == 4
         }
 
     @cached_property

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.results.view.model import Model, ModelBody, Moment
+from supple.results.view.model import Model, Moment
+from supple.scene.rows import BodyRows
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +23,7 @@ class SurfacePoint:
     place : (3,) its position [m]
     """
 
-    body: ModelBody
+    body: BodyRows
     vertices: NDArray[np.int64]
     weights: NDArray[np.float64]
     place: NDArray[np.float64]
@@ -45,7 +46,7 @@ class _Triangles:
 def _triangles(moment: Moment) -> _Triangles:
     corners, vertices = [], []
     for body in moment.model.bodies:
-        points, triangles = moment.finite_positions[body.vertices], body.triangles
+        points, triangles = moment.finite_positions[body.vertices], body.boundary
         if body.rigid and body.skin is not None:
             points, triangles = body.skin.positions(points), body.skin.triangles
         corners.append(points[triangles])

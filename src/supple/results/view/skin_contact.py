@@ -12,10 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.recording.scene import RecordedObstacle, SkinnedSurface
+from supple.mesh.skin import Skin
+from supple.scene.obstacles.obstacle import Obstacle
 
 
-def beyond_tets(skin: SkinnedSurface, rest: NDArray[np.float64]) -> tuple[NDArray[np.bool_], float]:
+def beyond_tets(skin: Skin, rest: NDArray[np.float64]) -> tuple[NDArray[np.bool_], float]:
     """Which vertices (k,) of a skin are outside of the tets that carry them, and how far at most it reaches there [m].
 
     Parameters
@@ -33,7 +34,7 @@ def kept_out(
     x: NDArray[np.float64],
     outside: NDArray[np.int64],
     reach: float,
-    obstacles: Sequence[RecordedObstacle],
+    obstacles: Sequence[Obstacle],
     poses: NDArray[np.float64],
     gap: float,
 ) -> NDArray[np.float64]:
@@ -47,8 +48,7 @@ def kept_out(
     """
     if not len(outside):
         return x
-    for recorded, pose in zip(obstacles, poses, strict=False):
-        obstacle = recorded.obstacle
+    for obstacle, pose in zip(obstacles, poses, strict=False):
         if obstacle.checked_by_triangles:
             continue
         distances, normals = obstacle.signed_distance((x[outside] - pose[:, 3]) @ pose[:, :3])

@@ -13,10 +13,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from supple.mesh.closed_surfaces import is_closed
-from supple.results.view.look import OBSTACLE, Look, theme
-from supple.results.view.model import Model, ModelBody, Moment
+from supple.results.view.look import OBSTACLE, Look, drawn_as, theme
+from supple.results.view.model import Model, Moment
 from supple.results.view.skin_contact import kept_out
 from supple.runtime.kernel_cache import njit
+from supple.scene.rows import BodyRows
 
 # A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
 ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
@@ -74,7 +75,7 @@ class SoftSurface(Surface):
     rows : (k,) the vertices of the skin, or of the body, that are drawn
     """
 
-    body: ModelBody
+    body: BodyRows
     skin: bool
     rows: NDArray[np.int64]
     opacity: ClassVar[float] = 1.0
@@ -139,13 +140,13 @@ def surfaces_of(model: Model, *, skins: bool = True, dark: bool = False) -> list
     return [*(body_surface(model, body, skins=skins) for body in model.bodies), *obstacle_surfaces(model, dark)]
 
 
-def body_surface(model: Model, body: ModelBody, *, skins: bool = True) -> SoftSurface | RigidSurface:
+def body_surface(model: Model, body: BodyRows, *, skins: bool = True) -> SoftSurface | RigidSurface:
     """The skin of a body; its boundary where it has none, or, if it is soft, without `skins`."""
     if body.skin is None or not (skins or body.rigid):
         return boundary_surface(body)
     if not body.rigid:
         rows = np.arange(len(body.skin.corners))
-        return SoftSurface(body.name, body.skin.triangles, body.color, body.look, body, True, rows)
+        return SoftSurface(body.name, body.skin.triangles, *drawn_as(body), body, True, rows)
     # Its control points give the pose; the coordinates begin at the center of mass, their mean.
     rest = model.rest_positions[body.vertices]
     center = rest.mean(axis=0)
@@ -156,14 +157,14 @@ def body_surface(model: Model, body: ModelBody, *, skins: bool = True) -> SoftSu
         return np.column_stack([(x[1:] - x[0]).T @ inverse, x.mean(axis=0)])
 
     vertices = body.skin.positions(rest) - center
-    return RigidSurface(body.name, body.skin.triangles, body.color, body.look, vertices, pose)
+    return RigidSurface(body.name, body.skin.triangles, *drawn_as(body), vertices, pose)
 
 
-def boundary_surface(body: ModelBody) -> SoftSurface:
+def boundary_surface(body: BodyRows) -> SoftSurface:
     """The boundary of a body's tets."""
-    used, rows = np.unique(body.triangles, return_inverse=True)
+    used, rows = np.unique(body.boundary, return_inverse=True)
     triangles = rows.reshape(-1, 3).astype(np.int32)
-    return SoftSurface(body.name, triangles, body.color, body.look, body, False, used.astype(np.int64))
+    return SoftSurface(body.name, triangles, *drawn_as(body), body, False, used.astype(np.int64))
 
 
 def obstacle_surfaces(model: Model, dark: bool = False) -> list[RigidSurface]:
@@ -173,8 +174,7 @@ def obstacle_surfaces(model: Model, dark: bool = False) -> list[RigidSurface]:
     lower half is drawn, so that it looks like a bowl.
     """
     made, view, color = [], model.view, theme(dark).obstacle
-    for number, recorded in enumerate(model.obstacles):
-        obstacle = recorded.obstacle
+    for number, obstacle in enumerate(model.obstacles):
         vertices, triangles = obstacle.drawn(view.center, 2.5 * view.radius)
         is_wall = obstacle.plane is not None and float(obstacle.plane[1] @ view.up) < 0.5
         opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if obstacle.is_room else 1.0
@@ -186,7 +186,7 @@ def obstacle_surfaces(model: Model, dark: bool = False) -> list[RigidSurface]:
             vertices, triangles = _lower_half(vertices, triangles, view.up)
         made.append(
             RigidSurface(
-                recorded.name,
+                str(obstacle.name),
                 triangles,
                 color,
                 OBSTACLE,
@@ -200,7 +200,7 @@ def obstacle_surfaces(model: Model, dark: bool = False) -> list[RigidSurface]:
         )
         rim = rim_of(vertices, triangles, view.up, _RIM * view.radius) if obstacle.is_room else None
         if rim is not None:
-            made.append(RigidSurface(f"{recorded.name}, rim", rim[1], color, OBSTACLE, rim[0], pose))
+            made.append(RigidSurface(f"{obstacle.name!s}, rim", rim[1], color, OBSTACLE, rim[0], pose))
     return made
 
 

@@ -7,15 +7,15 @@ time 0; `motion` moves it from there (see `supple.scene.motion`).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.kinds.forms import NON_NEGATIVE, Instance, Name
-from supple.kinds.kind import Declared, Kind, declared
+from supple.kinds.forms import NON_NEGATIVE, Name
+from supple.kinds.kind import Kind
 from supple.mesh.surface import SurfaceMesh
 from supple.scene.motion import Motion, MotionForm, rigid_pose
 from supple.scene.obstacles.shape import Shape
@@ -42,21 +42,10 @@ class Obstacle(Kind, ABC):
 
     title: ClassVar[str] = "obstacle"
 
-    @classmethod
-    def parameters(cls) -> dict[str, Declared]:
-        """What a kind declares of its own, by name."""
-        common = {field.name for field in fields(Obstacle)}
-        return {key: one for key, one in declared(cls).items() if key not in common}
-
     @property
     def label(self) -> str:
         """The name of this obstacle in messages."""
         return f"obstacle {self.name!r}" if self.name else type(self).__name__
-
-    def values(self) -> dict[str, Any]:
-        """The parameters as plain numbers and lists, without surfaces; a recording keeps them."""
-        own = {key: getattr(self, key) for key, one in self.parameters().items() if not isinstance(one.form, Instance)}
-        return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in own.items()}
 
     def pose(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotation (3, 3) and translation (3,) [m] from where it is at time 0 to where it is at `time` [s]."""

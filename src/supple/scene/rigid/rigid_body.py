@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from supple.errors import SceneError
 from supple.kinds.forms import POSITIVE, Instance, Vector
 from supple.materials.elastic import StVenantKirchhoff
 from supple.materials.material import Material
+from supple.mesh.skin import Skin
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -151,6 +153,11 @@ class RigidBody(PlacedBody):
         """The surface's vertices as combinations of the control points."""
         corners = np.broadcast_to(np.arange(4, dtype=np.int32), (len(self.weights), 4))
         return EmbeddedPoints.in_rows(corners, self.weights)
+
+    @cached_property
+    def attached_skin(self) -> Skin:
+        corners = np.tile(np.arange(4, dtype=np.int32), (len(self.weights), 1))
+        return Skin(corners, self.weights, self.surface.triangles)
 
     @property
     def touches_with_skin(self) -> bool:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.geometry.triangle_tree import closest_places
+from supple.scene.body import PlacedBody
 from supple.scene.stitches.stitching import Stitching
 
 
@@ -78,15 +82,63 @@ def largest_stitch_stretch(stitching: Stitching, points: NDArray[np.float64]) ->
     return float(every.max()) if len(every) else None
 
 
-def attachments(stitching: Stitching, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """The ends of each stitch: nodes (k, 4), the vertex first, and weights (k, 3) of the others at the point nearest to
-    it; points (n + a, 3) at the start [m]."""
-    springs = stitching.springs
-    others = np.concatenate([stitching.tets.vertices[:, 1:], springs.vertices[:, [1, 2, 2]]])
-    vertex = np.concatenate([stitching.tets.vertices[:, 0], springs.vertices[:, 0]])
-    weights = closest_places(points[vertex], points, others)
-    weights[len(stitching.tets) :] = np.column_stack([1.0 - springs.place, springs.place, np.zeros(len(springs))])
-    return np.column_stack([vertex, others]).astype(np.int32), weights
+@dataclass(frozen=True, eq=False)
+class StitchEnds:
+    """The ends of stitches, each from a vertex to the point that was nearest to it at the start.
+
+    Attributes
+    ----------
+    nodes : (k, 4) the vertex, then the corners of what it is stitched to; of tets first, then of springs. From n on,
+        they are points of rigid bodies, and then vertices of obstacles
+    weights : (k, 3) of the corners
+    rigid_control, rigid_weights : (r, 4) vertices, and the combination of these that each point of a rigid body is
+    anchor_owners : (a,) which obstacle those vertices belong to; anchors : (a, 3) at time 0, before its pose [m]
+    """
+
+    nodes: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    rigid_control: NDArray[np.int32]
+    rigid_weights: NDArray[np.float64]
+    anchor_owners: NDArray[np.int32]
+    anchors: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    @classmethod
+    def of(cls, stitching: Stitching, bodies: Sequence[PlacedBody]) -> StitchEnds:
+        """Those of all stitches of a scene with these bodies."""
+        springs, rigid, anchors = stitching.springs, stitching.apart, stitching.anchors
+        start = np.concatenate([body.place(body.mesh.vertices) for body in bodies])
+        points = stitching.points(start, 0.0)
+        others = np.concatenate([stitching.tets.vertices[:, 1:], springs.vertices[:, [1, 2, 2]]])
+        vertex = np.concatenate([stitching.tets.vertices[:, 0], springs.vertices[:, 0]])
+        weights = closest_places(points[vertex], points, others)
+        weights[len(stitching.tets) :] = np.column_stack([1.0 - springs.place, springs.place, np.zeros(len(springs))])
+        nodes = np.column_stack([vertex, others]).astype(np.int32)
+        return cls(nodes, weights, rigid.control, rigid.weights, anchors.owner, anchors.points)
+
+    def corners(self, x: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, 4, 3) where the nodes are [m].
+
+        Parameters
+        ----------
+        x : (n, 3) vertices of bodies [m]; poses : (obstacles, 3, 4) rotation and translation of each since time 0
+        """
+        pose = poses[self.anchor_owners]
+        there = np.einsum("aij,aj->ai", pose[:, :, :3], self.anchors) + pose[:, :, 3]
+        on_rigid = np.einsum("rk,rki->ri", self.rigid_weights, x[self.rigid_control])
+        return np.concatenate([x, on_rigid, there])[self.nodes]
+
+    def segments(
+        self, x: NDArray[np.float64], poses: NDArray[np.float64], broken: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64]:
+        """(k, 2, 3) ends of the stitches [m], of broken ones (b,) the same point twice; parameters as of `corners`."""
+        corners = self.corners(x, poses)
+        ends = np.stack([corners[:, 0], np.einsum("kc,kci->ki", self.weights, corners[:, 1:])], axis=1)
+        if broken is not None:
+            ends[broken, 1] = ends[broken, 0]
+        return ends
 
 
 def _deformation_gradients(stitching: Stitching, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,8 +14,9 @@ import pytest
 import supple as sp
 from supple.app.viewer.protocol.commands import Watch
 from supple.app.viewer.protocol.snapshots import BodyDescription, Measures, SceneDescription, Snapshot, Timing
-from supple.results.recording.actions import no_stitches
-from supple.results.recording.scene import RecordedObstacle
+from supple.scene.rows import rows_of
+from supple.scene.stitches.measures import StitchEnds
+from supple.scene.stitches.stitching import no_stitching
 
 TOKEN = "the-token-of-the-tests"
 
@@ -59,27 +60,15 @@ class FakeSimulation:
 
 
 def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
-    bodies, n, m = [], 0, 0
-    for i, mesh in enumerate(meshes):
-        rows = slice(n, n + len(mesh.vertices)), slice(m, m + len(mesh.tets))
-        n, m = rows[0].stop, rows[1].stop
-        values = {"youngs": 1e5, "poisson": 0.4, "damping": 0.0, "density": 1000.0, "friction": 0.0}
-        bodies.append(
-            BodyDescription(
-                f"body {i}",
-                *rows,
-                mesh.vertices,
-                mesh.surface.triangles,
-                mesh.nodes,
-                skin if i == 0 else None,
-                "StableNeoHookean",
-                values,
-                1.0,
-            )
-        )
+    material = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+    values = {"youngs": 1e5, "poisson": 0.4, "damping": 0.0, "density": 1000.0, "friction": 0.0}
+    surface = None if skin is None else sp.SurfaceMesh(*skin)
+    things = [sp.Body(f"body {i}", mesh, material, skin=None if i else surface) for i, mesh in enumerate(meshes)]
+    rows = rows_of(things)
+    bodies = [BodyDescription(one.body, one.number, one.vertices, one.tets, values, 1.0) for one in rows]
+    n, m = rows[-1].vertices.stop, rows[-1].tets.stop
     x = np.concatenate([mesh.vertices for mesh in meshes])
-    shape = {"point": np.zeros(3), "normal": np.array([0.0, 1.0, 0.0])}
-    floor = RecordedObstacle("floor", "HalfSpace", shape, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
+    floor = sp.HalfSpace(name="floor")
     made = SceneDescription(
         generation=1,
         revision=1,
@@ -90,7 +79,7 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
         up=np.array([0.0, 1.0, 0.0]),
         low=x.min(axis=0),
         high=x.max(axis=0),
-        stitches=no_stitches(),
+        stitches=StitchEnds.of(no_stitching(n), things),
         n_vertices=n,
         n_tets=m,
         n_constraints=3 * m,
@@ -105,7 +94,7 @@ def snapshot_of(description: SceneDescription, **changes) -> Snapshot:
         description=description,
         frame=0,
         time=0.0,
-        positions=np.concatenate([body.rest_positions for body in description.bodies]),
+        positions=np.concatenate([body.body.mesh.vertices for body in description.bodies]),
         obstacle_poses=(np.eye(3)[None], np.zeros((1, 3))),
         pinned=np.zeros(0, dtype=np.int32),
         grabs=(),

@@ -84,12 +84,11 @@ def test_pictures_go_on_after_one_that_raises(server, until):
 
 def test_fine_skins_follow_their_tets_without_a_python_loop(fake):
     """The work for every picture: 100k vertices, with bounded work for each and without a Python loop."""
-    from supple.mesh.skin import Embedding
-    from supple.results.recording.scene import SkinnedSurface
+    from supple.mesh.skin import Embedding, Skin
 
     mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(8, 8, 8))
     points = np.random.default_rng(0).uniform(-0.5, 0.5, (100_000, 3))
     held = Embedding.of(mesh, points)
-    skin = SkinnedSurface(held.corners, held.weights, np.zeros((0, 3), dtype=np.int32))
+    skin = Skin(held.corners, held.weights, np.zeros((0, 3), dtype=np.int32))
     stretch = np.diag([1.0, 2.0, 0.5])
     np.testing.assert_allclose(skin.positions(mesh.vertices @ stretch), points @ stretch, atol=1e-9)

@@ -12,7 +12,7 @@ import supple as sp
 from supple.app.cli.app import main
 from supple.results.check.checker import check_series
 from supple.results.check.geometry.moving_triangles import triangles_pass
-from supple.results.check.series_recording import Given
+from supple.results.check.series import Given
 
 from .generated import FAULTS, SURFACES, WRITERS, clean
 

@@ -126,7 +126,7 @@ def _report(paths: tuple[Path, ...], given: dict[str, Any], settings: dict[str, 
     from supple.errors import OutputError
     from supple.mesh.io.series.open import open_series
     from supple.results.check.checker import check_recording, check_series
-    from supple.results.check.series_recording import Given
+    from supple.results.check.series import Given
     from supple.results.recording.checked_hdf5 import is_of_another_program
 
     folder = paths[0].is_dir() and not (paths[0] / "recording.vtkhdf").exists()

@@ -320,8 +320,8 @@ def _recording(file: Path) -> None:
         rows = [
             ("kind", "recording"),
             ("frames", f"{len(recording)} to t = {recording.times[-1]:.6g} s, dt = {recording.dt:.6g} s"),
-            ("bodies", ", ".join(f"{body.name} ({body.material})" for body in recording.bodies)),
-            ("obstacles", ", ".join(f"{o.name} ({o.kind})" for o in recording.obstacles) or "none"),
+            ("bodies", ", ".join(f"{body.name} ({_made_of(body.body)})" for body in recording.bodies)),
+            ("obstacles", ", ".join(f"{o.name} ({type(o).__name__})" for o in recording.obstacles) or "none"),
             ("vertices", str(len(recording.masses))),
             ("tets", str(len(recording.tets))),
             ("volume", f"{sum(recording.rest_volumes[b.tets].sum() for b in soft):.6g} m^3 of soft bodies at rest"),
@@ -340,3 +340,12 @@ def _recording(file: Path) -> None:
         problems += [recording.unfinished] if recording.unfinished else []
         rows.append(("problems", "; ".join(problems) or "none"))
     print_table(rows, str(file))
+
+
+def _made_of(body: PlacedBody) -> str:
+    from supple.scene.rigid.rigid_body import RigidBody
+
+    if isinstance(body, RigidBody):
+        return f"rigid, {body.properties.mass:.6g} kg"
+    text = " ".join(repr(body.material).split())
+    return text if len(text) <= 500 else f"{text[:499]}…"

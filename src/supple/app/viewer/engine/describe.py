@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,16 +12,16 @@ from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.scene.solvers import kind_of, solver_values
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.parameters import PARAMETERS, Value
-from supple.app.viewer.protocol.snapshots import RIGID, BodyDescription, Measures, Reading, SceneDescription
+from supple.app.viewer.protocol.snapshots import BodyDescription, Measures, Reading, SceneDescription
+from supple.materials.own.energy_material import EnergyMaterial
 from supple.model.actuator_readings import cable_readings, cavity_readings
 from supple.model.diagnostics import measure
 from supple.model.state import State
 from supple.model.system import BodyRange, System
 from supple.results.readings.frame_readings import joint_readings
 from supple.results.readings.sensor_readings import sensor_readings
-from supple.results.recording.actions import joints_of, recorded_stitches
-from supple.results.recording.scene import RecordedObstacle
-from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.joints.placed import placed_joints
+from supple.scene.stitches.measures import StitchEnds
 from supple.solvers.xpbd.details import XPBDDetails
 
 
@@ -34,38 +34,28 @@ def describe(live: LiveScene) -> SceneDescription:
         generation=live.generation,
         revision=live.revision,
         bodies=tuple(_body(part, system.masses, setup.added) for part in system.bodies),
-        obstacles=tuple(map(RecordedObstacle.of, system.obstacles)),
+        obstacles=tuple(replace(obstacle, motion=None) for obstacle in system.obstacles),
         solver=kind_of(setup.solver),
         values={**solver_values(setup.solver), "dt": setup.dt, "gravity": gravity},
         up=live.up,
         low=positions.min(axis=0),
         high=positions.max(axis=0),
-        stitches=recorded_stitches(system),
+        stitches=StitchEnds.of(system.scene.stitching, system.scene.bodies),
         n_vertices=len(live.state.positions),
         n_tets=len(system.tets),
         n_constraints=sum(int(made.count) for made in getattr(live.workspace, "sets", ())),
-        joints=joints_of(system),
+        joints=placed_joints(system.scene.bodies, system.scene.joints, system.obstacles),
     )
 
 
 def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -> BodyDescription:
     body = part.body
-    skin = body.skin
-    return BodyDescription(
-        name=body.name,
-        vertices=part.vertices,
-        tet_rows=part.tets,
-        rest_positions=body.mesh.vertices,
-        triangles=body.mesh.surface.triangles.astype(np.int32),
-        nodes=body.mesh.nodes.astype(np.int32),
-        skin=None if skin is None else (skin.vertices, skin.triangles.astype(np.int32)),
-        material=RIGID if isinstance(body, RigidBody) else type(body.material).__name__,
-        values={"friction": body.friction, **({} if isinstance(body, RigidBody) else _material_values(body.material))},
-        mass=float(masses[part.vertices].sum()),
-        added=body.name in added,
-        look=body.drawn_look,
-        touches_with_skin=bool(body.touches_with_skin),
-    )
+    values = {"friction": body.friction, **({} if part.rigid else _material_values(body.material))}
+    if isinstance(body.material, EnergyMaterial):  # what is compiled stays here
+        body = body.changed(material=body.material.recorded())
+    _ = body.attached_skin  # found once, and sent with the body
+    rows = part.number, part.vertices, part.tets
+    return BodyDescription(body, *rows, values, float(masses[part.vertices].sum()), part.name in added)
 
 
 def _material_values(material: Any) -> dict[str, Value]:

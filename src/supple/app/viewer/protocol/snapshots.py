@@ -11,43 +11,33 @@ from numpy.typing import NDArray
 from supple.app.viewer.protocol.parameters import Value
 from supple.model.diagnostics import Diagnostics
 from supple.results.readings.frame_readings import JointReading
-from supple.results.recording.actions import RecordedJoint, RecordedStitches
-from supple.results.recording.scene import RecordedObstacle
+from supple.scene.joints.placed import PlacedJoint
+from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.rows import BodyRows
+from supple.scene.stitches.measures import StitchEnds
 
 RIGID = "rigid"  # instead of a material
 
 
 @dataclass(frozen=True, eq=False)
-class BodyDescription:
-    """One body. `vertices` and `tet_rows` are its rows in the arrays of a snapshot.
+class BodyDescription(BodyRows):
+    """One body, with its rows of the arrays of a snapshot.
 
     Attributes
     ----------
-    vertices, tet_rows : slices of a snapshot's `positions` and `tet_values`
-    rest_positions : (n, 3) in the coordinates of the mesh [m]
-    triangles : (t, 3) surface, counter-clockwise from outside; nodes : (m, 4) or (m, 10) of the tets; both numbered
-        from 0 in the body
-    skin : vertices (s, 3) in the coordinates of the mesh [m] and triangles (u, 3) of the finer surface, or None
-    material : name of its class, or `RIGID`; values : of the parameters that a page can change, by name
+    values : of the parameters that a page can change, by name
     mass : [kg]
     added : whether it was added on the page
-    look : how it is drawn
-    touches_with_skin : whether contact acts on the skin
     """
 
-    name: str
-    vertices: slice
-    tet_rows: slice
-    rest_positions: NDArray[np.float64]
-    triangles: NDArray[np.int32]
-    nodes: NDArray[np.int32]
-    skin: tuple[NDArray[np.float64], NDArray[np.int32]] | None
-    material: str
     values: dict[str, Value]
     mass: float
     added: bool = False
-    look: str = "rubber"
-    touches_with_skin: bool = False
+
+    @property
+    def material(self) -> str:
+        """The name of its class, or `RIGID`."""
+        return RIGID if self.rigid else type(self.body.material).__name__
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,17 +60,17 @@ class SceneDescription:
     generation: int
     revision: int
     bodies: tuple[BodyDescription, ...]
-    obstacles: tuple[RecordedObstacle, ...]
+    obstacles: tuple[Obstacle, ...]
     solver: str
     values: dict[str, Value]
     up: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    stitches: RecordedStitches
+    stitches: StitchEnds
     n_vertices: int
     n_tets: int
     n_constraints: int
-    joints: tuple[RecordedJoint, ...] = ()
+    joints: tuple[PlacedJoint, ...] = ()
 
     def body(self, name: str) -> BodyDescription:
         """The body of that name; raises `KeyError` where there is none."""

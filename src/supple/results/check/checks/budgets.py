@@ -9,7 +9,7 @@ from supple.results.check.frame_check import At, FrameCheck
 from supple.results.check.report import CheckResult
 from supple.results.check.settings import CheckSettings
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.recording.reader import Recording
+from supple.results.check.trajectory import Trajectory
 
 # Of energies and works, which are recorded and computed here in double precision.
 _CLOSED = 1e-9
@@ -17,22 +17,6 @@ _CLOSED = 1e-9
 _OF_DIFFERENCES = 1e-3
 # Works that take energy where nothing moves obstacles.
 _PASSIVE = ("contact", "friction", "damping")
-
-
-def external_action(recording: Recording) -> str | None:
-    """What may act on the scene from outside besides gravity, or None."""
-    physics = recording.physics
-    if "files" in recording.knows:  # and that nothing else acts
-        return None
-    if len(recording.pinned_vertices):
-        return "pins hold bodies"
-    if recording.obstacles:
-        return "bodies may rest on obstacles"
-    if physics.held_joints:
-        return "joints hold bodies"
-    if physics.forces or physics.soft_targets:
-        return "forces or soft targets act on bodies"
-    return None
 
 
 class Momentum(FrameCheck):
@@ -44,7 +28,7 @@ class Momentum(FrameCheck):
     bad = "changes by {worst} of itself without a force"
 
     def begin(self) -> None:
-        self.why_not = external_action(self.scene.recording)
+        self.why_not = self.scene.recording.acting
         self._start: tuple[float, NDArray[np.float64]] | None = None
         self._scale = 0.0
 
@@ -80,8 +64,8 @@ class Spin(FrameCheck):
 
     def begin(self) -> None:
         recording = self.scene.recording
-        self.why_not = external_action(recording)
-        self._implicit = (recording.solver or "").startswith("Implicit")
+        self.why_not = recording.acting
+        self._implicit = (recording.records.solver or "").startswith("Implicit")
         self.good = "constant within {worst}" + (", beyond the error of the integrator" if self._implicit else "")
         if self.why_not is None and self._implicit and self.settings.every > 1:
             self.why_not = "the error of an implicit integrator is known from one frame to the next only"
@@ -126,17 +110,9 @@ class Energy(FrameCheck):
         recording = self.scene.recording
         self._works = recorded_works(recording)
         if self._works is None:
-            self.why_not = self._unrecorded()
+            self.why_not = recording.driving
         self._first: Snapshot | None = None
         self._rows: list[tuple[int, float, float]] = []
-
-    def _unrecorded(self) -> str | None:
-        physics = self.scene.recording.physics
-        if physics.forces or physics.soft_targets:
-            return "forces or soft targets do work"
-        if physics.scripted_pins:
-            return "scripted pins do work"
-        return "motors do work" if physics.motors else None
 
     def see(self, at: Snapshot) -> None:
         self._first = self._first or at
@@ -201,7 +177,7 @@ class Balance(FrameCheck):
         recording = self.scene.recording
         numbers, stored, height = np.array(self._rows).T
         rows = numbers.astype(int)
-        residual = recording.frame_values("details/energy_residual")
+        residual = recording.records.frame_values("details/energy_residual")
         each = np.array([*self._works.values(), residual])
         sums, sizes = np.cumsum(each.sum(axis=0))[rows], np.cumsum(np.abs(each).sum(axis=0))[rows]
         scale = energy_scale(self.scene, stored, height) + sizes
@@ -209,30 +185,31 @@ class Balance(FrameCheck):
         open_ = np.maximum(miss - self.scene.floors.sums, 0.0) / scale
         left = np.abs(np.cumsum(residual)[rows]) / scale
         for number, miss, rest in zip(rows, open_, left, strict=True):
-            at = recording[int(number)]
+            at = At(int(number), float(recording.times[int(number)]))
             self.tally.see(at, float(miss), not miss <= _CLOSED)
             if not rest <= self.settings.max_energy_gain:
                 self.tally.see(at, float(rest), True, "forces that are not balanced")
         if "breaking" in self._works:
             apart = np.abs(self._works["breaking"][rows] + self._breaking) / scale
             worst = int(np.argmax(apart))
-            self.tally.see(
-                recording[int(rows[worst])], float(apart[worst]), not apart[worst] <= _CLOSED, "work of breaking"
-            )
+            at = At(int(rows[worst]), float(recording.times[rows[worst]]))
+            self.tally.see(at, float(apart[worst]), not apart[worst] <= _CLOSED, "work of breaking")
         for kind, names in (("cavities", "cavity_work"), ("cables", "cable_work")):
             if kind in self._works:
-                apart = np.abs(recording.frame_values(f"details/{names}").sum(axis=1) - self._works[kind])
+                apart = np.abs(recording.records.frame_values(f"details/{names}").sum(axis=1) - self._works[kind])
                 worst = int(np.argmax(apart))
                 share = float(apart[worst] / scale.max())
-                self.tally.see(recording[worst], share, not share <= _CLOSED, f"work of {kind}")
+                self.tally.see(At(worst, float(recording.times[worst])), share, not share <= _CLOSED, f"work of {kind}")
         return super().result()
 
 
-def recorded_works(recording: Recording, numerical: bool = False) -> dict[str, NDArray[np.float64]] | None:
+def recorded_works(recording: Trajectory, numerical: bool = False) -> dict[str, NDArray[np.float64]] | None:
     """By name, (frames,) [J], without what is numerical; None where the recording has none."""
-    for field in recording.details.fields:
+    if "recording" not in recording.knows:
+        return None
+    for field in recording.records.details.fields:
         if field.name == "work" and field.keys:
-            values = recording.frame_values("details/work").T
+            values = recording.records.frame_values("details/work").T
             named = dict(zip(field.keys, values, strict=True))
             return {name: work for name, work in named.items() if numerical or name != "numerical"}
     return None
@@ -244,10 +221,10 @@ def moved_and_height(at: Snapshot, first: Snapshot) -> tuple[float, float]:
     m, v = recording.masses, at.velocities
     elastic = at.elastic_energy
     if elastic is None:
-        elastic = float(recording.series("elastic_energy")[at.number])
+        elastic = float(recording.records.series("elastic_energy")[at.number])
     stitches = at.stitch_energy
     if stitches is None:
-        stitches = float(recording.series("stitch_energy")[at.number])
+        stitches = float(recording.records.series("stitch_energy")[at.number])
     moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic + stitches
     return moved, -float((m @ (at.positions - first.positions)) @ recording.gravity)
 

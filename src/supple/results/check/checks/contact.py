@@ -16,7 +16,7 @@ from supple.results.check.geometry.triangle_distance import triangles_apart
 from supple.results.check.report import CheckResult
 from supple.results.check.snapshot import Scene, Snapshot
 from supple.results.check.surfaces import moved, moved_back
-from supple.results.recording.scene import RecordedObstacle
+from supple.scene.obstacles.obstacle import Obstacle
 
 # A moved obstacle, and every distance from a ball or a wall, is rounded a few times.
 _ROUNDINGS = 16.0
@@ -41,7 +41,7 @@ class Clearance:
 
 
 def clearance(
-    obstacle: RecordedObstacle,
+    shape: Obstacle,
     pose: NDArray[np.float64],
     x: NDArray[np.float64],
     vertices: NDArray[np.int64],
@@ -52,7 +52,7 @@ def clearance(
     A static half-space is decided exactly, from its recorded point and normal. For a room vertices decide. For a solid
     whole triangles decide, up to about 1e-6 of their size where they lie along its surface.
     """
-    shape, R, t = obstacle.obstacle, pose[:, :3], pose[:, 3]
+    R, t = pose[:, :3], pose[:, 3]
     points = x[vertices]
     if shape.plane is not None:
         given, normal = shape.plane
@@ -132,7 +132,7 @@ def clearances(scene: Scene, at: Snapshot) -> Iterator[tuple[str, Clearance]]:
     """The clearance of each body from each obstacle that is a formula: where, and how far."""
     surfaces = scene.surfaces
     for j, obstacle in enumerate(scene.recording.obstacles):
-        if obstacle.obstacle.checked_by_triangles:
+        if obstacle.checked_by_triangles:
             continue
         for i in range(surfaces.bodies):
             if not surfaces.allowed[i, surfaces.bodies + j]:
@@ -157,7 +157,7 @@ class Obstacles(FrameCheck):
     bad = "a body is in an obstacle, at {worst}"
 
     def begin(self) -> None:
-        if all(recorded.obstacle.checked_by_triangles for recorded in self.scene.recording.obstacles):
+        if all(obstacle.checked_by_triangles for obstacle in self.scene.recording.obstacles):
             self.why_not = "the scene has no half-space, round solid or room"
 
     def see(self, at: Snapshot) -> None:
@@ -202,11 +202,10 @@ class Containment(FrameCheck):
     def _solids_in_bodies(self, at: Snapshot) -> Iterator[str]:
         surfaces = self.scene.surfaces
         for j, obstacle in enumerate(self.scene.recording.obstacles):
-            shape = obstacle.obstacle
-            if shape.checked_by_triangles or shape.is_room or shape.plane is not None:
+            if obstacle.checked_by_triangles or obstacle.is_room or obstacle.plane is not None:
                 continue
             # Of a convex solid, the mean of points about it is inside.
-            center = moved(shape.triangles()[0].mean(axis=0)[None], at.poses[j])[0]
+            center = moved(obstacle.triangles()[0].mean(axis=0)[None], at.poses[j])[0]
             for solid in surfaces.pieces:
                 allowed = solid.owner < surfaces.bodies and surfaces.allowed[solid.owner, surfaces.bodies + j]
                 if allowed and solid.closed and is_inside(at.points, center, surfaces.triangles, solid.triangles):

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.recording.actions import RecordedFunction, RecordedJoint
+from supple.scene.joints.joint import Function
+from supple.scene.joints.placed import PlacedJoint
 
 # Largest violations, as a share of the joint's size: of `Implicit`, and of solvers that correct positions step by step.
 _IMPLICIT, _OTHERS = 1e-6, 1e-3
@@ -32,34 +33,35 @@ class Joints(FrameCheck):
         recording = self.scene.recording
         if not recording.joints:
             self.why_not = "the scene has no joint"
-        of_solver = _IMPLICIT if (recording.solver or "").startswith("Implicit") else _OTHERS
+        of_solver = _IMPLICIT if (recording.records.solver or "").startswith("Implicit") else _OTHERS
         given = self.settings.max_joint_error
         self._most = of_solver if given is None else given
         self._last: dict[str, tuple[float, float]] = {}
         self._frames = [_Frame.of(self.scene, joint) for joint in recording.joints]
-        kept = {field.name: field.keys or () for field in recording.details.fields}
+        kept = {field.name: field.keys or () for field in recording.records.details.fields}
         self._recorded = {
             name: {key: values[:, k] for k, key in enumerate(kept[name])}
             for name in ("joint_coordinates", "motor_forces")
-            if kept.get(name) and (values := recording.frame_values(f"details/{name}")) is not None
+            if kept.get(name) and (values := recording.records.frame_values(f"details/{name}")) is not None
         }
 
     def see(self, at: Snapshot) -> None:
-        for joint, frame in zip(self.scene.recording.joints, self._frames, strict=True):
+        recording = self.scene.recording
+        for joint, (effort, rate), frame in zip(recording.joints, recording.joint_limits, self._frames, strict=True):
             recorded = self._of_report("joint_coordinates", joint.name, at.number)
             error, coordinate, strain = frame.error(at, recorded)
             where = joint.name
             before, last = self._last.get(joint.name, (at.time, coordinate))
             self._last[joint.name] = at.time, coordinate
-            if np.isfinite(joint.max_velocity):
-                too_far = (abs(coordinate - last) - joint.max_velocity * (at.time - before)) / frame.unit
+            if np.isfinite(rate):
+                too_far = (abs(coordinate - last) - rate * (at.time - before)) / frame.unit
                 error, where = (too_far, f"{joint.name}, its rate") if too_far > error else (error, where)
             differs = 0.0 if recorded is None else abs(coordinate - recorded) / frame.unit
             # Where a body is not quite rigid, an angle depends on the material that it is taken from.
             if differs > max(error, self._most, strain):
                 error, where = differs, f"{joint.name}, its recorded coordinate"
-            effort = self._of_report("motor_forces", joint.name, at.number)
-            beyond = effort is not None and not abs(effort) <= joint.max_force * (1.0 + 1e-9)
+            found = self._of_report("motor_forces", joint.name, at.number)
+            beyond = found is not None and not abs(found) <= effort * (1.0 + 1e-9)
             where = f"{joint.name}, its motor exceeds its largest effort" if beyond else where
             self.tally.see(at, error, beyond or not error <= self._most, where)
 
@@ -80,14 +82,14 @@ class _Frame:
     """
 
     scene: Scene
-    joint: RecordedJoint
+    joint: PlacedJoint
     points: NDArray[np.float64]
     axes: NDArray[np.float64]
     size: float
     unit: float
 
     @classmethod
-    def of(cls, scene: Scene, joint: RecordedJoint) -> _Frame:
+    def of(cls, scene: Scene, joint: PlacedJoint) -> _Frame:
         R, t = joint.placed[:, :, :3], joint.placed[:, :, 3]
         bodies, sizes = scene.recording.bodies, []
         for side in joint.sides:
@@ -122,9 +124,7 @@ class _Frame:
         return max(errors), coordinate, strain
 
     @staticmethod
-    def _value(
-        one: RecordedFunction, vectors: list[NDArray[np.float64]], R: NDArray[np.float64], near: float | None
-    ) -> float:
+    def _value(one: Function, vectors: list[NDArray[np.float64]], R: NDArray[np.float64], near: float | None) -> float:
         """The value of a function; R : (3, 3) the rotation of the first side against the second, in the axes."""
         if one.form == "twist":
             about, _, _, w = Rotation.from_matrix(R).as_quat()

@@ -41,7 +41,7 @@ class Finite(FrameCheck):
                 self.tally.see(None, count, True, what.replace("_", " "))
         names = [name for name in (*REPORT_NUMBERS, *REPORT_VECTORS) if name not in _MAY_BE_UNKNOWN]
         reports = "recording" in recording.knows
-        self._series = {name: recording.series(name) for name in names} if reports else {}
+        self._series = {name: recording.records.series(name) for name in names} if reports else {}
 
     def see(self, at: Snapshot) -> None:
         found = [(count, where) for count, where in self._bad(at) if count] if at.other is None else []
@@ -77,14 +77,14 @@ class Sequence(FrameCheck):
         self._last: Snapshot | None = None
         recording = self.scene.recording
         # XPBD may push a body out of another one and stop it within the same frame.
-        self._implicit = (recording.solver or "").startswith("Implicit")
-        indices = np.array([frame.index for frame in recording])
+        self._implicit = (recording.records.solver or "").startswith("Implicit")
+        indices = np.array([frame.index for frame in recording.records])
         for k in range(1, len(recording)):
-            at = recording[k]
+            at = recording.records[k]
             step = at.time - float(recording.times[k - 1])
             rounding = 4.0 * np.finfo(np.float64).eps * abs(at.time)
             # A step that failed ends where the solver got to, at the latest with its length; `Converged` names it.
-            failed = not recording.statuses[k].can_go_on
+            failed = not recording.records.statuses[k].can_go_on
             if failed and 0.0 <= step <= recording.dt * (1.0 + _SAME_TIME) + rounding:
                 step = recording.dt
             if not step > 0.0:
@@ -100,12 +100,12 @@ class Sequence(FrameCheck):
         if before is None:
             return
         if not np.array_equal(before.positions, at.positions):
-            converged = recording.statuses[at.number] is Status.CONVERGED
+            converged = recording.records.statuses[at.number] is Status.CONVERGED
             if self._implicit and converged and at.number == before.number + 1:
                 self._follow(before, at)
             return
         slowest = min(float(np.abs(frame.velocities).max(initial=0.0)) for frame in (before, at))
-        if slowest > self.scene.floors.speed and recording.statuses[at.number].can_go_on:
+        if slowest > self.scene.floors.speed and recording.records.statuses[at.number].can_go_on:
             self.tally.see(at, slowest, True, f"repeats frame {before.number} although it moves")
 
     def _follow(self, before: Snapshot, at: Snapshot) -> None:
@@ -140,6 +140,6 @@ class Converged(FrameCheck):
 
     def begin(self) -> None:
         recording = self.scene.recording
-        for frame, status in zip(recording, recording.statuses, strict=True):
+        for frame, status in zip(recording.records, recording.records.statuses, strict=True):
             if status is not Status.CONVERGED:
                 self.tally.see(frame, 1.0, True, str(status))

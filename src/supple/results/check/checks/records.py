@@ -41,28 +41,28 @@ class Records(FrameCheck):
         apart[~np.isfinite(apart)] = 0.0
         row = int(np.argmax(apart))
         yield float(apart[row]), f"det F of {self.scene.name('tet', row)}"
-        recorded = recording.series("min_det_F")[k]
+        recorded = recording.records.series("min_det_F")[k]
         yield abs(recorded - at.least_J.min()) / sizes[int(np.argmin(at.least_J))], "smallest det F"
         kinetic = 0.5 * float(m @ np.einsum("ij,ij->i", v, v))
-        recorded = recording.series("kinetic_energy")[k]
+        recorded = recording.records.series("kinetic_energy")[k]
         yield abs(recorded - kinetic) / (kinetic + _NOTHING), "kinetic energy"
         potential = -float((m @ x) @ recording.gravity)
         heights = float(m @ np.linalg.norm(x, axis=1)) * float(np.linalg.norm(recording.gravity))
-        recorded = recording.series("potential_energy")[k]
+        recorded = recording.records.series("potential_energy")[k]
         yield abs(recorded - potential) / (heights + _NOTHING), "potential energy"
         for name, energy in (
             ("elastic energy", at.elastic_energy),
             ("stitch energy", at.stitch_energy),
         ):
             if energy is not None:
-                recorded = recording.series(name.replace(" ", "_"))[k]
+                recorded = recording.records.series(name.replace(" ", "_"))[k]
                 yield abs(recorded - energy) / (abs(energy) + self.scene.floors.sums / _SAME), name
         momentum = m @ v
-        recorded = recording.series("linear_momentum")[k]
+        recorded = recording.records.series("linear_momentum")[k]
         speeds = np.linalg.norm(v, axis=1)
         yield float(np.linalg.norm(recorded - momentum)) / (float(m @ speeds) + _NOTHING), "linear momentum"
         r = x - m @ x / m.sum()
         spin = m @ np.cross(r, v - momentum / m.sum())
-        recorded = recording.series("angular_momentum")[k]
+        recorded = recording.records.series("angular_momentum")[k]
         turning = float(m @ (np.linalg.norm(r, axis=1) * speeds))
         yield float(np.linalg.norm(recorded - spin)) / (turning + _NOTHING), "angular momentum"

@@ -51,7 +51,7 @@ class Gaps(FrameCheck):
     def begin(self) -> None:
         self._frames: list[Snapshot] = []
         recording = self.scene.recording
-        for what, values in (("file", self.scene.file_steps), ("time", recording.times)):
+        for what, values in (("file", recording.numbers), ("time", recording.times)):
             if values is None or len(values) < 2:
                 continue
             steps = np.diff(values)

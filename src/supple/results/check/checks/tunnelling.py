@@ -77,7 +77,7 @@ class Tunnelling(FrameCheck):
     """
 
     name = "tunnelling"
-    needs = frozenset({"paths"})
+    needs = frozenset({"files"})
     unit = "pairs"
     good = "nothing passes through anything between frames"
     bad = "triangles pass through each other between frames: {worst}"

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import MUSCLE
 from supple.results.check.checks.budgets import energy_scale, moved_and_height, recorded_works
-from supple.results.check.frame_check import FrameCheck
+from supple.results.check.frame_check import At, FrameCheck
 from supple.results.check.report import CheckResult
 from supple.results.check.snapshot import Snapshot
 
@@ -81,8 +81,8 @@ class Works(FrameCheck):
             self.why_not = "works are computed from one frame to the next only"
         elif not self._parts:
             self.why_not = "; ".join(f"{name}: {why}" for name, why in [*self._open.items(), *self._left_out.items()])
-        self._implicit = (recording.solver or "").startswith("Implicit")
-        onset = re.search(r"barrier_onset=([-+.\de]+)", recording.solver or "")
+        self._implicit = (recording.records.solver or "").startswith("Implicit")
+        onset = re.search(r"barrier_onset=([-+.\de]+)", recording.records.solver or "")
         self._onset = float(onset[1]) if onset else _BARRIER_ONSET
         self._last: Snapshot | None = None
         self._forces = np.zeros_like(recording.rest_positions)
@@ -95,22 +95,21 @@ class Works(FrameCheck):
         recording = self.scene.recording
         reasons = {name: why for name, why in _NOT_RECORDED.items() if name in recording.other_loads}
         reasons |= _NEVER_RECORDED
-        physics = recording.physics
         if recording.quadratic is not None:
-            fibres = [each.rows for each in physics.active if each.kind == MUSCLE]
+            fibres = [each.rows for each in recording.moment(0).active if each.kind == MUSCLE]
             if fibres and np.isin(np.concatenate(fibres), recording.quadratic[0]).any():
                 reasons["muscles"] = "they act in quadratic tets"
         return {name: why for name, why in reasons.items() if name in self._works}
 
     def _pins_are_open(self) -> str | None:
-        recording, physics = self.scene.recording, self.scene.recording.physics
+        recording = self.scene.recording
         others = sorted(set(self._works) - _BESIDE_PINS - self._loads - {"pins"})
         rigid = np.zeros(len(recording.rest_positions), dtype=bool)
         for body in recording.bodies:
             rigid[body.vertices] = body.rigid
         if "pins" not in self._works:
             return "nothing is pinned"
-        if not all(physics.knows_law(k, body.tets) for k, body in enumerate(recording.bodies)):
+        if not all(map(recording.knows_law, range(len(recording.bodies)))):
             return "the recording does not contain the law of a body"
         if rigid[recording.pinned_vertices].any():
             return "a pinned body is rigid"
@@ -119,7 +118,7 @@ class Works(FrameCheck):
         return "welds may act on pinned vertices" if recording.welds else None
 
     def _contact_is_open(self) -> str | None:
-        if not any(field.name == "contact_force" for field in self.scene.recording.fields):
+        if not any(field.name == "contact_force" for field in self.scene.recording.records.fields):
             return "forces on vertices were not recorded (fields=['contact_force'])"
         if any(body.rigid or body.skin is not None for body in self.scene.recording.bodies):
             return "forces on rigid bodies and skins are not recorded"
@@ -128,7 +127,7 @@ class Works(FrameCheck):
     def see(self, at: Snapshot) -> None:
         last, forces = self._last, self._forces
         if self._open["contact"] is None:
-            forces = self.scene.recording[at.number].contact_force.values_of_all
+            forces = self.scene.recording.records[at.number].contact_force.values_of_all
         found = [(0.0, 0.0)] * len(self._parts)
         if last is not None:
             moved = at.positions - last.positions
@@ -189,7 +188,7 @@ class Works(FrameCheck):
 
     def _way_in_contact(self, last: Snapshot, at: Snapshot) -> NDArray[np.float64]:
         """(n,) `_way` of the bodies that something touched between the frames, zero for the others [m]."""
-        forces = getattr(self.scene.recording[at.number].report.details, "contact_forces", {})
+        forces = getattr(self.scene.recording.records[at.number].report.details, "contact_forces", {})
         way = self._way(last, at)
         for body in self.scene.recording.bodies:
             way[body.vertices] *= bool(np.any(forces.get(body.name, 0.0)))
@@ -236,7 +235,7 @@ class Works(FrameCheck):
                 work -= float(on_vertices[rows].sum())
                 left_open += float(left[rows].sum())
         if self._open["contact"] is not None:
-            details = recording[at.number].report.details
+            details = recording.records[at.number].report.details
             for sums in (getattr(details, f"{kind}_forces", {}) for kind in ("contact", "friction")):
                 for body in recording.bodies:
                     farthest = np.linalg.norm(along[body.vertices], axis=1).max()
@@ -276,7 +275,8 @@ class Works(FrameCheck):
             shares = excess / (sizes + (_CLOSED if name in self._loads else 1.0) * energies + self.scene.floors.sums)
             for number, share in zip(rows, shares, strict=True):
                 failed = not share <= self.settings.max_energy_gain
-                self.tally.see(recording[int(number)], float(share), failed, f"work of {name}" if failed else "")
+                at = At(int(number), float(recording.times[int(number)]))
+                self.tally.see(at, float(share), failed, f"work of {name}" if failed else "")
         return super().result()
 
 

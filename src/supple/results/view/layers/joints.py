@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.recording.actions import RecordedJoint
 from supple.results.view.layers.layer import Layer, single
 from supple.results.view.model import Model, Moment
+from supple.scene.joints.placed import PlacedJoint
 
 JOINT_COLOR = (225, 120, 20)
 _ARC = 32  # lines of a whole turn
@@ -70,11 +70,11 @@ def _moved(moment: Moment, side: int | None, points: NDArray[np.float64]) -> NDA
     return np.column_stack([points, np.ones(len(points))]) @ np.linalg.solve(rest, moment.finite_positions[rows])
 
 
-def _size(model: Model, joint: RecordedJoint) -> float:
+def _size(model: Model, joint: PlacedJoint) -> float:
     return float(np.ptp(model.rest_positions[model.bodies[joint.sides[0]].vertices], axis=0).max())
 
 
-def joint_lines(joint: RecordedJoint, size: float) -> Sides:
+def joint_lines(joint: PlacedJoint, size: float) -> Sides:
     """Lines (k, 2, 3) that move with the first side, and with the second, in their coordinates."""
     p, holds = joint.point, joint.conditions
     lines: dict[str, list[Any]] = {"first": [(p - _POINT * size * d, p + _POINT * size * d) for d in np.eye(3)]}

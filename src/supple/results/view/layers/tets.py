@@ -14,6 +14,7 @@ from supple.mesh.topology import TET_FACETS
 from supple.results.view.fields import NOT_KNOWN_COLOR, Field, Limits, Range, bin_of, nodal_values, palette
 from supple.results.view.layers.layer import Layer, single
 from supple.results.view.layers.section import Cut, Triangles, surface, whole
+from supple.results.view.look import drawn_as
 from supple.results.view.model import Model, Moment
 from supple.results.view.picking import first_hit
 
@@ -90,7 +91,7 @@ class TetView(Layer):
         self._field, self._explode = field, explode
         self._limits = Limits(field, ends) if field is not None else None
         self.range: tuple[float, float] | None = None
-        colors = palette(field) if field is not None else np.array([body.color for body in model.bodies])
+        colors = palette(field) if field is not None else np.array([drawn_as(body)[0] for body in model.bodies])
         self._drawn = ColoredTriangles(scene, "/bodies/tets", np.vstack([colors, [NOT_KNOWN_COLOR]]))
         self.nodes = self._drawn.handles
         self._triangles = exploded_facets(model) if explode > 0.0 else surface(model, cut)

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.app.viewer.from_snapshot import MomentBuilder
-from supple.results.recording.actions import no_stitches
-from supple.results.recording.scene import RecordedObstacle
 from supple.results.view.fields import FIELDS
 from supple.results.view.layers.connections import length_text
 from supple.results.view.layers.section import Cut, surface
@@ -122,7 +121,9 @@ def test_springs_with_length_and_pins(server, fake):
 
 def test_stitches_are_lines_from_vertices_to_the_places_that_were_nearest(server, fake):
     drawn = replace(
-        no_stitches(), nodes=np.array([[0, 30, 31, 33]], dtype=np.int32), weights=np.array([[0.2, 0.3, 0.5]])
+        fake.snapshot.description.stitches,
+        nodes=np.array([[0, 30, 31, 33]], dtype=np.int32),
+        weights=np.array([[0.2, 0.3, 0.5]]),
     )
     description = replace(fake.snapshot.description, stitches=drawn)
     stage = Stage(server, MomentBuilder().moment(fake.show(description=description)), ViewOptions())
@@ -188,13 +189,7 @@ def test_forces_are_arrows_with_a_scale(server, fake):
 
 
 def test_a_room_is_drawn_open(server, fake):
-    room = RecordedObstacle(
-        "bowl",
-        "Sphere",
-        {"center": [0.0, 0.0, 0.0], "radius": 3.0, "inside": True},
-        np.zeros((0, 3)),
-        np.zeros((0, 3), dtype=np.int32),
-    )
+    room = sp.obstacles.Sphere(radius=3.0, inside=True, name="bowl")
     Stage(
         server,
         MomentBuilder().moment(fake.show(description=replace(fake.snapshot.description, obstacles=(room,)))),

@@ -1,4 +1,4 @@
-"""A series as a recording: what the files do not contain is unknown, and the checks that need it are skipped."""
+"""A series for the checks: what the files do not contain is unknown, and the checks that need it are skipped."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError, OutputError
 from supple.materials.elastic import Elastic, FixedCorotated, NeoHookean, StableNeoHookean, StVenantKirchhoff
-from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.material import NotRecorded
+from supple.materials.per_tet import TetMaterial
 from supple.mesh.io.series.series import OtherCells, Series
 from supple.results.check.series_parts import parts_of
-from supple.results.recording.actions import no_stitches
-from supple.results.recording.details import RecordedDetails
-from supple.results.recording.physics import NOT_KNOWN, RecordedPhysics
-from supple.results.recording.scene import RecordedBody, RecordedScene
+from supple.results.check.trajectory import Moment, Part, Trajectory
 
 # As scene files call them.
 LAWS: dict[str, type[Elastic]] = {
@@ -66,32 +64,16 @@ class Given:
             raise OutputError(f"check: gravity is {self.gravity}; give three numbers")
 
 
-class SeriesFrame:
-    """One frame: positions (n, 3) in the order of the parts and why they cannot be compared, or None."""
-
-    def __init__(self, positions: NDArray[np.float64], other: str | None) -> None:
-        self.positions, self.other = positions, other
-
-
-class SeriesRecording(RecordedScene):
-    """A series of another program, for the checks.
-
-    Attributes
-    ----------
-    path : as the user gave it; times : (frames,) [s], or the numbers of frames; numbers : of files, or None
-    knows : what the checks may need of the files and of what is given, see `frame_check.UNKNOWN`
-    file_numbers : the rows in the files of vertices, tets and triangles; of a triangle between tets and outside, -1
-    notes : what was assumed, one sentence each
-    """
+class SeriesTrajectory(Trajectory):
+    """The frames of another program."""
 
     def __init__(self, series: Series, given: Given) -> None:
-        self._series, self.given, self.path = series, given, Path(series.path)
-        count = len(series)
-        first = self._first()
+        self._series = series
+        count, path = len(series), Path(series.path)
+        first = self._first(path)
         last = self._last(count)
         parts = parts_of(series.cells, first, last)
         self._points, self._twins = parts.points, parts.twins
-        self.file_numbers = {"vertex": parts.points, "tet": parts.tet_numbers, "triangle": parts.triangle_numbers}
         rest = np.ascontiguousarray(first[parts.points])
         self._apart = _APART * float(np.ptp(rest, axis=0).max())
         tets = parts.tets.astype(np.int32)
@@ -104,100 +86,80 @@ class SeriesRecording(RecordedScene):
             masses = np.ascontiguousarray(series.masses[parts.points])
         starts = np.vstack([np.zeros((1, 3), dtype=np.int64), parts.ends])
         bodies = tuple(
-            RecordedBody(
+            Part(
                 name,
-                "unknown",
                 slice(int(a[0]), int(b[0])),
                 slice(int(a[1]), int(b[1])),
                 (parts.triangles[a[2] : b[2]] - a[0]).astype(np.int32),
-                None,
             )
             for name, a, b in zip(parts.names, starts[:-1], starts[1:], strict=True)
         )
-        self.numbers = series.numbers
-        step = _step(series.times, given.dt)
-        self.times = self._times(count, step)
-        self.notes = (*series.notes, *parts.notes)
-        nothing = np.zeros(0, dtype=np.int64)
-        super().__init__(
-            supple_version="",
-            dt=step or 1.0,
-            steps=count - 1,
-            solver=None,
-            scene_text=None,
-            rest_positions=rest,
-            tets=tets,
-            quadratic=None,
-            rest_volumes=volumes,
-            masses=masses,
-            gravity=np.array(given.gravity or (0.0, 0.0, 0.0), dtype=np.float64),
-            pinned_vertices=nothing,
-            bodies=bodies,
-            obstacles=(),
-            physics=_physics(given, len(tets), len(bodies)),
-            untouching=(),
-            welds=(),
-            joints=(),
-            loads={},
-            other_loads=frozenset(),
-            cavities=(),
-            cables=(),
-            stitches=no_stitches(),
-            details=RecordedDetails(),
-            field_names=(),
-            sensors=(),
-            statuses_of_codes=(),
-        )
+        step, solid = _step(series.times, given.dt), len(tets) == np.count_nonzero(volumes > 0.0) > 0
         known = {
             "files": True,
-            "paths": True,
             "tets": len(tets) > 0,
             "times": step is not None and count > 2,
-            "masses": series.masses is not None
-            or (given.density is not None and len(tets) == np.count_nonzero(volumes > 0.0) > 0),
+            "masses": series.masses is not None or (given.density is not None and solid),
             "material": given.youngs is not None and given.poisson is not None,
             "gravity": given.gravity is not None,
             "free": given.free,
         }
-        self.knows = frozenset(name for name, known_ in known.items() if known_)
-        self._kept: dict[int, SeriesFrame] = {}
+        super().__init__(
+            path=path,
+            knows=frozenset(name for name, is_known in known.items() if is_known),
+            times=self._times(count, step),
+            dt=step or 1.0,
+            gravity=np.array(given.gravity or (0.0, 0.0, 0.0), dtype=np.float64),
+            bodies=bodies,
+            rest_positions=rest,
+            masses=masses,
+            tets=tets,
+            rest_volumes=volumes,
+            material=_material(given, len(tets)),
+            compliances=(None,) * len(bodies),
+            file_numbers={"vertex": parts.points, "tet": parts.tet_numbers, "triangle": parts.triangle_numbers},
+            numbers=series.numbers,
+            notes=(*series.notes, *parts.notes),
+        )
+        self._kept: dict[int, tuple[NDArray[np.float64], str | None]] = {}
 
-    def __len__(self) -> int:
-        return len(self._series)
+    def moment(self, number: int) -> Moment:
+        positions, other = self._frame(number)
+        return Moment(number, float(self.times[number]), positions, self._velocities(number), other=other)
 
-    def frame(self, number: int) -> SeriesFrame:
-        """A frame; the last few are kept."""
+    def _frame(self, number: int) -> tuple[NDArray[np.float64], str | None]:
+        """Positions (n, 3) in the order of the parts, and why they cannot be compared; the last few are kept."""
         if number not in self._kept:
             while len(self._kept) >= 4:
                 del self._kept[next(iter(self._kept))]
             self._kept[number] = self._read(number)
         return self._kept[number]
 
-    def velocities(self, number: int) -> NDArray[np.float64]:
+    def _velocities(self, number: int) -> NDArray[np.float64]:
         """(n, 3) [m/s] by differences of second order between frames; NaN where a frame of these cannot be compared."""
         last = len(self) - 1
         if "times" not in self.knows:
             return np.zeros_like(self.rest_positions)
-        a, b, c = (self.frame(min(max(number, 1), last - 1) + k).positions for k in (-1, 0, 1))
+        a, b, c = (self._frame(min(max(number, 1), last - 1) + k)[0] for k in (-1, 0, 1))
         if number == 0:
             return (4.0 * b - 3.0 * a - c) / (2.0 * self.dt)
         if number == last:
             return (a + 3.0 * c - 4.0 * b) / (2.0 * self.dt)
         return (c - a) / (2.0 * self.dt)
 
-    def _read(self, number: int) -> SeriesFrame:
+    def _read(self, number: int) -> tuple[NDArray[np.float64], str | None]:
         try:
             x = self._series.positions(number)
         except OtherCells as other:
-            return SeriesFrame(np.full_like(self.rest_positions, np.nan), str(other))
+            return np.full_like(self.rest_positions, np.nan), str(other)
         apart = np.abs(x[self._twins[:, 0]] - x[self._twins[:, 1]]).max(axis=1) if len(self._twins) else np.zeros(0)
         other = None
         if (apart > self._apart).any():
             one, two = self._twins[int(np.argmax(apart))]
             other = f"points {one} and {two} had the same place and separate by {apart.max():.3g}"
-        return SeriesFrame(np.ascontiguousarray(x[self._points]), other)
+        return np.ascontiguousarray(x[self._points]), other
 
-    def _first(self) -> NDArray[np.float64]:
+    def _first(self, path: Path) -> NDArray[np.float64]:
         """The positions of the first frame with finite numbers: the reference of shapes."""
         for number in range(min(len(self._series), 1000)):
             try:
@@ -206,7 +168,7 @@ class SeriesRecording(RecordedScene):
                 continue
             if np.isfinite(x).all():
                 return x
-        raise MeshError(f"{self.path}: no frame has finite positions only")
+        raise MeshError(f"{path}: no frame has finite positions only")
 
     def _last(self, count: int) -> NDArray[np.float64] | None:
         try:
@@ -218,7 +180,7 @@ class SeriesRecording(RecordedScene):
     def _times(self, count: int, step: float | None) -> NDArray[np.float64]:
         if self._series.times is not None:
             return np.asarray(self._series.times, dtype=np.float64)
-        numbers = np.arange(count) if self.numbers is None else self.numbers - self.numbers[0]
+        numbers = np.arange(count) if self._series.numbers is None else self._series.numbers - self._series.numbers[0]
         return np.asarray(numbers, dtype=np.float64) * (step or 1.0)
 
 
@@ -230,24 +192,7 @@ def _step(times: NDArray[np.float64] | None, given: float | None) -> float | Non
     return step if np.isfinite(step) and step > 0.0 else None
 
 
-def _physics(given: Given, tets: int, bodies: int) -> RecordedPhysics:
-    kind, mu, lam = np.full(tets, NOT_KNOWN, dtype=np.uint8), np.zeros(tets), np.zeros(tets)
-    if given.youngs is not None and given.poisson is not None:
-        law = LAWS[given.law](youngs=given.youngs, poisson=given.poisson, density=given.density or 1.0)
-        rows = law.per_tet(tets)
-        kind[:], mu, lam = rows.kind, rows.mu, rows.lam
-    return RecordedPhysics(
-        kind=kind,
-        mu=mu,
-        lam=lam,
-        materials=tuple(law.__name__ for law in ELASTIC_MATERIALS),
-        recorded_laws=(),
-        internal=0,
-        active=(),
-        compliances=(None,) * bodies,
-        forces=0,
-        soft_targets=0,
-        scripted_pins=0,
-        held_joints=0,
-        motors=0,
-    )
+def _material(given: Given, tets: int) -> TetMaterial:
+    if given.youngs is None or given.poisson is None:
+        return NotRecorded(name="unknown").per_tet(tets)
+    return LAWS[given.law](youngs=given.youngs, poisson=given.poisson, density=given.density or 1.0).per_tet(tets)

@@ -2,7 +2,10 @@
 
 Known are None, truth values, numbers, texts, sets of texts, tuples, lists, slices, mappings from texts, NumPy's arrays
 and scalars, and dataclasses and named tuples of these that are given as `classes`. An array is known by its path, such
-as "bodies/0/triangles". Nothing that is read is executed.
+as "bodies/0/triangles"; a short one can be among the JSON. Nothing that is read is executed.
+
+What a user describes (`supple.kinds.kind`, bodies, scenes, meshes) is written as the arguments that make it, and read
+by its constructor, which checks all of it. A function is written as a number; its values are elsewhere.
 
 `check` compares a value with the types, shapes and ranges of indices that the annotations of its class declare:
 
@@ -16,7 +19,7 @@ from __future__ import annotations
 
 import re
 from collections import ChainMap
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -25,6 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
+from supple.kinds.described import Described
+from supple.kinds.kind import Kind
 
 _DTYPE = re.compile(r"[<>|][biuf]\d{1,2}")
 _DEEPEST = 50
@@ -35,8 +40,29 @@ Classes = Mapping[str, type]
 Arrays = Mapping[str, NDArray[Any]]
 
 
-def encoded(value: Any, classes: Classes) -> tuple[Any, dict[str, NDArray[Any]]]:
+def kinds_by_name() -> dict[str, type]:
+    """All kinds that are defined so far, also those of a user; of two with one name, the first."""
+    found: dict[str, type] = {}
+    for kind in _below(Kind):
+        found.setdefault(kind.__name__, kind)
+    return found
+
+
+def _below(kind: type) -> Iterator[type]:
+    for one in kind.__subclasses__():
+        yield one
+        yield from _below(one)
+
+
+def encoded(
+    value: Any, classes: Classes, functions: list[Callable[..., Any]] | None = None, inline: int = 0
+) -> tuple[Any, dict[str, NDArray[Any]]]:
     """A tree that JSON can hold, and the arrays that it refers to, by their path.
+
+    Parameters
+    ----------
+    functions : gets the functions of the value, each once; where it is not given, there may be none
+    inline : the largest number of entries of an array that is in the tree
 
     Raises
     ------
@@ -51,6 +77,8 @@ def encoded(value: Any, classes: Classes) -> tuple[Any, dict[str, NDArray[Any]]]
         if item is None or (isinstance(item, (bool, int, float, str)) and type(item).__module__ == "builtins"):
             return item
         if isinstance(item, np.ndarray | np.generic) and item.dtype.kind in "biuf":
+            if item.size <= inline:
+                return {"numbers": [item.dtype.str, list(item.shape), np.ravel(item).tolist()]}
             arrays[path] = np.asarray(item)
             return {"array" if isinstance(item, np.ndarray) else "scalar": path}
         if isinstance(item, frozenset) and all(isinstance(part, str) for part in item):
@@ -62,20 +90,32 @@ def encoded(value: Any, classes: Classes) -> tuple[Any, dict[str, NDArray[Any]]]
         if isinstance(item, Mapping) and all(isinstance(key, str) for key in item):
             # By number: a key may contain any character, and two paths must differ.
             return {"mapping": {key: tree_of(part, inside(k)) for k, (key, part) in enumerate(item.items())}}
+        item = item.recorded() if hasattr(item, "recorded") else item
         if classes.get(type(item).__name__) is type(item):
-            made_of = {name: tree_of(getattr(item, name), inside(name)) for name in field_names(type(item))}
-            return {"class": type(item).__name__, "fields": made_of}
+            own = arguments(type(item))
+            tree = {
+                "class": type(item).__name__,
+                "fields": {key: tree_of(getattr(item, own[key]), inside(key)) for key in own},
+            }
+            other = getattr(item, "otherwise", None)
+            return tree if other is None else tree | {"otherwise": tree_of(other, inside("otherwise"))}
+        if functions is not None and callable(item):
+            known = next((k for k, function in enumerate(functions) if function is item), len(functions))
+            if known == len(functions):
+                functions.append(item)
+            return {"function": known}
         raise OutputError(f"a {type(item).__name__} cannot be written to a file; register its class with its codec")
 
     return tree_of(value, ""), arrays
 
 
-def decoded(tree: Any, arrays: Arrays, classes: Classes) -> Any:
-    """The value that `encoded` was given. Arrays are those given, not copies.
+def decoded(tree: Any, arrays: Arrays, classes: Classes, function: Callable[[int], Any] | None = None) -> Any:
+    """The value that `encoded` was given. Arrays are those given, not copies; `function` gives that of a number.
 
     Raises
     ------
     ValueError, TypeError, KeyError : where the tree is not one that `encoded` returns for these classes.
+    SuppleError : of the constructors.
     """
 
     def value_of(item: Any, depth: int) -> Any:
@@ -85,16 +125,22 @@ def decoded(tree: Any, arrays: Arrays, classes: Classes) -> Any:
             return item
         if not isinstance(item, dict):
             raise ValueError("it holds a value of an unknown kind")
-        if item.keys() == {"class", "fields"}:
-            return _instance(
-                classes[item["class"]], {key: value_of(part, depth + 1) for key, part in item["fields"].items()}
-            )
+        if item.keys() >= {"class", "fields"}:
+            name = item["class"]
+            if name not in classes and "otherwise" in item:
+                return value_of(item["otherwise"], depth + 1)
+            if name not in classes:
+                raise ValueError(f"the class {str(name)[:100]!r} is not known here; import the module that defines it")
+            return _instance(classes[name], {key: value_of(part, depth + 1) for key, part in item["fields"].items()})
         ((kind, content),) = item.items()
         match kind:
             case "array":
                 return arrays[content]
             case "scalar":
                 return arrays[content][()]
+            case "numbers":
+                dtype, shape, values = content
+                return np.array(values, dtype=_dtype(dtype)).reshape(shape)
             case "frozenset":
                 return frozenset(str(part) for part in content)
             case "slice":
@@ -106,9 +152,18 @@ def decoded(tree: Any, arrays: Arrays, classes: Classes) -> Any:
                 return [value_of(part, depth + 1) for part in content]
             case "mapping":
                 return {key: value_of(part, depth + 1) for key, part in content.items()}
+            case "function" if function is not None:
+                return function(int(content))
         raise ValueError(f"kind {kind!r} does not exist")
 
     return value_of(tree, 0)
+
+
+def arguments(made: type) -> dict[str, str]:
+    """The arguments that make an instance, and the names of its fields that have them."""
+    if isinstance(made, Described):
+        return {field.name: field.name for field in fields(made) if field.init}
+    return getattr(made, "_arguments", None) or {name: name for name in field_names(made)}
 
 
 def field_names(made: type) -> tuple[str, ...]:
@@ -118,8 +173,10 @@ def field_names(made: type) -> tuple[str, ...]:
 
 def _instance(made: type, given: dict[str, Any]) -> Any:
     """A dataclass or named tuple with these fields; all must be given, and none beside them."""
-    if set(field_names(made)) != given.keys():
+    if arguments(made).keys() != given.keys():
         raise ValueError(f"{made.__name__} has other fields in this version")
+    if isinstance(made, Described) or hasattr(made, "_arguments"):
+        return made(**given)
     later = [field.name for field in fields(made) if not field.init] if is_dataclass(made) else []
     instance = made(**{key: value for key, value in given.items() if key not in later})
     for key in later:
@@ -141,11 +198,9 @@ def restored(description: Any, data: memoryview) -> dict[str, NDArray[Any]]:
     """
     arrays, place = {}, 0
     for path, (dtype, shape) in description.items():
-        if not isinstance(dtype, str) or _DTYPE.fullmatch(dtype) is None:
-            raise ValueError(f"an array is of type {dtype!r}")
+        kind, count = _dtype(dtype), 1
         if not all(isinstance(length, int) and 0 <= length < 1 << 40 for length in shape):
             raise ValueError(f"an array has the shape {shape!r}")
-        kind, count = np.dtype(dtype), 1
         for length in shape:
             count *= length
         end = place + count * kind.itemsize
@@ -156,6 +211,12 @@ def restored(description: Any, data: memoryview) -> dict[str, NDArray[Any]]:
     if place != len(data):
         raise ValueError("bytes remain after its arrays")
     return arrays
+
+
+def _dtype(text: Any) -> np.dtype[Any]:
+    if not isinstance(text, str) or _DTYPE.fullmatch(text) is None:
+        raise ValueError(f"an array is of type {text!r}")
+    return np.dtype(text)
 
 
 Sizes = dict[str, int]
@@ -222,6 +283,8 @@ def check(value: Any, hint: Any, sizes: Known, where: str) -> None:
         isinstance(value, bool) and hint in (int, float)
     ):
         raise ValueError(f"{where} is {str(value)[:40]!r}, not of the type {getattr(hint, '__name__', hint)}")
+    elif isinstance(hint, Described):
+        return  # its constructor has checked it
     elif is_dataclass(hint) or hasattr(hint, "_fields"):
         own = Known({}, getattr(value, "sizes", {}), *sizes.maps[1:])
         hints = get_type_hints(hint, include_extras=True)
