@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from supple.results.recording.actions import recorded_stitches
 
 import supple as sp
 from supple.model.stitched_points import stitched_state, with_stitched_points
 from supple.model.system import build_system, initial_state
+from supple.scene.stitches.measures import StitchEnds
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.stitches import StitchEnergy
 from supple.solvers.implicit.newton.reduction import Reduction
@@ -166,7 +166,8 @@ def test_recordings_have_the_points_on_rigid_bodies(tmp_path, solver):
     with sp.read_recording(path) as recording:
         kept = recording[-1]
         segments = recording.stitches.segments(kept.state.positions, kept.obstacle_poses)
-        live = recorded_stitches(frame.system).segments(frame.state.positions, kept.obstacle_poses)
+        whole = frame.system.scene
+        live = StitchEnds.of(whole.stitching, whole.bodies).segments(frame.state.positions, kept.obstacle_poses)
     np.testing.assert_allclose(segments, live, atol=1e-15)
     tips = frame.positions["bar"][np.isclose(BAR.vertices[:, 0], 0.2)]
     np.testing.assert_allclose(segments[:9, 0], tips, atol=1e-15)

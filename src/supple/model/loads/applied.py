@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,30 +39,6 @@ class Setting:
         return sum(len(body.mesh.tets) for body in self.bodies[: [body.name for body in self.bodies].index(name)])
 
 
-@dataclass(frozen=True, eq=False)
-class LoadPattern:
-    """How the forces of a load follow from one value at a time, its `AppliedLoad.value`.
-
-    Attributes
-    ----------
-    kind : "vector", a force w_i f on each vertex, with the value f (3,); "pressure", a third of -p A on each corner of
-        a triangle of area vector A, with the value p; "spring", the forces of k / 2 (l - l0)^2,
-        l = |sum w_i x_i + offset|, with the value l0; "drag", c / 3 (w - v_i) on each corner of a triangle, with the
-        value w (3,), see `supple.model.loads.pressure`
-    work : as of `AppliedLoad`
-    vertices : (v,), or (t, 3) triangles of a pressure or a drag
-    weights : (v,) w; of no meaning for triangles
-    offset : (3,) [m]; stiffness : k [N/m]; of a drag, density times coefficient [kg/m^3]
-    """
-
-    kind: Literal["vector", "pressure", "spring", "drag"]
-    work: str
-    vertices: NDArray[np.int32]
-    weights: NDArray[np.float64]
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    stiffness: float = 0.0
-
-
 class AppliedLoad(ABC):
     """A load, with the numbers of the vertices that it acts on.
 
@@ -75,13 +51,8 @@ class AppliedLoad(ABC):
     is_internal: ClassVar[bool] = False
     work: str
 
-    @property
-    def pattern(self) -> LoadPattern | None:
-        """None where the forces do not follow from one value."""
-        return None
-
     def value(self, time: float) -> NDArray[np.float64] | None:
-        """That of the pattern at `time` [s]; None without a pattern."""
+        """The vector or number that the forces follow from at `time` [s]; None where they follow from more."""
         return None
 
     @abstractmethod
@@ -117,9 +88,8 @@ class DeadLoad(AppliedLoad):
 
 @dataclass(frozen=True, eq=False)
 class UniformLoad(DeadLoad):
-    """One vector times `weights` (k,); `vector` : time -> (3,)."""
+    """One vector times the weight of each vertex; `vector` : time -> (3,)."""
 
-    weights: NDArray[np.float64]
     vector: Callable[[float], NDArray[np.float64]]
 
     @classmethod
@@ -130,11 +100,7 @@ class UniformLoad(DeadLoad):
         vector: Callable[[float], NDArray[np.float64]],
         work: str,
     ) -> UniformLoad:
-        return cls(vertices, lambda time: weights[:, None] * vector(time), work, weights, vector)
-
-    @property
-    def pattern(self) -> LoadPattern:
-        return LoadPattern("vector", self.work, self.vertices, self.weights)
+        return cls(vertices, lambda time: weights[:, None] * vector(time), work, vector)
 
     def value(self, time: float) -> NDArray[np.float64]:
         return self.vector(time)
@@ -149,10 +115,6 @@ class MassLoad(AppliedLoad):
     masses: NDArray[np.float64]
 
     work = "body_forces"
-
-    @property
-    def pattern(self) -> LoadPattern | None:
-        return LoadPattern("vector", self.work, self.vertices, self.masses) if self.load.is_uniform else None
 
     def value(self, time: float) -> NDArray[np.float64] | None:
         return self.load.at(np.zeros((1, 3)), time)[0] if self.load.is_uniform else None

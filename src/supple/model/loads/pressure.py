@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.loads.applied import AppliedLoad, DragLoad, LoadPattern, Setting
+from supple.model.loads.applied import AppliedLoad, DragLoad, Setting
 from supple.scene.loads.over_time import script_of
 from supple.scene.loads.surface_loads import Wind
 
@@ -31,10 +31,6 @@ class FollowerPressure(AppliedLoad):
     pressure: Callable[[float], float]
 
     work = "pressures"
-
-    @property
-    def pattern(self) -> LoadPattern:
-        return LoadPattern("pressure", self.work, self.triangles, np.ones(len(self.triangles)))
 
     def value(self, time: float) -> NDArray[np.float64]:
         return np.asarray(self.pressure(time))
@@ -126,10 +122,6 @@ class WindDrag(DragLoad):
     factor: float
 
     work = "wind"
-
-    @property
-    def pattern(self) -> LoadPattern:
-        return LoadPattern("drag", self.work, self.triangles, np.ones(len(self.triangles)), stiffness=self.factor)
 
     def value(self, time: float) -> NDArray[np.float64]:
         return self.velocity(time)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.loads.applied import AppliedLoad, LoadPattern
+from supple.model.loads.applied import AppliedLoad
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +29,6 @@ class PointSpring(AppliedLoad):
     rest_length: Callable[[float], float]
 
     work = "springs"
-
-    @property
-    def pattern(self) -> LoadPattern:
-        x, y, z = self.offset.tolist()
-        return LoadPattern("spring", self.work, self.vertices, self.coefficients, (x, y, z), self.stiffness)
 
     def value(self, time: float) -> NDArray[np.float64]:
         return np.asarray(self.rest_length(time))

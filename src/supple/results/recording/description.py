@@ -6,6 +6,7 @@ It is written by the codec of kinds: a tree of JSON, and beside it an array for 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +32,8 @@ from supple.scene.scene import Scene
 FORMAT_VERSION = 7
 _GROUP, _HEADER = "supple", "supple/header"
 _INLINE = 16  # entries of arrays that are in the tree: vectors and matrices
+# What is no part of a scene, such as solvers and studies.
+_OF_PROGRAM = re.compile(r"supple\.(?!scene|materials)")
 VTK_TETRA, VTK_QUADRATIC_TETRA = 10, 24
 
 
@@ -52,7 +55,8 @@ class Description:
 
 def _classes() -> dict[str, type]:
     own = Scene, TetMesh, SurfaceMesh, Formula, Description, RecordedDetails, RecordedField, Regions
-    return kinds_by_name() | {kind.__name__: kind for kind in (*MATERIALS, *own)}
+    described = {name: kind for name, kind in kinds_by_name().items() if not _OF_PROGRAM.match(kind.__module__)}
+    return described | {kind.__name__: kind for kind in (*MATERIALS, *own)}
 
 
 def functions_of(scene: Scene) -> list[Callable[..., Any]]:
