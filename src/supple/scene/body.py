@@ -202,8 +202,8 @@ class Body(PlacedBody):
 
     @cached_property
     def touching(self) -> tuple[EmbeddedPoints, NDArray[np.int32]]:
-        skin = self.attached_skin
-        if self.collide == "tets" or skin is None:
+        skin = self.attached_skin if self.touches_with_skin else None
+        if skin is None:
             return super().touching
         return EmbeddedPoints.in_rows(skin.corners, skin.weights), skin.triangles
 

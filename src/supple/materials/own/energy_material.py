@@ -130,7 +130,8 @@ class EnergyMaterial(ByLaw):
         columns = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for _, value in self.law_parameters()))
         rows = np.column_stack([np.ravel(column) for column in columns])
         if isinstance(self.psi, Formula):
-            return self._measured_moduli(rows) if columns[0].ndim else tuple(self._measured_moduli(rows)[:, 0])
+            mu, bulk = self._measured_moduli(rows)
+            return (mu, bulk) if columns[0].ndim else (mu[0], bulk[0])
         expression: Any = self._expression  # pyright: ignore[reportAttributeAccessIssue]
         try:
             mu, bulk = moduli_at_rest(expression, self.of, self._names, rows[:, 1:]).T

@@ -123,7 +123,8 @@ def _pinned(scene: Scene, starts: Starts) -> NDArray[np.int64]:
     found = [np.zeros(0, dtype=np.int64)]
     for pin in scene.pins:
         body = scene.body(pin.body)
-        found.append(pin.select(body.place(body.mesh.vertices)) + starts[pin.body][0])
+        rows = pin.select(body.place(body.mesh.vertices)).astype(np.int64)
+        found.append(rows + starts[pin.body][0])
     return np.concatenate(found)
 
 
@@ -253,7 +254,7 @@ def _vector(work: str, body: PlacedBody, shares: Floats, starts: Starts) -> Load
     """A force with shares (k,) at the points of a body, as one on its vertices."""
     points = body.embedded
     spread = np.repeat(shares, np.diff(points.start)) * points.weights
-    weights = np.bincount(points.vertices, spread, len(body.mesh.vertices))
+    weights = np.bincount(points.vertices, spread, len(body.mesh.vertices)).astype(np.float64)
     return LoadPattern("vector", work, np.arange(len(weights)) + starts[body.name][0], weights)
 
 

@@ -18,17 +18,14 @@ class Recording(RecordedContents, Showable, Sequence[RecordedFrame]):
     Attributes
     ----------
     path : of the file; times : (frames,) [s]
-    bodies, obstacles, stitches : of the scene
-    rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
-    quadratic : rows (k,) and nodes (k, 10) of the quadratic tets, whose corners `tets` has; None without such
-    gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
-    physics : the bodies' laws and what acts on them
+    scene : as it was described; its functions of time have the values of the frames, and are linear in between
+    system : the scene as flat arrays, of which `rest_positions` (n, 3) [m], `masses` (n,) [kg], `tets` (m, 4) and
+        `rest_volumes` (m,) [m^3] are some; triangles : (t, 3) boundaries of all bodies
+    bodies : with their rows of these arrays; obstacles : of the scene; gravity : (3,) [m/s^2]
+    stitches, joints : of the scene, with their places
+    dt : time from frame to frame [s]
     details : which fields of the solver's details are kept; fields : of tets and vertices that were recorded
-    sensors : of the scene
-    untouching : pairs that may pass through each other: numbers of bodies, then obstacles
-    welds : vertices of soft bodies that are points of rigid ones; joints : of the scene
-    loads : those whose forces follow from one value, by its name in the details; other_loads : names of works of others
-    cavities, cables : of the scene
+    sensors : of the scene, then obstacles and pins
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 

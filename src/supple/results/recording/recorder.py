@@ -283,8 +283,9 @@ class Recorder:
         values = values_at(self._functions, frame.time)
         for number, series in function_series(self._at_start).items():
             value = values[number]
-            same = value is not None and value.shape == series.row_shape
-            file.put(series.path, value if same else np.full(series.row_shape, np.nan))
+            if value is None or value.shape != series.row_shape:
+                value = np.full(series.row_shape, np.nan)
+            file.put(series.path, value)
         readings = frame.sensors
         for sensor in recorded_sensors(frame.system.scene):
             file.put(sensor.series.path, readings[sensor.name].numbers())

@@ -333,7 +333,7 @@ def _recording(file: Path) -> None:
             ("scene file", "inside" if recording.scene_text else "none"),
             ("written by", f"supple {recording.supple_version}"),
         ]
-        if recording.stitches.names.breakable:
+        if recording.scene.stitching.names.breakable:
             broken = len(recording.broken_stitches(len(recording) - 1))
             rows.append(("stitches", f"{broken} of {len(recording.stitches)} pairs have broken at the end"))
         problems = [*(["a tetrahedron is inverted or flat (J <= 0)"] if J.min() <= 0.0 else [])]
