@@ -24,6 +24,7 @@ from supple.mesh.primitives.shape import SHAPES, shape
 from supple.model.joints.functions import FORMS, Form, Values
 from supple.model.loads.applied import AppliedLoad, Setting, UniformLoad
 from supple.model.loads.build import applied
+from supple.results.check.checks.joints import FORMS as JOINT_FORMS
 from supple.results.export.exporter import FORMATS, Format
 from supple.results.readings.reading import READINGS, Reading
 from supple.results.readings.sensor_readings import reading_of
@@ -357,6 +358,25 @@ def test_a_tether_holds(run):
     assert frames[5].report.joints["rope"].coordinate == pytest.approx(fallen[5], abs=1e-9)
     pull = frames[-1].report.joints["rope"].force
     assert pull[1] == pytest.approx(9.81, rel=0.05)
+
+
+def test_recordings_have_them_and_the_check_passes(run):
+    _, frames, path = run
+    with sp.read_recording(path) as recording:
+        scene, system = recording.scene, frames[-1].system
+        assert [type(one) for one in scene.joints] == [Tether]
+        assert (scene.joints[0].length, scene.loads[0].force[1], scene.sensors[0].above) == (0.1, 20.0, 2.0)
+        assert type(scene.bodies[0].material) is type(system.scene.bodies[0].material)
+        assert recording[-1].sensors["altitude"].height == frames[-1].sensors["altitude"].height
+        np.testing.assert_array_equal(recording[-1].von_mises["crate"], frames[-1].von_mises["crate"])
+    report = sp.check_recording(path)
+    assert {result.name for result in report.failures} <= {"status"}, str(report)
+    assert report["joints"].message == "what a joint holds is not known here: distance"
+    JOINT_FORMS["distance"] = lambda vectors, R: float(np.linalg.norm(vectors[0]))
+    try:
+        assert sp.check_recording(path)["joints"].verdict == "pass"
+    finally:
+        del JOINT_FORMS["distance"]
 
 
 def test_info_lists_them(run, capsys):

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from supple.app.viewer.protocol.snapshots import BodyDescription, SceneDescription, Snapshot
+from supple.app.viewer.protocol.snapshots import SceneDescription, Snapshot
 from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.model import Model, Moment
-from supple.scene.obstacles.obstacle import Obstacle
 
 
 class MomentBuilder:

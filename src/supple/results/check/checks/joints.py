@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,9 @@ class Joints(FrameCheck):
         recording = self.scene.recording
         if not recording.joints:
             self.why_not = "the scene has no joint"
+        forms = {one.form for joint in recording.joints for one in joint.conditions.functions}
+        if forms - FORMS.keys():
+            self.why_not = f"what a joint holds is not known here: {', '.join(sorted(forms - FORMS.keys()))}"
         of_solver = _IMPLICIT if (recording.records.solver or "").startswith("Implicit") else _OTHERS
         given = self.settings.max_joint_error
         self._most = of_solver if given is None else given
@@ -116,29 +120,13 @@ class _Frame:
         errors += [float(np.linalg.norm(first[k] - second[k])) for k in holds.parallel]
         coordinate = 0.0
         for one in holds.functions:
-            value = self._value(one, [vectors[name] for name in one.vectors], second @ first.T, near)
+            value = FORMS[one.form]([vectors[name] for name in one.vectors], second @ first.T)
+            value = _near(value, one, near) if one.form == "angle" else value
             unit, (low, high) = self.size if one.is_length else 1.0, one.limits
             errors.append(abs(value) / unit if one.vanishes else max(low - value, value - high, 0.0) / unit)
             coordinate = value if one is holds.coordinate else coordinate
         strain = max(float(np.linalg.norm(side.T @ side - np.eye(3))) for side in (F, G))
         return max(errors), coordinate, strain
-
-    @staticmethod
-    def _value(one: Function, vectors: list[NDArray[np.float64]], R: NDArray[np.float64], near: float | None) -> float:
-        """The value of a function; R : (3, 3) the rotation of the first side against the second, in the axes."""
-        if one.form == "twist":
-            about, _, _, w = Rotation.from_matrix(R).as_quat()
-            twist = 2.0 * np.arctan2(about, w)
-            return float(twist - _TURN * np.round(twist / _TURN))
-        a, b, *more = vectors
-        if one.form == "product":
-            return float(a @ b)
-        if one.form == "cosine":
-            return float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
-        angle = float(np.arctan2(a @ more[0], a @ b))
-        ends = [end for end in one.limits if np.isfinite(end)]
-        middle = sum(ends) / len(ends) if near is None and ends else near or 0.0
-        return angle + _TURN * round((middle - angle) / _TURN)
 
     def _side(self, at: Snapshot, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The linear part (3, 3) of the motion of a side from its own coordinates, and where the joint's point is."""
@@ -152,6 +140,29 @@ class _Frame:
         rest = self.scene.recording.rest_positions[rows]
         affine = np.linalg.solve(np.column_stack([rest, np.ones(4)]), at.positions[rows]).astype(np.float64)
         return affine[:3].T, self.points[k] @ affine[:3] + affine[3]
+
+
+def _near(angle: float, one: Function, near: float | None) -> float:
+    """The angle over all turns that is nearest to `near`, or to the middle of the limits."""
+    ends = [end for end in one.limits if np.isfinite(end)]
+    middle = sum(ends) / len(ends) if near is None and ends else near or 0.0
+    return angle + _TURN * round((middle - angle) / _TURN)
+
+
+def _twist(R: NDArray[np.float64]) -> float:
+    about, _, _, w = Rotation.from_matrix(R).as_quat()
+    twist = 2.0 * np.arctan2(about, w)
+    return float(twist - _TURN * np.round(twist / _TURN))
+
+
+Vectors = list[NDArray[np.float64]]
+# The values of functions, by their form; R : (3, 3) the rotation of the first side against the second, in the axes.
+FORMS: dict[str, Callable[[Vectors, NDArray[np.float64]], float]] = {
+    "product": lambda v, R: float(v[0] @ v[1]),
+    "cosine": lambda v, R: float(np.arccos(np.clip(v[0] @ v[1], -1.0, 1.0))),
+    "angle": lambda v, R: float(np.arctan2(v[0] @ v[2], v[0] @ v[1])),
+    "twist": lambda v, R: _twist(R),
+}
 
 
 class Welds(FrameCheck):
