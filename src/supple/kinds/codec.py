@@ -22,7 +22,7 @@ from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,7 @@ def encoded(
         if isinstance(item, Mapping) and all(isinstance(key, str) for key in item):
             # By number: a key may contain any character, and two paths must differ.
             return {"mapping": {key: tree_of(part, inside(k)) for k, (key, part) in enumerate(item.items())}}
-        item = item.recorded() if hasattr(item, "recorded") else item
+        item = getattr(item, "recorded", lambda item=item: item)()
         if classes.get(type(item).__name__) is type(item):
             own = arguments(type(item))
             tree = {
@@ -162,7 +162,7 @@ def decoded(tree: Any, arrays: Arrays, classes: Classes, function: Callable[[int
 def arguments(made: type) -> dict[str, str]:
     """The arguments that make an instance, and the names of its fields that have them."""
     if isinstance(made, Described):
-        return {field.name: field.name for field in fields(made) if field.init}
+        return {field.name: field.name for field in fields(cast("Any", made)) if field.init}
     return getattr(made, "_arguments", None) or {name: name for name in field_names(made)}
 
 
