@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from supple.results.check.series_recording import Given
 
 import supple as sp
 from benchmarks.measuring import PEERS_PYTHON, peers_installed, run_json
 from benchmarks.published import publish
 from benchmarks.table import Table
 from supple.results.check.checker import check_series
+from supple.results.check.series import Given
 
 PEERS = Path(__file__).parent / "peers"
 sys.path.insert(0, str(PEERS))
