@@ -40,9 +40,9 @@ def test_edges_and_corners_of_a_box_stay(rotation: tuple[float, float, float]) -
 
 def test_tets_of_a_surface_that_is_too_fine(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO):
-        mesh = tetrahedralize(BALL, tets=800, decimate=133)
-    assert len(mesh.tets) == pytest.approx(800, rel=0.1)
-    assert f"decimated the surface: {len(BALL.triangles)} -> 132 triangles, volume" in caplog.text
+        mesh = tetrahedralize(BALL, tets=200)
+    assert len(mesh.tets) == pytest.approx(200, rel=0.25)
+    assert f"decimated the surface: {len(BALL.triangles)} -> 1000 triangles, volume" in caplog.text
 
 
 def test_triangles_that_shall_stay_give_more_tets_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from supple.errors import MeshingError
-from supple.mesh.meshing import repair
+from supple.mesh.meshing import facing
 from supple.mesh.meshing.repair import repair_surface
 from supple.mesh.meshing.tetrahedralize import tetrahedralize, tetrahedralize_reported
 from supple.mesh.primitives.surfaces import sphere_surface
@@ -75,7 +75,7 @@ def test_a_one_sided_surface_cannot_be_oriented() -> None:
     vertices = np.concatenate([middle + across, middle - across])
     quads = [(k, k + 1, n + k + 1, n + k) for k in range(n - 1)] + [(n - 1, n, 0, 2 * n - 1)]
     triangles = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], dtype=np.int32)
-    assert repair._disagreeing(triangles, len(vertices)) is None
+    assert facing._disagreeing(triangles, len(vertices)) is None
 
 
 @needs_meshfix

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from supple.errors import MeshingError
-from supple.mesh.meshing import mesher_worker, meshers, tetrahedralize
+from supple.mesh.meshing import filling, mesher_worker, meshers
 from supple.mesh.meshing.child_process import Limits, MesherFailure
 from supple.mesh.meshing.meshers import mesh_with_tetgen
 from supple.mesh.meshing.tetrahedralize import tetrahedralize as fill
@@ -140,7 +140,7 @@ def test_surfaces_with_faults_are_errors_with_place_and_remedy(case: str) -> Non
 
 
 def test_the_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tetrahedralize, "ftetwild_installed", lambda: False)
+    monkeypatch.setattr(filling, "ftetwild_installed", lambda: False)
     with pytest.raises(MeshingError, match=r'pip install "supple\[dirty\]"'):
         fill(SPHERE, mesher="ftetwild")
 
@@ -159,7 +159,7 @@ def test_surfaces_with_faults_are_filled(mesher, caplog: pytest.LogCaptureFixtur
         pytest.importorskip("pytetwild")
     ball = sphere_surface(radius=0.5, edge_length=0.35)
     surface = joined(ball, moved(ball, 0.5, 0.01, 0.02))
-    mesh, report = tetrahedralize_reported(surface, max_volume=0.02, envelope=0.05, mesher=mesher)
+    mesh, report = tetrahedralize_reported(surface, max_volume=0.02, mesher=mesher)
     assert report.mesher == ("stuffing" if mesher == "auto" else "ftetwild")
     assert ("filling it with a lattice, which rounds sharp edges" in caplog.text) == (mesher == "auto")
     assert (mesh.volumes > 0).all()
@@ -186,7 +186,6 @@ def test_options_without_support_in_ftetwild_are_errors(options: dict) -> None:
         {"quality": 1.0},
         {"quality": float("inf")},
         {"min_dihedral": 90.0},
-        {"envelope": 0.0},
         {"time_limit": 0.0},
         {"memory_limit": -5},
         {"mesher": "gmsh"},
@@ -372,3 +371,27 @@ def test_a_sheet_encloses_nothing(mesher) -> None:
     sheet = SurfaceMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     with pytest.raises(MeshingError, match=r"found no volume inside of the surface|encloses nothing"):
         fill(sheet, tets=100, mesher=mesher)
+
+
+def crossed_shells() -> SurfaceMesh:
+    """A hollow ball with a wall of 2 cm, and a bar that crosses it."""
+    ball = sphere_surface(radius=0.5, edge_length=0.2)
+    return joined(ball, ball.transformed(0.96).flipped(), moved(box_surface((0.3, 0.05, 0.02), (3, 1, 1)), 0.5, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("tets", [4000, 20_000])
+def test_a_lattice_that_is_coarser_than_walls_says_so(tets) -> None:
+    """At any number: where no tet is left, and where few are."""
+    with pytest.raises(MeshingError, match=r"its walls are thinner than edges, .* m; ask for more tets \(tets=\d+\)"):
+        fill(crossed_shells(), tets=tets, mesher="stuffing")
+
+
+@pytest.mark.slow  # half a minute
+def test_ftetwild_fills_thin_walls_that_cross() -> None:
+    pytest.importorskip("pytetwild")
+    surface = crossed_shells()
+    mesh = fill(surface, tets=4000, mesher="ftetwild")
+    assert len(mesh.tets) == pytest.approx(4000, rel=0.15)
+    assert mesh.components.count == 1
+    wall = (1.0 - 0.96**3) * sphere_surface(radius=0.5, edge_length=0.2).volume
+    assert mesh.volume == pytest.approx(wall + 0.28 * 0.05 * 0.02, rel=0.02)

@@ -235,7 +235,6 @@ def _run_ftetwild(vertices: Any, triangles: Any, options: dict[str, Any], notes:
             triangles,
             edge_length_abs=edge_length,
             epsilon=options["envelope"],
-            num_threads=options["threads"],
             # Without this, tets come out negative.
             vtk_ordering=True,
             quiet=True,

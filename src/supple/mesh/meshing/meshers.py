@@ -100,6 +100,8 @@ def edge_of_count(tets: float, area: float, volume: float) -> float:
 logger = logging.getLogger(__name__)
 
 INSTALL = 'pip install "supple[dirty]"'
+# How far fTetWild may move the boundary, as a fraction of the bounding box's diagonal.
+ENVELOPE = 1e-3
 
 
 def ftetwild_installed() -> bool:
@@ -107,16 +109,12 @@ def ftetwild_installed() -> bool:
     return importlib.util.find_spec("pytetwild") is not None
 
 
-def mesh_with_ftetwild(
-    surface: SurfaceMesh, max_volume: float | None, envelope: float, limits: Limits, threads: int = 0
-) -> MesherResult:
+def mesh_with_ftetwild(surface: SurfaceMesh, max_volume: float | None, limits: Limits) -> MesherResult:
     """Tets inside what a surface most plausibly encloses: holes are closed, and overlaps become a union.
 
     Parameters
     ----------
     max_volume : [m^3], or None for edges of a twentieth of the bounding box's diagonal
-    envelope : how far the boundary may move, as a fraction of the bounding box's diagonal
-    threads : 0 for all cores
 
     Raises
     ------
@@ -128,8 +126,7 @@ def mesh_with_ftetwild(
     middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low)) or 1.0
     options = {
         "max_volume": None if max_volume is None else max_volume / size**3,
-        "envelope": envelope,
-        "threads": threads,
+        "envelope": ENVELOPE,
     }
     unit = (surface.vertices - middle) / size
     result = run_mesher(
@@ -138,7 +135,7 @@ def mesh_with_ftetwild(
     if len(result.elements) == 0:
         raise MeshingError("fTetWild found no volume inside of the surface; close its holes, or give another surface")
     result = replace(result, vertices=result.vertices * size + middle)
-    _warn_of_lost_pieces(surface, result, reach=(envelope + 0.05) * size)
+    _warn_of_lost_pieces(surface, result, reach=(ENVELOPE + 0.05) * size)
     return result
 
 

@@ -7,16 +7,16 @@ import logging
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.errors import MeshingError
 from supple.mesh.merge import merge_map
 from supple.mesh.meshing.child_process import Limits, run_mesher
+from supple.mesh.meshing.facing import consistently_oriented
 from supple.mesh.meshing.holes import close_holes
 from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
-from supple.mesh.topology import edge_keys, facet_keys, graph_components, has_vertex_twice
+from supple.mesh.topology import facet_keys, has_vertex_twice
 
 logger = logging.getLogger(__name__)
 
@@ -147,43 +147,6 @@ def _orient(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
         surface = SurfaceMesh(surface.vertices, np.where(rows[:, None], surface.triangles[:, ::-1], surface.triangles))
         steps.append(f"turned {len(report.wrong_facing_components)} components that faced the wrong way")
     return surface
-
-
-def consistently_oriented(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
-    """Turn triangles to agree with their neighbours, where all can; `steps` gets a line about it."""
-    report = surface.check()
-    if len(report.inconsistent_edges) == 0 or len(report.non_manifold_edges):
-        return surface
-    turned = _disagreeing(surface.triangles, len(surface.vertices))
-    if turned is None:
-        return surface
-    steps.append(f"turned {np.count_nonzero(turned)} triangles to agree with their neighbours")
-    return SurfaceMesh(surface.vertices, np.where(turned[:, None], surface.triangles[:, ::-1], surface.triangles))
-
-
-def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bool_] | None:
-    """Which triangles to turn so that neighbours agree (the smaller part of each piece); None if one-sided.
-
-    The nodes of a graph are (triangle, side 0 or 1). Two nodes are connected where neighbours with these sides agree.
-    """
-    starts, keys = triangles.ravel(), edge_keys(triangles, n_vertices).ravel()
-    order = np.argsort(keys, kind="stable")
-    same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
-    a, b = order[same], order[same + 1]
-    m = len(triangles)
-    # Neighbours that agree run along their common edge in opposite directions.
-    agree = starts[a] != starts[b]
-    ta, tb = a // 3, b // 3
-    rows = np.concatenate([ta, ta + m])
-    columns = np.concatenate([np.where(agree, tb, tb + m), np.where(agree, tb + m, tb)])
-    labels = graph_components(2 * m, rows, columns)
-    if (labels[:m] == labels[m:]).any():
-        return None
-    # Each piece appears twice in the graph, as it is and turned; the lower label is one of the two.
-    turned = labels[:m] > labels[m:]
-    piece = np.minimum(labels[:m], labels[m:])
-    share = np.bincount(piece, weights=turned) / np.maximum(np.bincount(piece), 1)
-    return turned ^ (share[piece] > 0.5)
 
 
 def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool, limits: Limits) -> SurfaceMesh:

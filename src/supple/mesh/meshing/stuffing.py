@@ -56,8 +56,11 @@ def stuffed(surface: SurfaceMesh, tets: int | None, edge: float | None) -> tuple
         raise MeshingError("the surface encloses nothing: close its holes, or give it a thickness")
     wanted = tets or 0
     length = edge or MEAN_EDGE * (12.0 * volume / wanted) ** (1.0 / 3.0)
+    shortest = 0.5 * length  # shorter ones make another mesh than that which is asked for, and take very long
     best: TetMesh | None = None
     for _ in range(_MOST_TRIES if wanted else 1):
+        if length < shortest:
+            break
         try:
             made = stuff("stuffing", inside, (middle - half, middle + half), length)
         except MeshError as error:

@@ -55,8 +55,9 @@ def stuff(
     values = inside(points)
     # Only tets with a corner inside are needed.
     tets = tets[(values[tets] < 0.0).any(axis=1)]
+    nothing = MeshError(f"{owner}: edge_length = {edge_length:g} m is too long: no tet is left; make it shorter")
     if len(tets) == 0:
-        raise MeshError(f"{owner}: edge_length = {edge_length:g} m is too long: no tet is left; make it shorter")
+        raise nothing
     edges, of_tet, is_long = _edges(tets, len(points))
     cuts, fractions = _cuts(inside, points, values, edges)
     values = values.copy()
@@ -65,6 +66,8 @@ def stuff(
     cut_row[cut_is_left] = len(points) + np.arange(len(cut_is_left))
     all_points = np.concatenate([points, cuts[cut_is_left]])
     pieces = _pieces(tets, np.sign(values), cut_row[of_tet], all_points)
+    if len(pieces) == 0:  # all points that were inside have moved onto the surface
+        raise nothing
     return TetMesh(*without_unused(all_points, pieces))
 
 

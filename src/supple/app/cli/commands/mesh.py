@@ -31,8 +31,6 @@ def mesh(
     keep_surface: Annotated[bool, Parameter(negative="")] = False,
     mesher: Literal["auto", "tetgen", "stuffing", "ftetwild"] = "auto",
     repair: Annotated[bool, Parameter(negative="")] = False,
-    decimate: Annotated[int | None, Parameter(converter=whole_number)] = None,
-    envelope: float = 1e-3,
     time_limit: float = 120.0,
     memory_limit: float = 4.0,
     base_index: Literal[0, 1] = 1,
@@ -67,12 +65,8 @@ def mesh(
         they fail. "ftetwild" is an extra, for thin walls that are not clean.
     repair
         Repair a surface that is not clean first, and list the changes. Where that fails, it is filled as it is.
-    decimate
-        Number of triangles to which the surface is reduced first.
     yes
         Go on without a question where more than 10 times the tets are needed.
-    envelope
-        How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
     time_limit
         Time limit of the mesher [s].
     memory_limit
@@ -118,8 +112,6 @@ def mesh(
                 keep_surface=keep_surface,
                 mesher=mesher,
                 repair=repair,
-                decimate=decimate,
-                envelope=envelope,
                 time_limit=time_limit,
                 memory_limit=_bytes(memory_limit),
             )

@@ -41,7 +41,6 @@ MESHING_OPTIONS = (
     "keep_surface",
     "mesher",
     "repair",
-    "decimate",
     "time_limit",
 )
 
@@ -50,7 +49,7 @@ class MeshFileModel(Model):
     """A mesh file. Where it holds a surface, that is filled with tetrahedra according to the meshing options.
 
     Without a size, a surface whose triangles need more than about 2,000 tetrahedra is filled with so many. A surface
-    that is remeshed for that, or reduced by `decimate`, is the skin of the body.
+    that is remeshed for that is the skin of the body.
     """
 
     file: FilePath = Field(description="relative to the scene file")
@@ -67,9 +66,6 @@ class MeshFileModel(Model):
         default=None, description="program for the tetrahedra"
     )
     repair: bool | None = Field(default=None, description="true: repair the surface first, if it has faults")
-    decimate: int | None = Field(
-        default=None, ge=4, le=10**8, description="number of triangles to which the surface is reduced first"
-    )
     time_limit: Positive | None = Field(default=None, description="of the mesher [s]")
     keep_axes: bool = Field(default=False, description=KEEP_AXES)
 
