@@ -376,7 +376,8 @@ def test_a_sheet_encloses_nothing(mesher) -> None:
 def crossed_shells() -> SurfaceMesh:
     """A hollow ball with a wall of 2 cm, and a bar that crosses it."""
     ball = sphere_surface(radius=0.5, edge_length=0.2)
-    return joined(ball, ball.transformed(0.96).flipped(), moved(box_surface((0.3, 0.05, 0.02), (3, 1, 1)), 0.5, 0.0, 0.0))
+    bar = box_surface((0.3, 0.05, 0.02), (3, 1, 1))
+    return joined(ball, ball.transformed(0.96).flipped(), moved(bar, 0.5, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("tets", [20_000])
