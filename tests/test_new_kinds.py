@@ -6,6 +6,7 @@ Each works in scene files and their schema, in both solvers, in recordings, chec
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
+import h5py
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
@@ -24,10 +25,13 @@ from supple.mesh.primitives.shape import SHAPES, shape
 from supple.model.joints.functions import FORMS, Form, Values
 from supple.model.loads.applied import AppliedLoad, Setting, UniformLoad
 from supple.model.loads.build import applied
-from supple.results.check.checks.joints import FORMS as JOINT_FORMS
+from supple.results.check.checks import joints as checked_joints
+from supple.results.check.load_forces import LoadPattern
+from supple.results.check.recorded import patterns_of
 from supple.results.export.exporter import FORMATS, Format
 from supple.results.readings.reading import READINGS, Reading
 from supple.results.readings.sensor_readings import reading_of
+from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.scene.joints.joint import Conditions, Function, Joint
 from supple.scene.loads.load import OnBody, body_of
 from supple.scene.materials import MATERIALS
@@ -106,7 +110,7 @@ class LogarithmicLaw(Law):
 LOGARITHMIC = LogarithmicLaw()
 
 
-# --- a load: its class, and its forces ------------------------------------------------------------------------------
+# --- a load: its class, its forces, and those that the verifier computes --------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +139,11 @@ def thrust_on_vertices(load: Thrust, setting: Setting) -> list[AppliedLoad]:
     vertices = (np.arange(len(body.mesh.vertices)) + setting.begins[load.body]).astype(np.int32)
     shares = setting.masses[vertices] / setting.masses[vertices].sum()
     return [UniformLoad.of(vertices, shares, lambda time: np.asarray(load.force), "thrusts")]
+
+
+def thrust_of_a_recording(load: Thrust, scene, starts, masses):
+    rows = starts[load.body][0] + np.arange(len(scene.body(load.body).mesh.vertices))
+    yield "thrusts", LoadPattern("vector", "thrusts", rows, masses[rows] / masses[rows].sum())
 
 
 # --- a joint: its class, its function, and what the verifier computes -----------------------------------------------
@@ -245,14 +254,16 @@ def count(scene: str, /) -> None:
 @pytest.fixture(autouse=True, scope="module")
 def registered():
     lists = [MATERIALS, *(part.kinds for part in PARTS.values())]
-    tables = [SHAPES, FORMS, READINGS, FORMATS, COMMANDS]
+    tables = [SHAPES, FORMS, checked_joints.FORMS, READINGS, FORMATS, COMMANDS]
     before = [one.copy() for one in (*lists, *tables)]
     shape(octahedron)
     MATERIALS.append(Logarithmic)
     for kind in (RoundedCube, Thrust, Tether, Altimeter):
         register(kind)
     applied.register(Thrust, thrust_on_vertices)
+    patterns_of.register(Thrust, thrust_of_a_recording)
     FORMS["distance"] = Form(1, of=distance)
+    checked_joints.FORMS["distance"] = lambda vectors, R: float(np.linalg.norm(vectors[0]))
     reading_of.register(Altimeter, height)
     READINGS["altimeter"] = HeightReading
     FORMATS["xyz"] = Format(write_xyz, (".xyz",))
@@ -360,23 +371,48 @@ def test_a_tether_holds(run):
     assert pull[1] == pytest.approx(9.81, rel=0.05)
 
 
-def test_recordings_have_them_and_the_check_passes(run):
+def test_a_recording_keeps_them(run):
     _, frames, path = run
     with sp.read_recording(path) as recording:
-        scene, system = recording.scene, frames[-1].system
-        assert [type(one) for one in scene.joints] == [Tether]
-        assert (scene.joints[0].length, scene.loads[0].force[1], scene.sensors[0].above) == (0.1, 20.0, 2.0)
-        assert type(scene.bodies[0].material) is type(system.scene.bodies[0].material)
         assert recording[-1].sensors["altitude"].height == frames[-1].sensors["altitude"].height
-        np.testing.assert_array_equal(recording[-1].von_mises["crate"], frames[-1].von_mises["crate"])
+        (block,) = recording.obstacles
+        assert (block.half, block.rounding, block.friction) == (0.5, 0.1, 0.5)
+        rocket, _, bob = recording.scene.bodies
+        assert isinstance(rocket.material, Logarithmic if "implicit" in str(path) else sp.StableNeoHookean)
+        assert bob.mass == 1.0
+        (rope,), (thrust,) = recording.scene.joints, recording.scene.loads
+        assert isinstance(rope, Tether)
+        assert rope.length == 0.1
+        assert isinstance(thrust, Thrust)
+        np.testing.assert_array_equal(thrust.force, [0, 20, 0])
+
+
+def test_checks_accept_it_and_find_what_is_wrong(run, tmp_path):
+    _, frames, path = run
     report = sp.check_recording(path)
-    assert {result.name for result in report.failures} <= {"status"}, str(report)
-    assert report["joints"].message == "what a joint holds is not known here: distance"
-    JOINT_FORMS["distance"] = lambda vectors, R: float(np.linalg.norm(vectors[0]))
-    try:
-        assert sp.check_recording(path)["joints"].verdict == "pass"
-    finally:
-        del JOINT_FORMS["distance"]
+    passed = {result.name for result in report.results if result.verdict == "pass"}
+    assert passed >= {"joints", "obstacles", "containment", "intersection", "balance", "works", "energy", "records"}
+    assert [result.name for result in report.failures if result.name != "status"] == []
+    copy = tmp_path / "copy.vtkhdf"
+    copy.write_bytes(path.read_bytes())
+    with h5py.File(copy, "r+") as file:
+        n = len(file["VTKHDF/Points"]) // (len(frames) + 1)
+        points = file["VTKHDF/Points"]
+        points[10 * n + 14 : 10 * n + 18] -= [0.0, 0.3, 0.0]  # bob hangs lower than the rope is long
+        points[20 * n : 20 * n + 7] += [0.0, 0.1, 0.0]  # the rocket is higher than its thrust lifts it
+    report = sp.check_recording(copy, only=["joints", "works"])
+    assert report["joints"].first_failure == 10
+    assert str(report["joints"].where).startswith("rope")
+    assert report["works"].verdict == "fail"
+
+
+def test_a_page_draws_them(run, tmp_path):
+    _, _, path = run
+    with sp.read_recording(path) as recording:
+        moment = moment_of_frame(model_of_recording(recording), recording[-1])
+        assert len(moment.model.bodies) == 3
+        recording.export("html", tmp_path / "page.html")
+    assert (tmp_path / "page.html").stat().st_size > 100_000
 
 
 def test_info_lists_them(run, capsys):
@@ -389,3 +425,13 @@ def test_info_lists_them(run, capsys):
     assert "length 0.1" in text
     assert "altimeter 'altitude' above 2" in text
     assert "Logarithmic (small strains: E = " in text or "xpbd" in str(file)
+
+
+def test_the_exporter_and_the_command(run, tmp_path, capsys):
+    file, frames, path = run
+    output = tmp_path / "points.xyz"
+    assert main(["export", str(path), "--to", "xyz", "-o", str(output)]) == 0
+    np.testing.assert_allclose(np.loadtxt(output)[:7], frames[-1].positions["rocket"], atol=1e-6)
+    capsys.readouterr()
+    assert main(["count", str(file)]) == 0
+    assert capsys.readouterr().out == "3 bodies\n"

@@ -74,10 +74,9 @@ def test_a_large_mesh_in_a_scene_is_most_likely_in_millimetres(caplog):
         assert ("part.vtu is 119 m long; where it is in millimetres, give scale: 0.001" in caplog.text) == warned
 
 
-@pytest.mark.parametrize("command", [["run", "part.stl", "-o", "out/part"], ["demo", "part.stl"]])
-def test_a_surface_is_simulated_and_resumed(command, tmp_path, capsys):
+def test_a_surface_is_simulated_and_resumed(tmp_path, capsys):
     sp.shapes.box_surface((100.0, 100.0, 100.0), (3, 3, 3)).save("part.stl")
-    assert main([*command, "--steps", "2", "--no-page", "--no-plot"]) == 0
+    assert main(["run", "part.stl", "-o", "out/part", "--steps", "2", "--no-page", "--no-plot"]) == 0
     assert "2 frames" in capsys.readouterr().out
     with sp.read_recording("out/part/recording.vtkhdf") as recording:
         assert len(recording) == 3

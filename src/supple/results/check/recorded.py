@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,7 @@ class RecordedTrajectory(Trajectory):
         )
 
 
+Patterns = Iterator[tuple[str, LoadPattern | None]]
 Starts = dict[str, tuple[int, int]]
 """By name of the body, the numbers of its first vertex and of its first tet."""
 
@@ -199,35 +201,52 @@ def _applied(scene: Scene, starts: Starts, masses: Floats) -> Iterator[tuple[str
     for force in scene.forces:
         yield "forces", _force(force, scene.body(force.body), starts) if force.is_total else None
     for load in scene.loads:
-        yield from _of_load(load, scene, starts, masses)
+        yield from patterns_of(load, scene, starts, masses)
 
 
-def _of_load(load: Load, scene: Scene, starts: Starts, masses: Floats) -> Iterator[tuple[str, LoadPattern | None]]:
-    if isinstance(load, Traction):
-        body = scene.body(load.body)
-        shares = np.zeros(len(body.points))
-        for triangles, weight in _weighted(body, load.triangles(body)):
-            a, b, c = body.points[triangles].transpose(1, 0, 2)
-            areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-            shares += weight * np.bincount(triangles.ravel(), np.repeat(areas, 3), len(shares))
-        yield "tractions", _vector("tractions", body, shares, starts)
-    elif isinstance(load, Pressure):
-        body = scene.body(load.body)
-        for triangles, _ in _weighted(body, load.triangles(body)):  # the weight is in the value
-            yield "pressures", LoadPattern("pressure", "pressures", triangles + starts[load.body][0])
-    elif isinstance(load, Wind):
-        body = scene.body(load.body)
-        triangles = body.triangles[load.triangles(body)] + starts[load.body][0]
-        yield "wind", LoadPattern("drag", "wind", triangles, stiffness=load.density * load.drag)
-    elif isinstance(load, BodyForce):
-        names = load.bodies or tuple(starts)
-        spans = [starts[name][0] + np.arange(len(scene.body(name).mesh.vertices)) for name in names]
-        rows = np.concatenate(spans)
-        yield "body_forces", LoadPattern("vector", "body_forces", rows, masses[rows]) if load.is_uniform else None
-    elif isinstance(load, Spring):
-        yield "springs", _spring(load, scene, starts)
-    else:
-        yield getattr(load, "kind", "loads"), None
+@singledispatch
+def patterns_of(load: Load, scene: Scene, starts: Starts, masses: Floats) -> Patterns:
+    """The names of the works of a load, and how its forces follow from a value; None where they do not, as of a kind
+    that has not registered its own."""
+    yield load.kind, None
+
+
+@patterns_of.register
+def _(load: Traction, scene: Scene, starts: Starts, masses: Floats) -> Patterns:
+    body = scene.body(load.body)
+    shares = np.zeros(len(body.points))
+    for triangles, weight in _weighted(body, load.triangles(body)):
+        a, b, c = body.points[triangles].transpose(1, 0, 2)
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+        shares += weight * np.bincount(triangles.ravel(), np.repeat(areas, 3), len(shares))
+    yield "tractions", _vector("tractions", body, shares, starts)
+
+
+@patterns_of.register
+def _(load: Pressure, scene: Scene, starts: Starts, masses: Floats) -> Patterns:
+    body = scene.body(load.body)
+    for triangles, _ in _weighted(body, load.triangles(body)):  # the weight is in the value
+        yield "pressures", LoadPattern("pressure", "pressures", triangles + starts[load.body][0])
+
+
+@patterns_of.register
+def _(load: Wind, scene: Scene, starts: Starts, masses: Floats) -> Patterns:
+    body = scene.body(load.body)
+    triangles = body.triangles[load.triangles(body)] + starts[load.body][0]
+    yield "wind", LoadPattern("drag", "wind", triangles, stiffness=load.density * load.drag)
+
+
+@patterns_of.register
+def _(load: BodyForce, scene: Scene, starts: Starts, masses: Floats) -> Patterns:
+    names = load.bodies or tuple(starts)
+    spans = [starts[name][0] + np.arange(len(scene.body(name).mesh.vertices)) for name in names]
+    rows = np.concatenate(spans)
+    yield "body_forces", LoadPattern("vector", "body_forces", rows, masses[rows]) if load.is_uniform else None
+
+
+@patterns_of.register
+def _(load: Spring, scene: Scene, starts: Starts, masses: Floats) -> Patterns:
+    yield "springs", _spring(load, scene, starts)
 
 
 def _weighted(body: PlacedBody, rows: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int32], float]]:
