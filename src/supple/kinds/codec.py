@@ -7,22 +7,16 @@ as "bodies/0/triangles"; a short one can be among the JSON. Nothing that is read
 What a user describes (`supple.kinds.kind`, bodies, scenes, meshes) is written as the arguments that make it, and read
 by its constructor, which checks all of it. A function is written as a number; its values are elsewhere.
 
-`check` compares a value with the types, shapes and ranges of indices that the annotations of its class declare:
-
-    triangles: Annotated[NDArray[np.int32], Rows("t", 3, below="n")]
-
-are rows of three numbers below n. The lengths "t" and "n" are those of the property `sizes` of the class, or of a class
-that holds it; a length with another name is the same wherever the class itself uses it.
+`check` compares a value with the types that its class declares.
 """
 
 from __future__ import annotations
 
 import re
-from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -219,49 +213,13 @@ def _dtype(text: Any) -> np.dtype[Any]:
     return np.dtype(text)
 
 
-Sizes = dict[str, int]
-Known = ChainMap[str, int]
-"""First the lengths that a class itself has shown, then those of `sizes`."""
-
-
-@dataclass(frozen=True, init=False)
-class Rows:
-    """Of an array: the length of each axis, a number or a name; below what its indices are; whether it is finite."""
-
-    lengths: tuple[int | str, ...]
-    below: str | None
-    finite: bool
-
-    def __init__(self, *lengths: int | str, below: str | None = None, finite: bool = False) -> None:
-        for name, value in (("lengths", lengths), ("below", below), ("finite", finite)):
-            object.__setattr__(self, name, value)
-
-    def check(self, array: Any, sizes: Known, where: str) -> None:
-        """Raise `ValueError` where an array differs; names without a length get it."""
-        if array.ndim != len(self.lengths):
-            raise ValueError(f"{where} has shape {array.shape}, not {self.lengths}")
-        for length, known in zip(array.shape, self.lengths, strict=True):
-            if length != (sizes.setdefault(known, length) if isinstance(known, str) else known):
-                wanted = tuple(sizes.get(name, name) if isinstance(name, str) else name for name in self.lengths)
-                raise ValueError(f"{where} has shape {array.shape}, not {wanted}")
-        if self.below is not None and array.size and not 0 <= array.min() <= array.max() < sizes[self.below]:
-            row = array.max() if array.max() >= sizes[self.below] else array.min()
-            raise ValueError(f"{where} points to row {row} of {sizes[self.below]}")
-        if self.finite and not np.isfinite(array).all():
-            raise ValueError(f"{where} is not finite")
-
-
-def check(value: Any, hint: Any, sizes: Known, where: str) -> None:
+def check(value: Any, hint: Any, where: str) -> None:
     """Raise `ValueError` where a value is not what an annotation says; `where` names the value."""
     origin, args = get_origin(hint), get_args(hint)
     if hint in (Any, object):
         return
-    if origin is Annotated:
-        check(value, args[0], sizes, where)
-        for rows in args[1:]:
-            rows.check(value, sizes, where)
-    elif origin in (Union, UnionType):
-        _check_union(value, args, sizes, where)
+    if origin in (Union, UnionType):
+        _check_union(value, args, where)
     elif origin is np.ndarray:
         kind = get_args(args[1])[0]
         if not isinstance(value, np.ndarray) or not np.issubdtype(value.dtype, kind):
@@ -273,12 +231,12 @@ def check(value: Any, hint: Any, sizes: Known, where: str) -> None:
         if not isinstance(value, tuple) or (args[-1] is not Ellipsis and len(value) != len(args)):
             raise ValueError(f"{where} is not the tuple that it should be")
         for k, item in enumerate(value):
-            check(item, args[0] if args[-1] is Ellipsis else args[k], sizes, f"{where}/{k}")
+            check(item, args[0] if args[-1] is Ellipsis else args[k], f"{where}/{k}")
     elif origin in (dict, Mapping):
         if not isinstance(value, dict):
             raise ValueError(f"{where} is not a mapping")
         for key, item in value.items():
-            check(item, args[1], sizes, f"{where}/{key}")
+            check(item, args[1], f"{where}/{key}")
     elif not isinstance(value, (int, float) if hint is float else origin or hint) or (
         isinstance(value, bool) and hint in (int, float)
     ):
@@ -286,16 +244,15 @@ def check(value: Any, hint: Any, sizes: Known, where: str) -> None:
     elif isinstance(hint, Described):
         return  # its constructor has checked it
     elif is_dataclass(hint) or hasattr(hint, "_fields"):
-        own = Known({}, getattr(value, "sizes", {}), *sizes.maps[1:])
-        hints = get_type_hints(hint, include_extras=True)
+        hints = get_type_hints(hint)
         for name in field_names(hint):
-            check(getattr(value, name), hints[name], own, f"{where}/{name}")
+            check(getattr(value, name), hints[name], f"{where}/{name}")
 
 
-def _check_union(value: Any, hints: tuple[Any, ...], sizes: Known, where: str) -> None:
+def _check_union(value: Any, hints: tuple[Any, ...], where: str) -> None:
     """The error is that of the first type, or of the one that the value is of."""
     if value is None and type(None) in hints:
         return
     hints = tuple(hint for hint in hints if hint is not type(None))
     of_its_class = [hint for hint in hints if isinstance(hint, type) and isinstance(value, hint)]
-    check(value, (of_its_class or hints)[0], sizes, where)
+    check(value, (of_its_class or hints)[0], where)

@@ -25,14 +25,12 @@ class Law(ABC):
     Attributes
     ----------
     counts : numbers of parameters that a row may have
-    name : by which recordings know the law; None for one that they do not keep
     infinite_when_flat : whether psi goes to infinity wherever J goes to zero. No law has an energy for J <= 0.
     bulk : the parameter K of the law, where psi has the volume term K/2 (J - 1)^2, of which quadratic tets average J.
         None where there is none.
     """
 
     counts: range
-    name: str | None = None
     infinite_when_flat: bool = False
     bulk: int | None = None
 
@@ -58,11 +56,9 @@ class Flow(ABC):
 
     Attributes
     ----------
-    name : by which recordings know it
     step_law : whose derivative by the trial F_e, that without flow in the step, is the stress at the step's end
     """
 
-    name: str
     step_law: Law
 
     @abstractmethod

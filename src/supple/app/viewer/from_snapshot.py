@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.app.viewer.protocol.snapshots import SceneDescription, Snapshot
+from supple.app.viewer.protocol.snapshots import Snapshot
 from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.model import Model, Moment
 
@@ -20,7 +20,9 @@ class MomentBuilder:
         """The moment of a snapshot."""
         if self._model is None or snapshot.description.generation != self._generation:
             self._generation = snapshot.description.generation
-            self._model = self._model_of(snapshot.description)
+            scene = snapshot.description
+            view = view_of_scene(box_corners(scene.low, scene.high), np.asarray(scene.up), scene.obstacles)
+            self._model = Model(scene.bodies, scene.obstacles, view, scene.stitches, scene.joints)
         rotations, translations = snapshot.obstacle_poses
         poses = np.concatenate([rotations.reshape(-1, 3, 3), translations.reshape(-1, 3, 1)], axis=2)
         values = {}
@@ -38,16 +40,4 @@ class MomentBuilder:
             springs={grab.grab: (np.array(grab.point), np.array(grab.target)) for grab in snapshot.grabs},
             tet_values=values,
             broken_stitches=snapshot.broken_stitches,
-        )
-
-    def _model_of(self, scene: SceneDescription) -> Model:
-        tets = np.concatenate([body.body.mesh.tets + body.vertices.start for body in scene.bodies])
-        return Model(
-            scene.bodies,
-            scene.obstacles,
-            np.concatenate([body.body.mesh.vertices for body in scene.bodies]),
-            np.ascontiguousarray(tets, dtype=np.int32),
-            view_of_scene(box_corners(scene.low, scene.high), np.asarray(scene.up), scene.obstacles),
-            scene.stitches,
-            joints=scene.joints,
         )

@@ -32,7 +32,6 @@ class FibreLaw(Law):
     """The law; its parameters are k1 [Pa], k2, kappa and the unit vector a."""
 
     counts = range(6, 7)
-    name = "fibres"
 
     def densities(self, F: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.models(F, p, False, False)[0]

@@ -33,5 +33,5 @@ def _energy(s, p):
 
 
 _KERNEL = law_kernel("hencky", _energy)
-HENCKY = IsotropicLaw(_KERNEL, range(2, 7), "hencky", infinite_when_flat=True)
-MAXWELL = IsotropicLaw(_KERNEL, range(2, 4), "maxwell")
+HENCKY = IsotropicLaw(_KERNEL, range(2, 7), infinite_when_flat=True)
+MAXWELL = IsotropicLaw(_KERNEL, range(2, 4))

@@ -28,7 +28,6 @@ class IsotropicLaw(Law):
 
     kernel: Callable[..., Any]
     counts: range
-    name: str | None = None
     infinite_when_flat: bool = False
     bulk: int | None = None
 

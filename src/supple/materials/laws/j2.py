@@ -89,7 +89,6 @@ J2_STEP = IsotropicLaw(law_kernel("j2_step", _energy), range(7, 8), infinite_whe
 class J2Flow(Flow):
     """Parameters of the law: K, mu, Y0, H, Y1 [Pa], r. The measure of flow is the accumulated plastic strain."""
 
-    name = "j2"
     step_law = J2_STEP
 
     def step_parameters(self, p: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:

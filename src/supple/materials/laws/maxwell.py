@@ -25,7 +25,6 @@ from supple.materials.per_tet import Flow
 class MaxwellFlow(Flow):
     """Parameters of the law: 0, G [Pa], T [s]. The measure of flow is the sum of |strain| of the dashpot."""
 
-    name = "maxwell"
     step_law = MAXWELL
 
     def step_parameters(self, p: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:

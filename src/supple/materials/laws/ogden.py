@@ -50,4 +50,4 @@ def _energy(s, p):
     return psi, tau, c, (b0, b1, b2)
 
 
-OGDEN = IsotropicLaw(law_kernel("ogden", _energy), range(3, 20, 2), "ogden", bulk=0)
+OGDEN = IsotropicLaw(law_kernel("ogden", _energy), range(3, 20, 2), bulk=0)

@@ -49,4 +49,4 @@ def _energy(s, p):
     return psi, tau, c, quotients
 
 
-YEOH = IsotropicLaw(law_kernel("yeoh", _energy), range(4, 5), "yeoh", bulk=0)
+YEOH = IsotropicLaw(law_kernel("yeoh", _energy), range(4, 5), bulk=0)

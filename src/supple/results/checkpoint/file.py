@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.kinds.codec import Known, check, decoded, described, encoded, restored
+from supple.kinds.codec import check, decoded, described, encoded, restored
 from supple.materials.laws.internal import COLUMNS
 from supple.model.state import State
 from supple.runtime.replacing import whole_file
@@ -136,7 +136,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         line, _, rest = content.partition(b"\n")
         header = json.loads(line)
         checkpoint = decoded(header["content"], restored(header["arrays"], memoryview(rest)), _classes())
-        check(checkpoint, Checkpoint, Known(), "checkpoint")
+        check(checkpoint, Checkpoint, "checkpoint")
         _check_consistency(checkpoint)
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError) as error:
         raise _damaged(path, f"its content is not what this version writes ({error})") from None

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SuppleError
-from supple.kinds.codec import Known, check, decoded, encoded, kinds_by_name
+from supple.kinds.codec import Arrays, check, decoded, encoded, kinds_by_name
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.own.formula import Formula
 from supple.mesh.surface import SurfaceMesh
@@ -59,16 +59,15 @@ def _classes() -> dict[str, type]:
     return described | {kind.__name__: kind for kind in (*MATERIALS, *own)}
 
 
-def functions_of(scene: Scene) -> list[Callable[..., Any]]:
-    """The functions of time in a scene, each once.
+def described(scene: Scene) -> tuple[Any, Arrays, list[Callable[..., Any]]]:
+    """A scene as a tree of JSON, the arrays beside it, and its functions of time, each once.
 
     Raises
     ------
     OutputError : where the scene has what a recording cannot keep.
     """
     functions: list[Callable[..., Any]] = []
-    encoded(scene, _classes(), functions)
-    return functions
+    return *encoded(scene, _classes(), functions, _INLINE), functions
 
 
 def write_description(file: h5py.File, description: Description) -> None:
@@ -110,7 +109,7 @@ def read_description(file: CheckedFile, function: Callable[[int], Any]) -> Descr
 
     try:
         found = decoded(json.loads(file.text(_HEADER)), _Arrays(file), _classes(), numbered)
-        check(found, Description, Known(), _GROUP)
+        check(found, Description, _GROUP)
         _check_consistency(found, used)
     except (
         ArithmeticError,

@@ -19,7 +19,7 @@ from supple.materials.laws.internal import COLUMNS, count_of
 from supple.model.state import Status
 from supple.results.frame import Frame
 from supple.results.readings.fields import Field, checked_fields, cost
-from supple.results.recording.description import Description, functions_of, write_description
+from supple.results.recording.description import Description, described, write_description
 from supple.results.recording.details import RecordedDetails, RecordedSensor, recorded_sensors
 from supple.results.recording.file import TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.results.recording.functions import Values, function_series, values_at
@@ -179,7 +179,7 @@ class Recorder:
     def _layout(self, first: Frame) -> Layout:
         system = first.system
         self._details = RecordedDetails.like(first.report.details)
-        self._functions = functions_of(system.scene)
+        self._functions = described(system.scene)[2]
         self._at_start = values_at(self._functions, 0.0)
         sizes = len(system.rest_positions), len(system.tets), len(system.obstacles)
         names, sensors = system.scene.stitching.names, recorded_sensors(system.scene)

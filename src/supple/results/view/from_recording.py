@@ -12,9 +12,8 @@ from supple.results.view.model import Model, Moment
 
 def model_of_recording(recording: Recording) -> Model:
     """The constant data of a recording."""
-    rest, tets = recording.rest_positions, recording.tets
-    view, stitches = view_of(recording), recording.stitches
-    return Model(recording.bodies, recording.obstacles, rest, tets, view, stitches, recording.joints)
+    view = view_of(recording)
+    return Model(recording.bodies, recording.obstacles, view, recording.stitches, recording.joints)
 
 
 def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:

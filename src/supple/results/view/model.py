@@ -32,7 +32,6 @@ class Model:
     ----------
     bodies : with their rows of the arrays
     obstacles : at time 0
-    rest_positions : (n, 3) [m]; tets : (m, 4) rows of them
     view : bounds of the motion, and the up direction
     stitches : of all kinds
     joints : of rigid bodies
@@ -40,11 +39,20 @@ class Model:
 
     bodies: Sequence[BodyRows]
     obstacles: Sequence[Obstacle]
-    rest_positions: NDArray[np.float64]
-    tets: NDArray[np.int32]
     view: View
     stitches: StitchEnds
     joints: tuple[PlacedJoint, ...] = ()
+
+    @cached_property
+    def rest_positions(self) -> NDArray[np.float64]:
+        """(n, 3) vertices of all bodies [m]."""
+        return np.concatenate([part.body.mesh.vertices for part in self.bodies])
+
+    @cached_property
+    def tets(self) -> NDArray[np.int32]:
+        """(m, 4) rows of them."""
+        tets = [part.body.mesh.tets + part.vertices.start for part in self.bodies]
+        return np.concatenate(tets).astype(np.int32, copy=False)
 
     @cached_property
     def surface_vertices(self) -> NDArray[np.int64]:
