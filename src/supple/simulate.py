@@ -19,7 +19,7 @@ from supple.contact.parting import with_parted_sides
 from supple.errors import SceneError, SolverError, SuppleError, SuppleWarning
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.materials.laws.internal import checked
-from supple.model.breaking import after_breaks
+from supple.model.breaking import after_breaks, are_of
 from supple.model.crushed import too_soft
 from supple.model.state import Problems, State, Status, StepReport
 from supple.model.system import System, build_system, initial_state
@@ -187,7 +187,7 @@ def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None =
         raise SceneError(
             f"simulate: start has {len(state.positions)} vertices, the scene has {count}; give one of this scene"
         )
-    if len(state.broken_stitches) and state.broken_stitches.max() >= len(scene.stitching):
+    if not are_of(state, scene):
         raise SceneError("simulate: start has broken stitches that the scene does not have; give one of this scene")
     state = _with_inputs(scene, _with_internal(scene, state))
     # A frame of this scene has the pins' anchors; computing them again would give them only up to round-off.

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from supple.model.energy_balance import BREAKING
 from supple.model.state import State, StepReport
 from supple.model.system import System
+from supple.scene.scene import Scene
 from supple.scene.stitches.measures import stitch_energies, stitch_loads
+
+
+def are_of(state: State, scene: Scene) -> bool:
+    """Whether the scene has the stitches that have broken in a state."""
+    broken, parted = state.broken_stitches, state.parted_stitches
+    return bool(np.isin(broken, np.arange(len(scene.stitching))).all() and np.isin(parted, broken).all())
 
 
 def without_broken(system: System, broken: NDArray[np.int64], parted: NDArray[np.int64]) -> System:

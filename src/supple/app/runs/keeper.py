@@ -15,7 +15,7 @@ import numpy as np
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal, Session, now, versions, write_journal
 from supple.errors import OutputError
-from supple.model.breaking import without_broken
+from supple.model.breaking import are_of, without_broken
 from supple.model.system import System, rebuilt_system
 from supple.results.checkpoint.file import Checkpoint, RunFacts, write_checkpoint
 from supple.results.checkpoint.scene_hash import scene_hash
@@ -50,9 +50,9 @@ def frame_of(checkpoint: Checkpoint, scene: Scene, solver: Solver) -> Frame | No
     if len(checkpoint.state.positions) != count or len(checkpoint.anchors) != len(scene.pins):
         return None
     system = rebuilt_system(scene, checkpoint.start_states, checkpoint.anchors)
-    if scene_hash(system, *checkpoint.run.span) != checkpoint.run.scene:
-        return None
     state = checkpoint.state
+    if scene_hash(system, *checkpoint.run.span) != checkpoint.run.scene or not are_of(state, scene):
+        return None
     system = without_broken(system, state.broken_stitches, state.parted_stitches)
     return start_frame(system, state, checkpoint.index, solver)
 
