@@ -18,7 +18,6 @@ from mkdocs.structure.files import File, Files
 sys.path.append(str(Path(__file__).parent))  # mkdocs loads this file alone
 
 from api import api_pages
-
 from kinds import kinds_page
 
 ROOT = Path(__file__).parents[2]
