@@ -18,7 +18,7 @@ from supple.app.cli.app import register as register_command
 from supple.app.scene_file.document import json_schema
 from supple.app.scene_file.loader import load_run
 from supple.app.scene_file.yaml_files import read_yaml
-from supple.kinds.forms import ANY_NUMBER, POSITIVE, Name, NumberPerTet, Vector
+from supple.kinds.forms import ANY_NUMBER, POSITIVE, BodyName, Name, NumberPerTet, Vector
 from supple.materials.by_law import ByLaw
 from supple.materials.per_tet import Law
 from supple.mesh.primitives.shape import SHAPES, shape
@@ -126,7 +126,7 @@ class Thrust(OnBody):
 
     kind: ClassVar[str] = "thrust"
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     force: Annotated[np.ndarray, Vector()]
     name: Annotated[str | None, Name()] = None
 
@@ -198,12 +198,8 @@ class Altimeter(Sensor):
     kind: ClassVar[str] = "altimeter"
 
     name: Annotated[str, Name()]
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     above: Annotated[float, ANY_NUMBER] = 0.0
-
-    @property
-    def bodies(self):
-        return (self.body,)
 
     def check(self, bodies, obstacles):
         body_of(self.body, bodies, self.label)
@@ -360,6 +356,14 @@ def test_a_solver_without_the_new_material_says_so(tmp_path):
     loaded = load_run(file)
     with pytest.raises(sp.SolverError, match="the material Logarithmic, which XPBD cannot simulate"):
         next(iter(sp.simulate(loaded.scene, loaded.solver, loaded.dt, 1)))
+
+
+def test_what_refers_to_a_body_is_known_by_its_fields(run):
+    file, *_ = run
+    scene = load_run(file).scene
+    found = {key: [item.label for item in items] for key, items in scene.referring("rocket").items() if items}
+    assert found == {"loads": ["thrust on body 'rocket'"], "sensors": ["altimeter 'altitude'"]}
+    assert [joint.label for joint in scene.referring("bob")["joints"]] == ["joint 'rope'"]
 
 
 def test_a_tether_holds(run):

@@ -28,6 +28,10 @@ class Form(ABC):
         SceneError : where it is impossible; the text begins with `what`.
         """
 
+    def bodies(self, value: Any) -> tuple[str, ...]:
+        """The names of bodies, or of things that may stand for one, that a checked value has."""
+        return ()
+
 
 @dataclass(frozen=True)
 class Number(Form):
@@ -191,6 +195,14 @@ class Name(Form):
     def checked(self, value: Any, what: str) -> str:
         check_name(value, what)
         return value
+
+
+@dataclass(frozen=True)
+class BodyName(Name):
+    """The name of a body, or of what may stand for one."""
+
+    def bodies(self, value: Any) -> tuple[str, ...]:
+        return (value,)
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,12 @@ class Kind(metaclass=Described):
         name = getattr(self, "name", None)
         return f"{self.word} {name!r}" if name else self.word
 
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The names of the bodies, and of things that may stand for one, that it names."""
+        given = ((one.form, getattr(self, key)) for key, one in declared(type(self)).items())
+        return tuple(name for form, value in given if value is not None for name in form.bodies(value))
+
     def summary(self) -> str:
         """What was given, without names and what has its default."""
         parts = []

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import POSITIVE, Form, Name
+from supple.kinds.forms import POSITIVE, BodyName, Form, Name
 from supple.scene.motion import Motion, MotionForm
 from supple.scene.selection import OnVertices, Selection, Vertices
 
@@ -59,7 +59,7 @@ class Force(OnVertices):
     kind: ClassVar[str] = "force"
     joint: ClassVar[str] = "on"
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     vertices: Annotated[Selection, Vertices()]
     force: Annotated[ArrayLike | Callable[[float], ArrayLike], ForceForm()]
     name: Annotated[str | None, Name()] = None
@@ -120,7 +120,7 @@ class SoftTarget(OnVertices):
 
     kind: ClassVar[str] = "soft_target"
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     vertices: Annotated[Selection, Vertices()]
     stiffness: Annotated[float, POSITIVE]
     motion: Annotated[Motion, MotionForm()] = None

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from supple.errors import SceneError
-from supple.kinds.forms import Name
+from supple.kinds.forms import BodyName, Name
 from supple.scene.motion import Motion, MotionForm
 from supple.scene.selection import OnVertices, Selection, Vertices
 
@@ -31,7 +31,7 @@ class Pin(OnVertices):
 
     kind: ClassVar[str] = "pin"
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     vertices: Annotated[Selection | None, Vertices()] = None
     motion: Annotated[Motion, MotionForm()] = None
     name: Annotated[str | None, Name()] = None

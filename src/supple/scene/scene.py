@@ -248,6 +248,11 @@ class Scene(Showable, metaclass=Described):
         driven = (joint for joint in self.joints if isinstance(joint, AxisJoint))
         return {str(joint.name): joint.motor for joint in driven if joint.motor is not None}
 
+    def referring(self, name: str) -> dict[str, list[Any]]:
+        """All that refers to a body of that name, by the lists of the scene; without contact pairs."""
+        lists = [key for key in PARTS if key not in ("bodies", "obstacles", "contact_pairs")]
+        return {key: [item for item in getattr(self, key) if name in item.bodies] for key in lists}
+
     def with_added(self, **parts: Sequence[Any]) -> Scene:
         """The same scene with further bodies, obstacles, pins, or other parts.
 

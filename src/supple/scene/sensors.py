@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import Counts, Direction, Name, Vector
+from supple.kinds.forms import BodyName, Counts, Direction, Name, Vector
 from supple.kinds.kind import Kind
 from supple.kinds.suggestion import suggestion
 from supple.scene.body import PlacedBody
@@ -31,11 +31,6 @@ class Sensor(Kind, ABC):
 
     name: str
 
-    @property
-    @abstractmethod
-    def bodies(self) -> tuple[str, ...]:
-        """The names of the bodies, and obstacles, that it belongs to."""
-
     @abstractmethod
     def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
         """Raise `SceneError` where it does not fit these bodies, and the names of obstacles."""
@@ -46,10 +41,6 @@ class SurfaceSensor(Sensor):
 
     body: str
     region: Region
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return (self.body,)
 
     def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
         self.triangles(bodies)
@@ -85,13 +76,9 @@ class ForceSensor(SurfaceSensor):
     title: ClassVar[str] = "force sensor"
 
     name: Annotated[str, Name()]
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     region: Annotated[Region, TRIANGLES] = None
-    by: Annotated[str | None, Name()] = None
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return (self.body,) if self.by is None else (self.body, self.by)
+    by: Annotated[str | None, BodyName()] = None
 
     def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
         super().check(bodies, obstacles)
@@ -125,7 +112,7 @@ class Taxels(SurfaceSensor):
     kind: ClassVar[str] = "taxels"
 
     name: Annotated[str, Name()]
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     corner: Annotated[ArrayLike, Vector()]
     first: Annotated[ArrayLike, Vector()]
     second: Annotated[ArrayLike, Vector()]
@@ -164,13 +151,9 @@ class AngleSensor(OnVertices, Sensor):
     title: ClassVar[str] = "angle sensor"
 
     name: Annotated[str, Name()]
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     vertices: Annotated[Selection | None, Vertices()] = None
     axis: Annotated[ArrayLike | None, Direction()] = None
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return (self.body,)
 
     def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
         body = body_of(self.body, bodies, self.label)
@@ -205,10 +188,6 @@ class DistanceSensor(Sensor):
     name: Annotated[str, Name()]
     first: Annotated[Point, PointForm()]
     second: Annotated[Point, PointForm()]
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return tuple(name for name, _ in (self.first, self.second) if name is not None)
 
     def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
         for key in ("first", "second"):

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import Flag, Name, Vector
+from supple.kinds.forms import BodyName, Flag, Name, Vector
 from supple.kinds.kind import Kind
 from supple.kinds.suggestion import suggestion
 from supple.scene.body import PlacedBody
@@ -96,8 +96,8 @@ class Joint(Kind, ABC):
 
     title: ClassVar[str] = "joint"
 
-    first: Annotated[str, Name()]
-    second: Annotated[str | None, Name()] = None
+    first: Annotated[str, BodyName()]
+    second: Annotated[str | None, BodyName()] = None
     point: Annotated[ArrayLike | None, Vector()] = None
     collide: Annotated[bool, Flag()] = False
     name: Annotated[str | None, Name()] = None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, Name
+from supple.kinds.forms import POSITIVE, BodyName, Name
 from supple.kinds.suggestion import suggestion
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.body import PlacedBody
@@ -39,8 +39,8 @@ class Weld(OnVertices):
 
     kind: ClassVar[str] = "weld"
 
-    body: Annotated[str, Name()]
-    rigid: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
+    rigid: Annotated[str, BodyName()]
     vertices: Annotated[Selection | None, Vertices()] = None
     max_distance: Annotated[float | None, POSITIVE] = None
     name: Annotated[str | None, Name()] = None

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import Name
+from supple.kinds.forms import BodyName, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Load, body_of
 from supple.scene.loads.over_time import Curve, OverTimeOf, value_at
@@ -36,12 +36,8 @@ class BodyForce(Load):
     kind: ClassVar[str] = "body_force"
 
     force: Annotated[ArrayLike | Curve | Callable[[NDArray[np.float64], float], ArrayLike], OverTimeOf((3,))]
-    body: Annotated[str | None, Name()] = None
+    body: Annotated[str | None, BodyName()] = None
     name: Annotated[str | None, Name()] = None
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return () if self.body is None else (self.body,)
 
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         if self.body is not None:

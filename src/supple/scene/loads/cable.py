@@ -60,11 +60,6 @@ class Cable(Kind):
             remedy = "give it" if self.stiffness is None else "it has no effect with tension; leave it out"
             raise SceneError(f"{self.label}: stiffness is {self.stiffness!r}; {remedy}")
 
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """The names of the bodies that it acts on."""
-        return tuple(name for name, _ in self.points if name is not None)
-
     def corners(
         self, bodies: Sequence[PlacedBody]
     ) -> list[tuple[str | None, NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]]:

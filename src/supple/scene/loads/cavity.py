@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name, OneOf, Whole
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, BodyName, Name, OneOf, Whole
 from supple.kinds.kind import Kind
 from supple.mesh.closed_surfaces import enclosed_voids, is_closed, signed_volumes
 from supple.scene.body import PlacedBody
@@ -74,7 +74,7 @@ class Cavity(Kind):
     kind: ClassVar[str] = "cavity"
     exactly_one: ClassVar[tuple[str, ...]] = ("pressure", "volume", "gas")
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     pressure: Annotated[OverTime | None, OverTimeOf()] = None
     volume: Annotated[OverTime | None, OverTimeOf(bounds=POSITIVE)] = None
     gas: Annotated[Gas | None, OneOf((Gas,), "a Gas")] = None
@@ -88,11 +88,6 @@ class Cavity(Kind):
         super().__post_init__()
         if self.triangles is not None and self.void:
             raise SceneError(f"{self.label}: void and triangles given; give one of them")
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """The names of the bodies that it acts on."""
-        return (self.body,)
 
     def check(self, bodies: Sequence[PlacedBody], others: Sequence[Cavity]) -> None:
         """Raise `SceneError` where it has no surface, or shares one with another cavity; see `surface`."""

@@ -23,11 +23,6 @@ class Load(Kind, ABC):
 
     name: str | None
 
-    @property
-    @abstractmethod
-    def bodies(self) -> tuple[str, ...]:
-        """The names of the bodies that it acts on; none for all bodies."""
-
     @abstractmethod
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         """Raise `SceneError` where it does not fit these bodies."""
@@ -57,10 +52,6 @@ class OnBody(Load):
     @property
     def label(self) -> str:
         return f"{super().label} on body {self.body!r}"
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return (self.body,)
 
 
 class OnSurface(OnBody):

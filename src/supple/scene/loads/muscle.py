@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import POSITIVE, Form, Name, Number
+from supple.kinds.forms import POSITIVE, BodyName, Form, Name, Number
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TETS, OnBody, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
@@ -67,7 +67,7 @@ class Muscle(OnBody):
 
     kind: ClassVar[str] = "muscle"
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     strength: Annotated[float, POSITIVE]
     direction: Annotated[ArrayLike, Directions()]
     activation: Annotated[OverTime, ACTIVATION] = 1.0

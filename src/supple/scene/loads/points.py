@@ -39,6 +39,9 @@ class PointForm(Form):
             return name, int(place)
         return name, finite_vector(place, f"{what}: place")
 
+    def bodies(self, value: Point) -> tuple[str, ...]:
+        return () if value[0] is None else (value[0],)
+
 
 @dataclass(frozen=True)
 class PointList(Form):
@@ -52,6 +55,9 @@ class PointList(Form):
         if len(given) < 2:
             raise SceneError(f"{what} is {value!r}; give two or more")
         return tuple(PointForm().checked(point, f"{what}[{i}]") for i, point in enumerate(given))
+
+    def bodies(self, value: tuple[Point, ...]) -> tuple[str, ...]:
+        return tuple(name for name, _ in value if name is not None)
 
 
 def point_corners(

@@ -50,10 +50,6 @@ class Spring(Load):
         if self.first[0] is None and self.second[0] is None:
             raise SceneError(f"{self.label}: both ends are fixed in the world; give at least one point of a body")
 
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return tuple(name for name, _ in (self.first, self.second) if name is not None)
-
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         first, second = (self.corners(key, bodies) for key in ("first", "second"))
         if first[0] == second[0] and all(np.array_equal(a, b) for a, b in zip(first[1:3], second[1:3], strict=True)):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, Name
+from supple.kinds.forms import NON_NEGATIVE, BodyName, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TRIANGLES, OnSurface, Region, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
@@ -33,7 +33,7 @@ class Traction(OnSurface):
 
     kind: ClassVar[str] = "traction"
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     traction: Annotated[OverTime, OverTimeOf((3,))]
     region: Annotated[Region, TRIANGLES] = None
     name: Annotated[str | None, Name()] = None
@@ -56,7 +56,7 @@ class Pressure(OnSurface):
 
     kind: ClassVar[str] = "pressure"
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     pressure: Annotated[OverTime, OverTimeOf()]
     region: Annotated[Region, TRIANGLES] = None
     name: Annotated[str | None, Name()] = None
@@ -92,7 +92,7 @@ class Wind(OnSurface):
 
     kind: ClassVar[str] = "wind"
 
-    body: Annotated[str, Name()]
+    body: Annotated[str, BodyName()]
     velocity: Annotated[OverTime, OverTimeOf((3,))]
     drag: Annotated[float, NON_NEGATIVE] = 1.0
     density: Annotated[float, NON_NEGATIVE] = 1.2

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Choice, Form, Name, Number
+from supple.kinds.forms import NON_NEGATIVE, POSITIVE, BodyName, Choice, Form, Name, Number
 from supple.kinds.kind import Kind
 from supple.numerics.geometry.triangle_tree import TriangleTree, pair_distances
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
@@ -86,8 +86,8 @@ class Stitch(Kind, ABC):
     title: ClassVar[str] = "stitch"
     exactly_one: ClassVar[tuple[str, ...]] = ("pairs", "max_distance")
 
-    first: Annotated[str, Name()]
-    second: Annotated[str, Name()]
+    first: Annotated[str, BodyName()]
+    second: Annotated[str, BodyName()]
     pairs: Annotated[ArrayLike | None, PairList()] = field(default=None, kw_only=True)
     max_distance: Annotated[float | None, POSITIVE] = field(default=None, kw_only=True)
     pairing: Annotated[str, Choice(("closest", "all"))] = field(default="closest", kw_only=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from fnmatch import fnmatchcase
 from functools import singledispatch
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -305,21 +306,10 @@ def _(command: commands.RemoveBody, live: LiveScene) -> None:
 def without_body(scene: Scene, name: str) -> Scene:
     """The scene without a body and all that refers to it."""
     bodies = [body for body in scene.bodies if body.name != name]
-    return replace(
-        scene,
-        bodies=bodies,
-        pins=[pin for pin in scene.pins if pin.body != name],
-        forces=[force for force in scene.forces if force.body != name],
-        loads=[load for load in scene.loads if name not in load.bodies],
-        cavities=[cavity for cavity in scene.cavities if name not in cavity.bodies],
-        cables=[cable for cable in scene.cables if name not in cable.bodies],
-        sensors=[sensor for sensor in scene.sensors if name not in sensor.bodies],
-        soft_targets=[target for target in scene.soft_targets if target.body != name],
-        stitches=[stitch for stitch in scene.stitches if name not in (stitch.first, stitch.second)],
-        joints=[joint for joint in scene.joints if name not in (joint.first, joint.second)],
-        welds=[weld for weld in scene.welds if name not in (weld.body, weld.rigid)],
-        contact_pairs=_pairs_among([thing.name for thing in (*bodies, *scene.obstacles)], scene.contact_pairs),
-    )
+    gone = scene.referring(name)
+    left: dict[str, Any] = {key: [one for one in getattr(scene, key) if one not in gone[key]] for key in gone}
+    pairs = _pairs_among([thing.name for thing in (*bodies, *scene.obstacles)], scene.contact_pairs)
+    return replace(scene, bodies=bodies, contact_pairs=pairs, **left)
 
 
 def _pairs_among(things: Sequence[str | None], pairs: Sequence[ContactPair]) -> list[ContactPair]:

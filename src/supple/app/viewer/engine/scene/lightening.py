@@ -16,7 +16,6 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.mesh.topology import without_unused
 from supple.scene.body import Body
-from supple.scene.scene import Scene
 from supple.solvers.implicit.solver import Implicit
 
 _FEWEST = 60  # tets of a body: fewer do not bend
@@ -86,12 +85,4 @@ def _is_free(body: Body, source: LiveSource) -> bool:
         np.ndim(getattr(body.material, one.name)) for one in fields(body.material)
     ):  # pyright: ignore[reportArgumentType]
         return False
-    return body.name not in _referred_to(source.scene)
-
-
-def _referred_to(scene: Scene) -> set[str | None]:
-    """The names of the bodies that something else of the scene acts on, measures or joins."""
-    single = (*scene.pins, *scene.forces, *scene.soft_targets, *scene.welds)
-    several = (*scene.loads, *scene.cavities, *scene.cables, *scene.sensors)
-    named = {one.body for one in single} | {name for one in several for name in one.bodies}
-    return named | {name for stitch in scene.stitches for name in (stitch.first, stitch.second)}
+    return not any(source.scene.referring(body.name).values())
