@@ -93,3 +93,43 @@ def test_a_stitch_energy_that_was_changed(seam, corrupted):
         file["supple/frames/stitch_energy"][2] *= 1.0 + 1e-5
 
     assert failures(corrupted(seam, change)) == {"records": 2}
+
+
+@pytest.fixture(scope="session")
+def torn(folder):
+    """Two cubes that fly apart; the springs between them break in frame `first`."""
+    a, b = sp.Body("a", CUBE, JELLY, velocity=(-0.5, 0, 0)), sp.Body("b", CUBE, JELLY, position=(0.12, 0, 0))
+    seam = sp.VertexVertexStitch("b", "a", max_distance=0.021, stiffness=5.0, strength=0.05)
+    path = recorded(folder / "torn.vtkhdf", sp.Scene([a, b], stitches=[seam]), sp.XPBD(substeps=20))
+    with sp.read_recording(path) as recording:
+        first = next(k for k in range(len(recording)) if recording.broken_stitches(k).any())
+        assert sp.check_recording(path, skip=["status"]).ok
+        assert 0 < first < len(recording) - 1
+    return path, first
+
+
+def test_a_broken_stitch_that_holds_again_is_found(torn, corrupted):
+    path, first = torn
+
+    def heal(file, n):
+        file["supple/frames/broken_stitches"][first + 1 :] = 0
+
+    assert {"records", "balance"} <= set(failures(corrupted(path, heal)))
+
+
+def test_a_wrong_energy_of_breaking_is_found(torn, corrupted):
+    path, first = torn
+    with sp.read_recording(path) as recording:
+        keys = next(field.keys for field in recording.details.fields if field.name == "work")
+    assert keys is not None
+    column, other = keys.index("breaking"), keys.index("numerical")
+
+    def change(file, n):
+        works = file["supple/frames/details/work"]
+        lost = works[first, column]
+        assert lost < 0.0
+        works[first, column] = 0.5 * lost
+        works[first, other] += 0.5 * lost
+
+    found = failures(corrupted(path, change))
+    assert found["balance"] == first
