@@ -219,6 +219,28 @@ def test_functions_are_recorded_by_their_values_in_each_frame(tmp_path):
     assert sp.check_recording(path, only=only).ok
 
 
+def test_functions_of_motors_actuators_and_inputs_are_recorded(tmp_path):
+    given = whole_scene()
+    turn = sp.HingeJoint("b", None, point=(3, 0, 0), motor=sp.PositionMotor(lambda t: 0.1 + t, 1.0))
+    push = sp.SliderJoint("a", None, motor=sp.ForceMotor(sp.MotorInput("push", 0.3)))
+    scene = sp.Scene(
+        given.bodies,
+        joints=[turn, push],
+        cavities=[sp.Cavity("tyre", pressure=lambda t: 5.0)],
+        cables=[sp.Cable([("bar", 3), (None, (0, 5, 0))], length=lambda t: 4.0 - t, stiffness=1.0)],
+        loads=[sp.Muscle("hat", 1e3, (1, 0, 0), lambda t: 0.25)],
+        pins=[sp.Pin("bar", [0], motion=sp.MotionInput("hand", (0.0, 0.0, 0.0)))],
+        **STILL,
+    )
+    read_back(scene, tmp_path / "r.vtkhdf")
+    with sp.read_recording(tmp_path / "r.vtkhdf") as recording:
+        found = recording.scene
+        given = [*(joint.motor.script for joint in found.joints), found.cavities[0].pressure, found.cables[0].length]
+        assert [float(function(0.0)) for function in (*given, found.loads[0].activation)] == [0.1, 0.3, 5.0, 4.0, 0.25]
+        np.testing.assert_array_equal(found.pins[0].motion(0.0), np.zeros(3))
+        assert found.inputs == {}
+
+
 def test_a_recorded_scene_is_simulated_again_with_the_same_bits(tmp_path):
     floor = sp.HalfSpace(friction=0.3)
     ball = sp.Body("ball", sp.shapes.sphere(0.1, 0.05), RUBBER, position=(0, 0.101, 0), velocity=(0.2, -1, 0))

@@ -112,6 +112,8 @@ def test_a_recording(rows_of):
     assert rows["kind"] == "recording"
     assert rows["frames"] == "4 to t = 0.03 s, dt = 0.01 s"
     assert (rows["vertices"], rows["tets"], rows["mass"]) == ("8", "6", "1000 kg")
+    assert rows["body cube"] == "StableNeoHookean, 6 tets, 1 m^3, 1000 kg"
+    assert rows["place of cube"] == "(-0.5, -0.5, -0.5) to (0.5, 0.5, 0.5) m"
     assert (rows["ended"], rows["problems"]) == ("converged", "none")
     assert float(rows["smallest J"].split()[0]) == pytest.approx(min(1.0, *(f.report.min_det_F for f in frames)), 1e-5)
     assert np.isfinite(frames[-1].time)

@@ -12,6 +12,8 @@ from supple.app.cli.arguments import Confine
 from supple.app.cli.console import print_table
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
 
     from supple.app.scene_file.loader import Run
@@ -154,15 +156,28 @@ def _scene(file: Path, timed: bool, confine: bool) -> None:
     from supple.app.cli.console import reading
     from supple.app.scene_file.loader import load_run
     from supple.model.system import build_system, initial_state
-    from supple.scene.rigid.rigid_body import RigidBody
 
     with reading():
         run = load_run(file, confine=confine)
     start = initial_state(run.scene, **{key.removeprefix("initial_"): value for key, value in run.start.items()})
     scene, system = run.scene, build_system(run.scene, start)
-    points = system.split(start.positions)
     rows = [
         ("kind", "scene"),
+        *_counted(system),
+        ("solver", run.chosen_solver.account),
+        ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
+        ("memory", f"about {run.chosen_solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
+        ("intersections", _start_problem(system, start)),
+        ("each frame", _frame_time(run) if timed else "--time simulates the first ones, and says how long one takes"),
+        *_described(system, system.split(start.positions)),
+    ]
+    print_table(rows, str(file))
+
+
+def _counted(system: System) -> list[tuple[str, str]]:
+    """How many things a scene has, and their names."""
+    scene = system.scene
+    return [
         ("bodies", str(len(scene.bodies))),
         ("vertices", str(len(system.masses))),
         ("tets", str(len(system.tets))),
@@ -170,12 +185,14 @@ def _scene(file: Path, timed: bool, confine: bool) -> None:
         ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
         ("loads", ", ".join(load.label for load in scene.loads) or "none"),
         ("sensors", ", ".join(sensor.label for sensor in scene.sensors) or "none"),
-        ("solver", run.chosen_solver.account),
-        ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
-        ("memory", f"about {run.chosen_solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
-        ("intersections", _start_problem(system, start)),
-        ("each frame", _frame_time(run) if timed else "--time simulates the first ones, and says how long one takes"),
     ]
+
+
+def _described(system: System, points: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
+    """What each thing of a scene is; points : of each body at the start [m]."""
+    from supple.scene.rigid.rigid_body import RigidBody
+
+    rows, scene = [], system.scene
     for part in system.bodies:
         mass = system.masses[part.vertices].sum()
         rows.append((f"place of {part.name}", _place(points[part.name])))
@@ -198,7 +215,7 @@ def _scene(file: Path, timed: bool, confine: bool) -> None:
     for k, weld in enumerate(scene.welds):
         count = int((scene.welding.weld == k).sum())
         rows.append((weld.name or weld.kind, f"{count} vertices of {weld.body} are points of {weld.rigid}"))
-    print_table(rows, str(file))
+    return rows
 
 
 def _place(x: np.ndarray) -> str:
@@ -320,10 +337,7 @@ def _recording(file: Path) -> None:
         rows = [
             ("kind", "recording"),
             ("frames", f"{len(recording)} to t = {recording.times[-1]:.6g} s, dt = {recording.dt:.6g} s"),
-            ("bodies", ", ".join(f"{body.name} ({_made_of(body.body)})" for body in recording.bodies)),
-            ("obstacles", ", ".join(f"{o.name} ({type(o).__name__})" for o in recording.obstacles) or "none"),
-            ("vertices", str(len(recording.masses))),
-            ("tets", str(len(recording.tets))),
+            *_counted(recording.system),
             ("volume", f"{sum(recording.rest_volumes[b.tets].sum() for b in soft):.6g} m^3 of soft bodies at rest"),
             ("mass", f"{recording.masses.sum():.6g} kg"),
             ("solver", recording.solver or "unknown"),
@@ -332,6 +346,7 @@ def _recording(file: Path) -> None:
             ("ended", str(recording.statuses[-1])),
             ("scene file", "inside" if recording.scene_text else "none"),
             ("written by", f"supple {recording.supple_version}"),
+            *_described(recording.system, recording[0].positions),
         ]
         if recording.scene.stitching.names.breakable:
             broken = len(recording.broken_stitches(len(recording) - 1))
@@ -340,12 +355,3 @@ def _recording(file: Path) -> None:
         problems += [recording.unfinished] if recording.unfinished else []
         rows.append(("problems", "; ".join(problems) or "none"))
     print_table(rows, str(file))
-
-
-def _made_of(body: PlacedBody) -> str:
-    from supple.scene.rigid.rigid_body import RigidBody
-
-    if isinstance(body, RigidBody):
-        return f"rigid, {body.properties.mass:.6g} kg"
-    text = " ".join(repr(body.material).split())
-    return text if len(text) <= 500 else f"{text[:499]}…"
