@@ -136,6 +136,10 @@ class FrameCheck:
     def see(self, at: Snapshot) -> None:
         """Check a frame; frames come in order."""
 
+    def at(self, number: int) -> At:
+        """Number and time of a frame."""
+        return At(int(number), float(self.scene.recording.times[number]))
+
     def passed(self) -> CheckResult:
         """The result where nothing failed and nothing was measured."""
         return CheckResult(self.name, Verdict.PASS, self.good)

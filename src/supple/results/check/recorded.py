@@ -14,7 +14,7 @@ from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.load_forces import CablePath, CavitySurface, LoadPattern
-from supple.results.check.trajectory import Floats, Moment, Part, Stitches, Trajectory, Weld
+from supple.results.check.trajectory import Floats, Part, Stitches, Trajectory, TrajectoryFrame, Weld
 from supple.results.recording.reader import Recording
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import pair_table
@@ -84,10 +84,10 @@ class RecordedTrajectory(Trajectory):
             unfinished=source.unfinished,
         )
 
-    def moment(self, number: int) -> Moment:
+    def frame(self, number: int) -> TrajectoryFrame:
         frame = self.records[number]
         state, details, before = frame.state, frame.report.details, self.records.broken_stitches(max(number - 1, 0))
-        return Moment(
+        return TrajectoryFrame(
             number,
             frame.time,
             np.ascontiguousarray(state.positions),

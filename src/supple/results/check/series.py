@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from supple.errors import MeshError, OutputError
+from supple.errors import MeshError, OutputError, SuppleError
+from supple.kinds.forms import POSITIVE, Choice, Flag, Vector
+from supple.kinds.kind import Kind
 from supple.materials.elastic import Elastic, FixedCorotated, NeoHookean, StableNeoHookean, StVenantKirchhoff
-from supple.materials.material import NotRecorded
+from supple.materials.material import POISSON, NotRecorded
 from supple.materials.per_tet import TetMaterial
 from supple.mesh.io.series.series import OtherCells, Series
 from supple.results.check.series_parts import parts_of
-from supple.results.check.trajectory import Moment, Part, Trajectory
+from supple.results.check.trajectory import Part, Trajectory, TrajectoryFrame
 
 # As scene files call them.
 LAWS: dict[str, type[Elastic]] = {
@@ -28,7 +31,7 @@ _APART = 1e-6
 
 
 @dataclass(frozen=True)
-class Given:
+class Given(Kind):
     """What a user knows of a series beside its files.
 
     Parameters
@@ -43,25 +46,16 @@ class Given:
     OutputError : where a number is out of range.
     """
 
-    density: float | None = None
-    youngs: float | None = None
-    poisson: float | None = None
-    gravity: tuple[float, float, float] | None = None
-    dt: float | None = None
-    free: bool = False
-    law: str = "stable_neo_hookean"
+    kind: ClassVar[str] = "check"
+    error: ClassVar[type[SuppleError]] = OutputError
 
-    def __post_init__(self) -> None:
-        if self.law not in LAWS:
-            raise OutputError(f"check: law is {self.law!r}; give one of {', '.join(LAWS)}")
-        for name in ("density", "youngs", "dt"):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0.0):
-                raise OutputError(f"check: {name} is {value}; give a number above zero")
-        if self.poisson is not None and not -1.0 < self.poisson < 0.5:
-            raise OutputError(f"check: poisson is {self.poisson}; give a number between -1 and 0.5")
-        if self.gravity is not None and not (len(self.gravity) == 3 and np.isfinite(self.gravity).all()):
-            raise OutputError(f"check: gravity is {self.gravity}; give three numbers")
+    density: Annotated[float | None, POSITIVE] = None
+    youngs: Annotated[float | None, POSITIVE] = None
+    poisson: Annotated[float | None, POISSON] = None
+    gravity: Annotated[ArrayLike | None, Vector()] = None
+    dt: Annotated[float | None, POSITIVE] = None
+    free: Annotated[bool, Flag()] = False
+    law: Annotated[str, Choice(tuple(LAWS))] = "stable_neo_hookean"
 
 
 class SeriesTrajectory(Trajectory):
@@ -109,7 +103,7 @@ class SeriesTrajectory(Trajectory):
             knows=frozenset(name for name, is_known in known.items() if is_known),
             times=self._times(count, step),
             dt=step or 1.0,
-            gravity=np.array(given.gravity or (0.0, 0.0, 0.0), dtype=np.float64),
+            gravity=np.zeros(3) if given.gravity is None else np.asarray(given.gravity),
             bodies=bodies,
             rest_positions=rest,
             masses=masses,
@@ -123,9 +117,9 @@ class SeriesTrajectory(Trajectory):
         )
         self._kept: dict[int, tuple[NDArray[np.float64], str | None]] = {}
 
-    def moment(self, number: int) -> Moment:
+    def frame(self, number: int) -> TrajectoryFrame:
         positions, other = self._frame(number)
-        return Moment(number, float(self.times[number]), positions, self._velocities(number), other=other)
+        return TrajectoryFrame(number, float(self.times[number]), positions, self._velocities(number), other=other)
 
     def _frame(self, number: int) -> tuple[NDArray[np.float64], str | None]:
         """Positions (n, 3) in the order of the parts, and why they cannot be compared; the last few are kept."""

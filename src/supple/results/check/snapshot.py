@@ -18,7 +18,7 @@ from supple.results.check.geometry.surface_pairs import meeting_pairs
 from supple.results.check.load_forces import ActuatorState, actuator_states, add_muscle_forces, load_forces
 from supple.results.check.stored_energies import elastic_energy, stitch_energies
 from supple.results.check.surfaces import Surfaces, seam_keys
-from supple.results.check.trajectory import Moment, Trajectory
+from supple.results.check.trajectory import Trajectory, TrajectoryFrame
 
 _MOST_PAIRS = 1000
 
@@ -61,7 +61,7 @@ class Scene:
 
     def snapshot(self, number: int) -> Snapshot:
         """A frame."""
-        return Snapshot(**vars(self.recording.moment(number)), scene=self)
+        return Snapshot(**vars(self.recording.frame(number)), scene=self)
 
     def name(self, kind: Literal["vertex", "tet"], row: int) -> str:
         """A vertex or tet as messages call it: its number within its body, or the file; of a skin, within that."""
@@ -78,7 +78,7 @@ class Scene:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Snapshot(Moment):
+class Snapshot(TrajectoryFrame):
     """One frame, with what is measured on it."""
 
     scene: Scene

@@ -200,7 +200,7 @@ def seam_keys(recording: Trajectory, surfaces: Surfaces) -> NDArray[np.int64]:
     stitched = surfaces.stitched
     if not len(stitched):
         return np.zeros(0, dtype=np.int64)
-    frame = recording.moment(0)
+    frame = recording.frame(0)
     if not np.isfinite(frame.positions).all() or not np.isfinite(frame.poses).all():
         return np.zeros(0, dtype=np.int64)
     x, triangles, owners = surfaces.place(frame.positions, frame.poses), surfaces.triangles, surfaces.owners

@@ -76,7 +76,7 @@ class Stitches:
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class TrajectoryFrame:
     """One frame.
 
     Attributes
@@ -170,7 +170,7 @@ class Trajectory(ABC):
         return self.source
 
     @abstractmethod
-    def moment(self, number: int) -> Moment:
+    def frame(self, number: int) -> TrajectoryFrame:
         """A frame."""
 
     def knows_law(self, body: int) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.check.frame_check import At, FrameCheck
+from supple.results.check.frame_check import FrameCheck
 from supple.results.check.report import CheckResult
 from supple.results.check.settings import CheckSettings
 from supple.results.check.snapshot import Scene, Snapshot
@@ -144,8 +144,7 @@ class Energy(FrameCheck):
         if "files" in recording.knows:  # differences between frames show fast vibrations one time and not another
             gains = np.maximum(energy - energy[0], 0.0) / scale
         for (number, _, _), gain in zip(self._rows, gains, strict=True):
-            at = At(number, float(recording.times[number]))
-            self.tally.see(at, float(gain), not gain <= self.settings.max_energy_gain)
+            self.tally.see(self.at(number), float(gain), not gain <= self.settings.max_energy_gain)
         return super().result()
 
 
@@ -185,21 +184,21 @@ class Balance(FrameCheck):
         open_ = np.maximum(miss - self.scene.floors.sums, 0.0) / scale
         left = np.abs(np.cumsum(residual)[rows]) / scale
         for number, miss, rest in zip(rows, open_, left, strict=True):
-            at = At(int(number), float(recording.times[int(number)]))
+            at = self.at(number)
             self.tally.see(at, float(miss), not miss <= _CLOSED)
             if not rest <= self.settings.max_energy_gain:
                 self.tally.see(at, float(rest), True, "forces that are not balanced")
         if "breaking" in self._works:
             apart = np.abs(self._works["breaking"][rows] + self._breaking) / scale
             worst = int(np.argmax(apart))
-            at = At(int(rows[worst]), float(recording.times[rows[worst]]))
-            self.tally.see(at, float(apart[worst]), not apart[worst] <= _CLOSED, "work of breaking")
+            failed = not apart[worst] <= _CLOSED
+            self.tally.see(self.at(rows[worst]), float(apart[worst]), failed, "work of breaking")
         for kind, names in (("cavities", "cavity_work"), ("cables", "cable_work")):
             if kind in self._works:
                 apart = np.abs(recording.records.frame_values(f"details/{names}").sum(axis=1) - self._works[kind])
                 worst = int(np.argmax(apart))
                 share = float(apart[worst] / scale.max())
-                self.tally.see(At(worst, float(recording.times[worst])), share, not share <= _CLOSED, f"work of {kind}")
+                self.tally.see(self.at(worst), share, not share <= _CLOSED, f"work of {kind}")
         return super().result()
 
 

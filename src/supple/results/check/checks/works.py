@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import MUSCLE
 from supple.results.check.checks.budgets import energy_scale, moved_and_height, recorded_works
-from supple.results.check.frame_check import At, FrameCheck
+from supple.results.check.frame_check import FrameCheck
 from supple.results.check.report import CheckResult
 from supple.results.check.snapshot import Snapshot
 
@@ -96,7 +96,7 @@ class Works(FrameCheck):
         reasons = {name: why for name, why in _NOT_RECORDED.items() if name in recording.other_loads}
         reasons |= _NEVER_RECORDED
         if recording.quadratic is not None:
-            fibres = [each.rows for each in recording.moment(0).active if each.kind == MUSCLE]
+            fibres = [each.rows for each in recording.frame(0).active if each.kind == MUSCLE]
             if fibres and np.isin(np.concatenate(fibres), recording.quadratic[0]).any():
                 reasons["muscles"] = "they act in quadratic tets"
         return {name: why for name, why in reasons.items() if name in self._works}
@@ -275,8 +275,7 @@ class Works(FrameCheck):
             shares = excess / (sizes + (_CLOSED if name in self._loads else 1.0) * energies + self.scene.floors.sums)
             for number, share in zip(rows, shares, strict=True):
                 failed = not share <= self.settings.max_energy_gain
-                at = At(int(number), float(recording.times[int(number)]))
-                self.tally.see(at, float(share), failed, f"work of {name}" if failed else "")
+                self.tally.see(self.at(number), float(share), failed, f"work of {name}" if failed else "")
         return super().result()
 
 
