@@ -278,6 +278,25 @@ def test_a_material_of_a_user_is_known_where_its_class_is(tmp_path):
     assert sp.check_recording(path).ok
 
 
+def test_classes_that_are_defined_again_or_have_the_name_of_ours(tmp_path):
+    def defined(name):
+        return dataclass(frozen=True, eq=False, kw_only=True)(type(name, (Stiffening,), {}))
+
+    first, second = defined("Again"), defined("Again")
+    for kind, factor in ((first, 3.0), (second, 4.0)):  # as of a notebook whose cell is executed again
+        scene = sp.Scene([sp.Body("bar", BOX, kind(youngs=1e5, poisson=0.3, factor=factor))], **STILL)
+        path = tmp_path / "r.vtkhdf"
+        recorder = sp.Recorder(path)
+        recorder.begin(first_frame(scene, initial_state(scene)), 0.01, 0)
+        recorder.end()
+        with sp.read_recording(path) as recording:
+            found = recording.scene.bodies[0].material
+        assert (type(found), found.factor) == (second, factor)
+    ours = defined("NeoHookean")
+    with pytest.raises(sp.OutputError, match="a NeoHookean cannot be written to a file"):
+        read_back(sp.Scene([sp.Body("bar", BOX, ours(youngs=1e5, poisson=0.3))], **STILL), tmp_path / "s.vtkhdf")
+
+
 def test_only_parts_of_scenes_are_made_from_a_file(tmp_path):
     path = tmp_path / "r.vtkhdf"
     read_back(sp.Scene([sp.Body("bar", BOX, RUBBER)], **STILL), path)

@@ -35,11 +35,16 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 def kinds_by_name() -> dict[str, type]:
-    """All kinds that are defined so far, also those of a user; of two with one name, the first."""
+    """All kinds that are defined so far, also those of a user; of two with one name ours, or else the latest."""
     found: dict[str, type] = {}
     for kind in _below(Kind):
-        found.setdefault(kind.__name__, kind)
+        if _is_ours(kind) or not _is_ours(found.get(kind.__name__, kind)):
+            found[kind.__name__] = kind
     return found
+
+
+def _is_ours(kind: type) -> bool:
+    return kind.__module__.startswith("supple.")
 
 
 def _below(kind: type) -> Iterator[type]:
@@ -85,7 +90,9 @@ def encoded(
             # By number: a key may contain any character, and two paths must differ.
             return {"mapping": {key: tree_of(part, inside(k)) for k, (key, part) in enumerate(item.items())}}
         item = getattr(item, "recorded", lambda item=item: item)()
-        if classes.get(type(item).__name__) is type(item):
+        known = classes.get(type(item).__name__)
+        # A notebook defines a class again when its cell is executed again.
+        if known is type(item) or (known is not None and isinstance(item, Kind) and not _is_ours(known)):
             own = arguments(type(item))
             tree = {
                 "class": type(item).__name__,
@@ -94,10 +101,10 @@ def encoded(
             other = getattr(item, "otherwise", None)
             return tree if other is None else tree | {"otherwise": tree_of(other, inside("otherwise"))}
         if functions is not None and callable(item):
-            known = next((k for k, function in enumerate(functions) if function is item), len(functions))
-            if known == len(functions):
+            number = next((k for k, function in enumerate(functions) if function is item), len(functions))
+            if number == len(functions):
                 functions.append(item)
-            return {"function": known}
+            return {"function": number}
         raise OutputError(f"a {type(item).__name__} cannot be written to a file; register its class with its codec")
 
     return tree_of(value, ""), arrays
