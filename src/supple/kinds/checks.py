@@ -59,14 +59,6 @@ def number(value: object, what: str) -> float:
     return given
 
 
-def non_negative(value: object, what: str) -> float:
-    """`value` as a float that is finite and zero or more."""
-    given = number(value, what)
-    if given < 0.0:
-        raise SceneError(f"{what} is {given:g}; it must be zero or more")
-    return given
-
-
 def positive(value: object, what: str) -> float:
     """`value` as a float that is finite and above zero."""
     given = number(value, what)

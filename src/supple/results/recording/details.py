@@ -140,13 +140,6 @@ class RecordedSensor:
         prefix = self.name if self.kind == "driven" else f"sensors.{self.name}"
         return {f"{prefix}.{end}": column for end, column in self.reading.columns(numbers).items()}
 
-    def check(self) -> None:
-        """Raise `ValueError` where this is not what this version writes."""
-        grid = len(self.shape) == 3 and min(self.shape) > 0 and self.shape[2] == 3
-        kind = READINGS.get(self.kind)
-        if kind is None or not (grid if not kind.shape else self.shape == kind.shape):
-            raise ValueError(f"sensor {self.name!r} of the kind {self.kind!r} has numbers of the shape {self.shape}")
-
 
 def recorded_sensors(scene: Scene) -> tuple[RecordedSensor, ...]:
     """The sensors of a scene, then its obstacles and pins."""
