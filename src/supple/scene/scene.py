@@ -122,18 +122,17 @@ class Scene(Showable, metaclass=Described):
         for load in self.loads:
             with at(*given[id(load)]):
                 load.check(self.bodies)
+        for key in ("sensors", "cavities", "cables", "joints", "welds"):
+            self._require_own_names(key)
         for i, sensor in enumerate(self.sensors):
             with at("sensors", i):
                 sensor.check(self.bodies, [str(obstacle.name) for obstacle in self.obstacles])
-                _check_own_name("sensor", sensor, self.sensors[:i])
         for i, cavity in enumerate(self.cavities):
             with at("cavities", i):
-                _check_own_name("cavity", cavity, self.cavities[:i])
                 cavity.check(self.bodies, self.cavities[:i])
         for i, cable in enumerate(self.cables):
             with at("cables", i):
                 cable.corners(self.bodies)
-                _check_own_name("cable", cable, self.cables[:i])
         self._check_joints()
         self._check_welds(pinned)
         if self.contact_pairs:
@@ -148,6 +147,15 @@ class Scene(Showable, metaclass=Described):
         facts["obstacles"] = short_list(obstacle.name for obstacle in self.obstacles)
         facts |= {key: str(len(getattr(self, key))) for key in PARTS if key not in facts}
         return {name: value for name, value in facts.items() if value not in ("", "0")}
+
+    def _require_own_names(self, key: str) -> None:
+        taken: set[str | None] = set()
+        for i, item in enumerate(getattr(self, key)):
+            if item.name in taken:
+                thing = key.removesuffix("s") if key != "cavities" else "cavity"
+                with at(key, i):
+                    raise SceneError(f"{item.label}: another {thing} has this name; give each a different name")
+            taken.add(item.name)
 
     def _check_skins(self) -> None:
         """Raise for what acts on the surface of the tets of a body that touches with its skin."""
@@ -170,14 +178,8 @@ class Scene(Showable, metaclass=Described):
         for i, joint in enumerate(self.joints):
             with at("joints", i):
                 joint.check(bodies, obstacles)
-                if any(other.name == joint.name for other in self.joints[:i]):
-                    raise SceneError(f"{joint.label}: another joint has this name; give each a different name")
 
     def _check_welds(self, pinned: dict[str, NDArray[np.bool_]]) -> None:
-        for i, weld in enumerate(self.welds):
-            with at("welds", i):
-                if any(other.name == weld.name for other in self.welds[:i]):
-                    raise SceneError(f"{weld.label}: another weld has this name; give each a different name")
         vertices, weld_of, begin = self.welding.vertices, self.welding.weld, 0
         for body in self.bodies:
             count = len(body.mesh.vertices)
@@ -320,11 +322,6 @@ class Scene(Showable, metaclass=Described):
         raise SceneError(
             f"scene: body {name!r} does not exist; there are {', '.join(repr(b.name) for b in self.bodies)}"
         )
-
-
-def _check_own_name(kind: str, item: Cavity | Cable | Sensor, others: Sequence[Cavity | Cable | Sensor]) -> None:
-    if any(other.name == item.name for other in others):
-        raise SceneError(f"{item.label}: another {kind} has this name; give each a different name")
 
 
 def _name(bases: Sequence[type]) -> str:
