@@ -5,6 +5,7 @@ import re
 import sys
 import tomllib
 from functools import cache
+from importlib.metadata import requires
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,9 @@ IMPORT_NAMES = {
     "usd-core": "pxr",
 }
 BY_TRIMESH = {"lxml", "networkx"}  # imported by it where it reads 3MF
+# Used as those that need them do, in the versions that these allow: not listed again.
+BROUGHT = {"PIL": "matplotlib", "llvmlite": "numba", "rich": "cyclopts", "websockets": "viser"}
+MOST = 16  # packages that a plain install asks for
 # Development tools that are run, or loaded by pytest; no test imports them.
 TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-cov", "pytest-xdist", "ruff"}
 OWN = {"supple", "tests", "benchmarks"}
@@ -68,7 +72,13 @@ def runtime(project):
 
 def test_every_package_that_the_library_imports_is_declared(runtime):
     imported = imported_packages(SOURCES)
-    assert {name: imported[name] for name in imported.keys() - runtime} == {}
+    assert {name: imported[name] for name in imported.keys() - runtime - BROUGHT.keys()} == {}
+    for name, by in BROUGHT.items():
+        assert name in runtime | {import_name(need) for need in requires(by) or () if "extra ==" not in need}, name
+
+
+def test_a_plain_install_asks_for_few_packages(project):
+    assert len(project["project"]["dependencies"]) <= MOST
 
 
 def test_every_declared_package_is_imported(runtime):
@@ -78,5 +88,5 @@ def test_every_declared_package_is_imported(runtime):
 def test_every_package_that_the_tests_import_is_declared(project, runtime):
     development = {import_name(r) for r in project["dependency-groups"]["dev"]}
     imported = imported_packages(TESTS)
-    assert {name: imported[name] for name in imported.keys() - runtime - development} == {}
+    assert {name: imported[name] for name in imported.keys() - runtime - development - BROUGHT.keys()} == {}
     assert development - imported.keys() - runtime == TOOLS

@@ -117,8 +117,10 @@ def _reason(error: Exception) -> str:
 @contextmanager
 def _processes(count: int) -> Iterator[Executor]:
     """Processes that end with this one. They do not import the script of the user, unlike those of the library."""
-    from loky import ProcessPoolExecutor
-
+    try:
+        from loky import ProcessPoolExecutor
+    except ImportError:
+        raise StudyError("a study on this machine needs loky; pip install 'supple[studies]'") from None
     threads = dict.fromkeys(_THREADS, str(max(1, (os.cpu_count() or 1) // count)))
     executor = ProcessPoolExecutor(count, env=threads, initializer=end_with_parent, initargs=(os.getpid(),))
     try:

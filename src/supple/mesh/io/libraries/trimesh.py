@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 from base64 import b64encode
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -61,6 +62,7 @@ def read_dae(data: bytes) -> MeshFile:
     """Triangles of a COLLADA file."""
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise FormatError("it declares entities of XML, which are not read")
+    _require("collada")
     return read_in_child(data, "trimesh", ".dae")
 
 
@@ -70,7 +72,14 @@ def read_3mf(data: bytes) -> MeshFile:
         raise FormatError("it is not a 3MF file, which is a ZIP archive")
     if b"3dmodel.model" not in data.lower():
         raise FormatError("it is a ZIP archive without a model of 3MF; unpack it")
+    _require("lxml", "networkx")
     return read_in_child(data, "trimesh", ".3mf")
+
+
+def _require(*packages: str) -> None:
+    for name in packages:
+        if find_spec(name) is None:
+            raise FormatError(f"it needs {name}, which is not installed; pip install 'supple[formats]'")
 
 
 def read_file(path: Path) -> MeshFile:
