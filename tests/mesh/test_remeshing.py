@@ -4,13 +4,13 @@ import logging
 
 import numpy as np
 import pytest
+from tests.mesh.cad_parts import CLEAN, cup, housing, noisy_scan, overlapping, turned_tetrahedron
 
 from supple.errors import MeshingError
 from supple.mesh.meshing.consent import asking
 from supple.mesh.meshing.spelling import spelled_for
 from supple.mesh.meshing.tetrahedralize import tetrahedralize, tetrahedralize_reported
 from supple.mesh.shapes import box_surface
-from tests.mesh.cad_parts import CLEAN, cup, housing, noisy_scan, overlapping, turned_tetrahedron
 
 
 def heights(mesh):
