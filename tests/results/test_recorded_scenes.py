@@ -11,6 +11,7 @@ import pytest
 from tests.recordings import set_in_scene
 
 import supple as sp
+from supple.kinds.checks import unit_vectors
 from supple.kinds.described import Described
 from supple.kinds.forms import POSITIVE
 from supple.kinds.kind import Kind
@@ -21,6 +22,7 @@ from supple.scene.registry import PARTS
 from supple.simulate import first_frame
 
 BOX = sp.shapes.box((0.4, 0.1, 0.1), (4, 1, 1))
+DIRECTIONS = np.random.default_rng(8).normal(size=(len(BOX.tets), 3))
 RUBBER = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
 STILL = {"gravity": (0.0, 0.0, 0.0)}
 
@@ -81,6 +83,7 @@ def whole_scene():
         sp.obstacles.Sphere(
             center=(0, 9, 0), radius=0.3, motion=sp.Keyframes([0, 1], rotations=[[0, 0, 0], [1, 2, 3]])
         ),
+        sp.HalfSpace(point=(0, -5, 0), normal=np.array([0.3, 1.0, 0.7]) / 3e-7, name="slope"),
         sp.obstacles.Capsule(start=(0, 0, 9), end=(0.1, 0.2, 9.3), radius=0.2),
         sp.obstacles.Cylinder(start=(0, 0, -9), end=(1, 0.2, -9), radius=0.7),
         sp.obstacles.Torus(center=(0, -9, 0)),
@@ -94,8 +97,8 @@ def whole_scene():
         sp.BodyForce((0, 0, 0.1), body="bar"),
         sp.Spring(("bar", 0), (None, (0, 1, 0)), 10.0),
         sp.Wind("bar", (1, 0, 0), drag=0.4),
-        sp.Muscle("hat", 1e3, (1, 0, 0), 0.5, force_length=([0.5, 1.0], [0.0, 1.0])),
-        sp.Growth("hat", sp.Curve([0, 1], [1.0, 1.1]), direction=(0, 1, 0)),
+        sp.Muscle("hat", 1e3, DIRECTIONS, 0.5, force_length=([0.5, 1.0], [0.0, 1.0])),
+        sp.Growth("hat", sp.Curve([0, 1], [1.0, 1.1]), direction=(0.3, 1, 0.2)),
         sp.Force("bar", [1, 2], (0, 0.1, 0), name="push"),
         sp.SoftTarget("hat", region, 10.0, motion=sp.Keyframes([0, 1], [[0, 0, 0], [0, 0.1, 0]])),
     ]
@@ -149,7 +152,7 @@ def test_every_material_reads_back_to_the_last_bit(tmp_path, kind):
         "MooneyRivlin": {"c10": 1e4, "c01": 2e3, "bulk": 1e6},
         "Yeoh": {"c10": 1e4, "c20": 1e2, "bulk": 1e6},
         "Ogden": {"mu": [1e4, -1e3], "alpha": [2.0, -2.0], "bulk": 1e6},
-        "HolzapfelGasserOgden": {"c10": 1e4, "k1": 1e4, "k2": 1.0, "directions": [(1, 0, 0)], "bulk": 1e6},
+        "HolzapfelGasserOgden": {"c10": 1e4, "k1": 1e4, "k2": 1.0, "directions": DIRECTIONS[:, None], "bulk": 1e6},
         "EnergyMaterial": {"psi": "c * (I1 - 3 - 2 * log(J))", "parameters": {"c": 1e4}, "bulk": 1e5},
         "J2Plastic": {"youngs": 1e5, "poisson": 0.3, "yield_stress": 1e3},
         "Viscoelastic": {"material": RUBBER, "prony": [(0.5, 0.1)]},
@@ -163,6 +166,14 @@ def test_every_material_reads_back_to_the_last_bit(tmp_path, kind):
     np.testing.assert_allclose(found.energy_density(F), material.energy_density(F), rtol=1e-12)
     np.testing.assert_allclose(found.first_piola(F), material.first_piola(F), rtol=1e-9, atol=1e-6)
     assert [found.youngs, found.poisson] == pytest.approx([material.youngs, material.poisson], rel=1e-10)
+
+
+def test_unit_vectors_stay_the_same_to_the_last_bit():
+    rng = np.random.default_rng(3)
+    vectors = rng.normal(size=(20_000, 3)) * 10.0 ** rng.integers(-200, 200, (20_000, 1))
+    once = unit_vectors(vectors)
+    np.testing.assert_allclose(np.linalg.norm(once, axis=1), 1.0, atol=1e-15)
+    np.testing.assert_array_equal(unit_vectors(once), once)
 
 
 def test_regions_and_quadratic_tets_read_back(tmp_path):

@@ -40,13 +40,19 @@ def finite_vector(value: object, what: str, *, nonzero: bool = False) -> NDArray
 
 def unit_vector(value: object, what: str) -> NDArray[np.float64]:
     """The direction (3,) of a vector of any length; raise where it is not three finite numbers, or has no length."""
-    vector = finite_vector(value, what, nonzero=True)
-    largest = np.abs(vector).max()
-    if not 1e-100 < largest < 1e100:  # squares would not be numbers
-        vector = vector / largest
-    length = np.linalg.norm(vector)
-    # A unit vector stays the same to the last bit, so that a recorded one reads back equal.
-    return vector if abs(length - 1.0) <= 4e-16 else finite_vector(vector / length, what)
+    return finite_vector(unit_vectors(finite_vector(value, what, nonzero=True)), what)
+
+
+def unit_vectors(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The directions of vectors (..., 3) of any length above zero.
+
+    A unit vector stays the same to the last bit, so that a recorded one reads back equal.
+    """
+    largest = np.abs(vectors).max(axis=-1, keepdims=True)
+    # Beyond these, squares would not be numbers.
+    scaled = np.where((largest > 1e-100) & (largest < 1e100), vectors, vectors / largest)
+    lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    return np.where(np.abs(lengths - 1.0) <= 1e-15, scaled, scaled / lengths)
 
 
 def number(value: object, what: str) -> float:

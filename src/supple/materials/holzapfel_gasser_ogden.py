@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.kinds.checks import unit_vectors
 from supple.kinds.forms import NON_NEGATIVE, POSITIVE, ListOf, Number, NumberPerTet
 from supple.materials.by_law import ByLaw
 from supple.materials.laws.fibres import FIBRES
@@ -60,7 +61,7 @@ class HolzapfelGasserOgden(ByLaw):
         lengths = np.linalg.norm(directions, axis=-1)
         if not (np.isfinite(lengths) & (lengths > 0.0)).all():
             raise SceneError(f"{name}: a direction is zero or not finite; give vectors of a length above zero")
-        object.__setattr__(self, "directions", directions / lengths[..., None])
+        object.__setattr__(self, "directions", unit_vectors(directions))
 
     def rest_moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Of the ground, without fibres."""

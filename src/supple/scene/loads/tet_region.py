@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.checks import float_array
+from supple.kinds.checks import float_array, unit_vectors
 from supple.kinds.forms import Form
 from supple.scene.body import PlacedBody
 from supple.scene.selection import InBox
@@ -51,8 +51,7 @@ class Directions(Form):
         largest = np.abs(given).max(axis=-1, keepdims=True)
         if not (np.isfinite(largest).all() and (largest > 0.0).all()):
             raise SceneError(f"{what} is zero or not finite; give vectors of any length above zero")
-        given = given / largest
-        return given / np.linalg.norm(given, axis=-1, keepdims=True)
+        return unit_vectors(given)
 
 
 def directions_of(direction: ArrayLike, rows: NDArray[np.int64], label: str) -> NDArray[np.float64]:
