@@ -28,8 +28,6 @@ FRICTION = 0.8
 GRIPPED, LIFTED, END = 0.5, 1.5, 4.5
 LARGEST_GRIP, LARGEST_LIFT = 12.0, 60.0
 
-PALM = shapes.box_surface((0.18, 0.02, 0.04), (1, 1, 1))
-
 
 def scene() -> Scene:
     """Fingers of 20 x 60 x 20 mm, welded to carriers that slide on the palm, which slides up and down."""
