@@ -91,7 +91,7 @@ def draw_live(tab, page) -> None:
     controller.simulation.send(Play())
     settle(2.0)
     controller.simulation.send(Pause())
-    show("live_stitches.png", surface="wireframe", contacts=True)
+    show("live_stitches.png", surface="wireframe", color_by="body", contacts=True)
 
 
 def main() -> None:
