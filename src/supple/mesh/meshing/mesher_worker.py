@@ -26,6 +26,11 @@ FLAT = 0.05
 # Flat tets come by chance: another mesh of nearly the same edges has others.
 OTHER_EDGE, OTHER_EDGES = 0.98, 2
 
+# Of TetGen: a mesh with the triangles as they are, of whatever tets.
+SHAPELESS = {"quality": None, "min_dihedral": None, "keep_surface": True, "max_volume": None, "points": None}
+# Of its volume: a component that faces inward, with more of it in others, is a cavity.
+WITHIN = 0.999
+
 
 def main(folder: Path) -> int:
     """Run the job in `folder`; returns 0, or 1 where `answer.json` has the error, or as "disk" that of a file."""
@@ -42,6 +47,7 @@ def main(folder: Path) -> int:
             "tetgen": _run_tetgen,
             "ftetwild": _run_ftetwild,
             "meshfix": _run_meshfix,
+            "union": _run_union,
             "decimation": _run_decimation,
         }
         if job["mesher"] == "mmg":
@@ -85,8 +91,7 @@ def _run_mmg(
     from mmgpy import MmgMesh3D  # pyright: ignore[reportMissingImports]
 
     if elements.shape[1] == 3:
-        shapeless = {"quality": None, "min_dihedral": None, "keep_surface": True, "max_volume": None, "points": None}
-        vertices, elements, _ = _run_tetgen(vertices, elements, shapeless, notes)
+        vertices, elements, _ = _run_tetgen(vertices, elements, SHAPELESS, notes)
 
     def run(edge: float) -> tuple[Any, Any, Any]:
         # nofem: tets may have two sides on the surface. Otherwise thin walls get two layers, and ten times the time.
@@ -263,6 +268,42 @@ def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: 
         labels.append(np.full(len(faces[-1]), float(k)))
         start += len(points[-1])
     return np.concatenate(points), np.concatenate(faces), np.concatenate(labels)
+
+
+def _run_union(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
+    """The boundary of what the closed components of a surface of size 1 enclose together."""
+    import manifold3d
+    import numpy as np
+
+    def manifold(points: Any, faces: Any) -> Any:
+        made = manifold3d.Manifold(
+            manifold3d.Mesh64(np.array(points, order="C"), np.array(faces, np.uint64, order="C"))
+        )
+        if made.status() != manifold3d.Error.NoError:
+            raise RuntimeError(f"{made.status()}")
+        return made
+
+    def together(solids: list[Any]) -> Any:
+        return manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
+
+    solids, inward, cavities = [], [], []
+    for component in manifold(vertices, triangles).decompose():
+        if component.volume() > 0.0:
+            solids.append(component)
+        else:
+            mesh = component.to_mesh64()
+            inward.append(manifold(mesh.vert_properties[:, :3], mesh.tri_verts[:, ::-1]))
+    union = together(solids)
+    for component in inward:
+        # What faces inward within others is a cavity, what sticks out of them is a solid with the wrong winding.
+        alone = (union ^ component).volume() < WITHIN * component.volume()
+        (solids if alone else cavities).append(component)
+    union = together(solids) - together(cavities)
+    tolerance = options["tolerance"]
+    # Cuts leave triangles that are shorter than round-off; without them, others may cross.
+    mesh = (union.set_tolerance(tolerance).simplify(tolerance) if tolerance else union).to_mesh64()
+    faces = np.array(mesh.tri_verts, np.int32)
+    return np.array(mesh.vert_properties)[:, :3], faces, np.ones(len(faces))
 
 
 def _run_decimation(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError, MeshingError
+from supple.mesh.meshing.sizes import MOST_TIMES
 from supple.mesh.meshing.spelling import option
 from supple.mesh.primitives.isosurface_stuffing import MEAN_EDGE, stuff
 from supple.mesh.surface import SurfaceMesh
@@ -17,7 +18,13 @@ from supple.numerics.geometry.winding_numbers import winding_numbers
 
 logger = logging.getLogger(__name__)
 
-_MOST_TRIES = 6
+_MOST_TRIES = 8
+# The number of tets falls with so great a power of the edge.
+_SLOPE = 2.7
+# Where walls are lost, the next lattice has edges of this share, and about twice the tets.
+_FINER = 0.75
+# Of cuts: to .4 % of an edge. Each one costs a winding number.
+_BISECTIONS = 8
 # Of moving the boundary: a ball of 24 tets lacks 3, .5 and .1 % of its volume after one, two and three.
 _ROUNDS = 3
 _TOLERANCE = 0.1
@@ -54,33 +61,45 @@ def stuffed(surface: SurfaceMesh, tets: int | None, edge: float | None) -> tuple
     volume = float((inside(middle + half * grid) < 0.0).mean() * np.prod(2.0 * half))
     if volume < 1e-6 * float((high - low).max()) ** 3:
         raise MeshingError("the surface encloses nothing: close its holes, or give it a thickness")
-    wanted = tets or 0
-    length = edge or MEAN_EDGE * (12.0 * volume / wanted) ** (1.0 / 3.0)
-    shortest = 0.5 * length  # shorter ones make another mesh than that which is asked for, and take very long
-    best: TetMesh | None = None
-    for _ in range(_MOST_TRIES if wanted else 1):
-        if length < shortest:
-            break
+    # Shorter edges make another mesh than that which is asked for, and take very long.
+    length = edge or MEAN_EDGE * (12.0 * volume / (tets or 1)) ** (1.0 / 3.0)
+    best, made, longest = None, None, np.inf
+    for _ in range(_MOST_TRIES if tets else 1):
         try:
-            made = stuff("stuffing", inside, (middle - half, middle + half), length)
+            made = stuff("stuffing", inside, (middle - half, middle + half), length, _BISECTIONS)
         except MeshError as error:
             if "no tet is left" not in str(error):
                 raise MeshingError(str(error).replace("make edge_length longer", "ask for fewer tets")) from None
-            length *= 0.6
+            made = None
+        wanted = tets or 0
+        if made is None or not _keeps_walls(made, volume, surface):
+            longest = length
+            if made is not None and len(made.tets) > 0.5 * MOST_TIMES * wanted:
+                break
+            length *= _FINER
             continue
         if best is None or abs(len(made.tets) - wanted) < abs(len(best.tets) - wanted):
             best = made
-        if abs(len(made.tets) - wanted) <= _TOLERANCE * wanted:
+        following = min(length * (len(made.tets) / max(wanted, 1)) ** (1.0 / _SLOPE), _FINER**0.5 * longest)
+        if abs(len(made.tets) - wanted) <= _TOLERANCE * wanted or length <= following < length / _FINER**0.25:
             break
-        length *= (len(made.tets) / max(wanted, 1)) ** (1.0 / 2.7)
-    missing = np.inf if best is None else (volume - best.volume) / best.surface.compact().area
-    if best is None or missing > _FARTHEST * length or best.components.count > surface.components.count:
-        more = 8 * max(wanted, 1 if best is None else len(best.tets))
-        remedy = f"ask for more tets ({option('tets', more)}), or clean the surface ({option('repair', True)})"
+        length = following
+    if best is None:
+        more = 2 * max(tets or 0, 1 if made is None else len(made.tets))
         raise MeshingError(
-            f"the surface is filled with a lattice, and its walls are thinner than edges, {length:.3g} m; {remedy}"
+            f"the surface is filled with a lattice, and its walls are thinner than edges, {length:.3g} m; "
+            f"ask for more tets ({option('tets', more)}), or clean the surface ({option('repair', True)})"
         )
+    if tets and len(best.tets) > 1.25 * tets and longest < np.inf:
+        logger.warning("%s tets instead of %s: longer ones lose walls", f"{len(best.tets):,}", f"{tets:,}")
     return as_large(best, volume), volume
+
+
+def _keeps_walls(mesh: TetMesh, volume: float, surface: SurfaceMesh) -> bool:
+    """Whether a lattice lacks so little of the surface's volume [m^3] that it has lost no wall."""
+    missing = (volume - mesh.volume) / mesh.surface.compact().area
+    edge = MEAN_EDGE * (12.0 * mesh.volume / len(mesh.tets)) ** (1.0 / 3.0)
+    return missing <= _FARTHEST * edge and mesh.components.count <= surface.components.count
 
 
 def as_large(mesh: TetMesh, volume: float) -> TetMesh:

@@ -16,6 +16,7 @@ from supple.mesh.meshing.repair import RepairReport, repair_surface
 from supple.mesh.meshing.sizes import TETS_OF_BOUND, refuse_too_many, volume_of_edge, warn_of_many
 from supple.mesh.meshing.spelling import option
 from supple.mesh.meshing.surface_fit import distance
+from supple.mesh.meshing.union import united
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 
@@ -33,7 +34,8 @@ class MeshingReport:
     ----------
     mesher : "tetgen", "mmg" (which remeshes TetGen's tets), "stuffing" or "ftetwild"; seconds : that it took
     repair : what was repaired first; None where nothing was
-    fine, filled : the surface before it was remeshed, and the boundary of the tets; the same one where it was not
+    fine, filled : the surface, or the union of its components, before it was remeshed, and the boundary of the tets;
+        the same one where it was not
     distance : Hausdorff distance between both [m]
     """
 
@@ -67,12 +69,12 @@ def tetrahedralize(
     """Fill a surface with tets.
 
     For a number of tets or a length of edges, TetGen fills a clean surface and Mmg remeshes this, with the boundary:
-    sharp edges stay, the boundary moves by about a tenth of an edge and is fitted so that the volume stays. A surface
-    that is not clean is filled by isosurface stuffing, which rounds sharp edges at the size of a tet. The log has the
-    distance between both surfaces; draw the original one as the skin of the body. Triangles that disagree with their
-    neighbours, and components that face inward, are turned first. Cavities (closed shells inside others, facing inward)
-    stay empty. All meshers run in child processes: a crash, an endless loop or a lack of memory there does not affect
-    this process.
+    sharp edges stay, the boundary moves by about a tenth of an edge and is fitted so that the volume stays. Closed
+    components that overlap are united first. Any other surface that is not clean is filled by isosurface stuffing,
+    which rounds sharp edges at the size of a tet. The log has the distance between both surfaces; draw the original one
+    as the skin of the body. Triangles that disagree with their neighbours, and components that face inward, are turned
+    first. Cavities (closed shells inside others, facing inward) stay empty. All meshers run in child processes: a
+    crash, an endless loop or a lack of memory there does not affect this process.
 
     Parameters
     ----------
@@ -84,7 +86,8 @@ def tetrahedralize(
         Mean length of edges.
     tets : int, optional
         Number of tets, reached within 10 % where the details of the surface allow it; otherwise the log has a warning.
-        Walls that are thinner than an eighth of such tets' edges get more tets, with a warning, too.
+        Walls that are thinner than an eighth of such tets' edges, or in a lattice than these, get more tets, with a
+        warning, too.
         Without any size: the coarsest mesh of TetGen, or about 2,000 where this has more.
     quality : float, optional
         TetGen's upper bound on circumradius over shortest edge of each tet [-], above 1, for `max_volume`,
@@ -158,6 +161,8 @@ def tetrahedralize_reported(
             logger.info("MeshFix cannot repair it without losing parts; meshing the surface without repair")
         else:
             surface, report = facing_outward(fixed)
+    if mesher == "auto" and not keep_surface:
+        surface, report = united(surface, report, limits)
     chosen = choose(mesher, report, repair, keep_surface)
     if chosen != "tetgen" or edge is not None or tets is not None:
         check_tetgen_options(chosen, quality, min_dihedral, keep_surface)

@@ -27,11 +27,16 @@ SNAP_LONG, SNAP_SHORT = 0.24999, 0.41189
 MEAN_EDGE = (4.0 * np.sqrt(0.75) + 3.0) / 7.0
 # Corners 0, 1 of a tet span a long edge of one half of the lattice, corners 2, 3 one of the other half.
 PARTNER = np.array([1, 0, 3, 2])
+# Of cuts, which halve what is left of an edge.
 BISECTIONS = 40
 
 
 def stuff(
-    owner: str, inside: Implicit, bounds: tuple[NDArray[np.float64], NDArray[np.float64]], edge_length: float
+    owner: str,
+    inside: Implicit,
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
+    edge_length: float,
+    bisections: int = BISECTIONS,
 ) -> TetMesh:
     """Tets that fill the region where `inside` is negative.
 
@@ -41,6 +46,7 @@ def stuff(
     inside : function of points (k, 3) -> (k,), negative inside
     bounds : lowest and highest corner of a box around the region [m]; a lattice point lies in its middle
     edge_length : mean edge [m]
+    bisections : of each edge that the surface cuts
 
     Raises
     ------
@@ -59,7 +65,7 @@ def stuff(
     if len(tets) == 0:
         raise nothing
     edges, of_tet, is_long = _edges(tets, len(points))
-    cuts, fractions = _cuts(inside, points, values, edges)
+    cuts, fractions = _cuts(inside, points, values, edges, bisections)
     values = values.copy()
     points, cut_is_left = _snap(points, values, edges, is_long, cuts, fractions)
     cut_row = np.full(len(edges), -1)
@@ -106,7 +112,11 @@ def _edges(tets: NDArray[np.int64], n_points: int) -> tuple[NDArray[np.int64], N
 
 
 def _cuts(
-    inside: Implicit, points: NDArray[np.float64], values: NDArray[np.float64], edges: NDArray[np.int64]
+    inside: Implicit,
+    points: NDArray[np.float64],
+    values: NDArray[np.float64],
+    edges: NDArray[np.int64],
+    bisections: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where the surface cuts each edge: points (e, 3), and fractions (e,) from the first end; NaN where it does not."""
     first, second = edges.T
@@ -115,7 +125,7 @@ def _cuts(
     outer = first[cut] + second[cut] - inner
     a, b = points[inner], points[outer]
     low, high = np.zeros(len(cut)), np.ones(len(cut))
-    for _ in range(BISECTIONS):
+    for _ in range(bisections):
         middle = 0.5 * (low + high)
         is_inside = inside(a + middle[:, None] * (b - a)) < 0.0
         low, high = np.where(is_inside, middle, low), np.where(is_inside, high, middle)
