@@ -158,7 +158,8 @@ def test_surfaces_with_faults_are_filled(mesher, caplog: pytest.LogCaptureFixtur
     if mesher == "ftetwild":
         pytest.importorskip("pytetwild")
     ball = sphere_surface(radius=0.5, edge_length=0.35)
-    surface = joined(ball, moved(ball, 0.5, 0.01, 0.02))
+    with_hole = SurfaceMesh(ball.vertices, ball.triangles[1:])
+    surface = joined(with_hole, moved(ball, 0.5, 0.01, 0.02))
     mesh, report = tetrahedralize_reported(surface, max_volume=0.02, mesher=mesher)
     assert report.mesher == ("stuffing" if mesher == "auto" else "ftetwild")
     assert ("filling it with a lattice, which rounds sharp edges" in caplog.text) == (mesher == "auto")
@@ -373,9 +374,9 @@ def test_a_sheet_encloses_nothing(mesher) -> None:
         fill(sheet, tets=100, mesher=mesher)
 
 
-def crossed_shells() -> SurfaceMesh:
+def crossed_shells(edge: float = 0.2) -> SurfaceMesh:
     """A hollow ball with a wall of 2 cm, and a bar that crosses it."""
-    ball = sphere_surface(radius=0.5, edge_length=0.2)
+    ball = sphere_surface(radius=0.5, edge_length=edge)
     bar = box_surface((0.3, 0.05, 0.02), (3, 1, 1))
     return joined(ball, ball.transformed(0.96).flipped(), moved(bar, 0.5, 0.0, 0.0))
 
@@ -385,6 +386,27 @@ def test_a_lattice_that_is_coarser_than_walls_says_so(tets) -> None:
     """Not after minutes, with finer and finer lattices, nor for lack of memory."""
     with pytest.raises(MeshingError, match=r"its walls are thinner than edges, .* m; ask for more tets \(tets=\d+\)"):
         fill(crossed_shells(), tets=tets, mesher="stuffing")
+
+
+def test_thin_walls_that_cross_are_united() -> None:
+    """A cavity and a bar through its wall, at the number of tets and with the volume of their union."""
+    surface = crossed_shells(0.1)
+    mesh, report = tetrahedralize_reported(surface, tets=4000)
+    assert report.mesher == "mmg"
+    assert len(mesh.tets) == pytest.approx(4000, rel=0.15)
+    assert mesh.components.count == 1
+    wall = (1.0 - 0.96**3) * sphere_surface(radius=0.5, edge_length=0.1).volume
+    assert mesh.volume == pytest.approx(wall + 0.28 * 0.05 * 0.02, rel=0.02)
+
+
+def test_a_component_that_faces_inward_is_a_cavity_within_others_and_a_solid_outside() -> None:
+    ball = sphere_surface(radius=0.5, edge_length=0.2)
+    inner, outer = ball.transformed(0.4).flipped(), moved(ball, 0.6, 0.02, 0.01).flipped()
+    third = moved(ball, -0.6, 0.02, 0.01)
+    mesh, report = tetrahedralize_reported(joined(ball, inner, outer, third), tets=1500)
+    assert report.mesher == "mmg"
+    two = tetrahedralize_reported(joined(ball, moved(ball, 0.6, 0.02, 0.01), third), tets=1500)[0]
+    assert mesh.volume == pytest.approx(two.volume - 0.4**3 * ball.volume, rel=0.01)
 
 
 @pytest.mark.slow  # half a minute

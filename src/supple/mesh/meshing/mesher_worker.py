@@ -28,7 +28,7 @@ OTHER_EDGE, OTHER_EDGES = 0.98, 2
 
 # Of TetGen: a mesh with the triangles as they are, of whatever tets.
 SHAPELESS = {"quality": None, "min_dihedral": None, "keep_surface": True, "max_volume": None, "points": None}
-# Of its volume: a component that faces inward, with more of it in others, is a cavity.
+# Of its volume: a component that faces inward, with more of it in another, is a cavity of this.
 WITHIN = 0.999
 
 
@@ -271,7 +271,10 @@ def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: 
 
 
 def _run_union(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
-    """The boundary of what the closed components of a surface of size 1 enclose together."""
+    """The boundary of what the closed components of a surface of size 1 enclose together.
+
+    Those that face inward are cavities of the smallest one around them, or solids where there is none.
+    """
     import manifold3d
     import numpy as np
 
@@ -283,22 +286,23 @@ def _run_union(vertices: Any, triangles: Any, options: dict[str, Any], notes: li
             raise RuntimeError(f"{made.status()}")
         return made
 
-    def together(solids: list[Any]) -> Any:
-        return manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
-
-    solids, inward, cavities = [], [], []
+    solids, inward = [], []
     for component in manifold(vertices, triangles).decompose():
         if component.volume() > 0.0:
             solids.append(component)
         else:
             mesh = component.to_mesh64()
             inward.append(manifold(mesh.vert_properties[:, :3], mesh.tri_verts[:, ::-1]))
-    union = together(solids)
+    outward = list(solids)
     for component in inward:
-        # What faces inward within others is a cavity, what sticks out of them is a solid with the wrong winding.
-        alone = (union ^ component).volume() < WITHIN * component.volume()
-        (solids if alone else cavities).append(component)
-    union = together(solids) - together(cavities)
+        shares = [(solid ^ component).volume() / component.volume() for solid in outward]
+        around = [k for k, share in enumerate(shares) if share > WITHIN]
+        if around:
+            smallest = min(around, key=lambda k: outward[k].volume())
+            solids[smallest] -= component
+        else:
+            solids.append(component)
+    union = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
     tolerance = options["tolerance"]
     # Cuts leave triangles that are shorter than round-off; without them, others may cross.
     mesh = (union.set_tolerance(tolerance).simplify(tolerance) if tolerance else union).to_mesh64()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError, MeshingError
-from supple.mesh.meshing.sizes import MOST_TIMES
+from supple.mesh.meshing.child_process import DEFAULT_TETS
 from supple.mesh.meshing.spelling import option
 from supple.mesh.primitives.isosurface_stuffing import MEAN_EDGE, stuff
 from supple.mesh.surface import SurfaceMesh
@@ -23,6 +23,8 @@ _MOST_TRIES = 8
 _SLOPE = 2.7
 # Where walls are lost, the next lattice has edges of this share, and about twice the tets.
 _FINER = 0.75
+# Of a wish for few tets, for thin walls: more of them take long to find.
+_MORE = 5
 # Of cuts: to .4 % of an edge. Each one costs a winding number.
 _BISECTIONS = 8
 # Of moving the boundary: a ball of 24 tets lacks 3, .5 and .1 % of its volume after one, two and three.
@@ -74,7 +76,7 @@ def stuffed(surface: SurfaceMesh, tets: int | None, edge: float | None) -> tuple
         wanted = tets or 0
         if made is None or not _keeps_walls(made, volume, surface):
             longest = length
-            if made is not None and len(made.tets) > 0.5 * MOST_TIMES * wanted:
+            if made is not None and len(made.tets) > max(wanted, _MORE * min(wanted, DEFAULT_TETS)):
                 break
             length *= _FINER
             continue
