@@ -126,12 +126,12 @@ def test_file_info_recording_check_and_page_know_it(tmp_path, capsys):
     assert report.ok, report.failures
     assert 0.0 <= report["joints"].worst < 1e-6
     with sp.read_recording(recording) as read:
-        (drawn,) = read.joints
+        (drawn,), (recorded_joint,) = read.joints, read.scene.joints
         model = model_of_recording(read)
         lines = [joint_lines(drawn, 1.0)]
         segments = joint_segments(moment_of_frame(model, read[-1]), lines)
         turned = read[-1].poses["bar"].rotation @ [0, 1, 0]
-    assert drawn.kind == "universal"
+    assert type(recorded_joint) is sp.UniversalJoint
     # The axis that the bar has is drawn where the bar has it now; the other one stays.
     ways = segments[:, 1] - segments[:, 0]
     directions = ways / np.linalg.norm(ways, axis=1)[:, None]
