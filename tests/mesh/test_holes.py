@@ -24,7 +24,7 @@ def without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         importlib.util,
         "find_spec",
-        lambda name, *rest: None if name in ("pymeshfix", "pytetwild") else find(name, *rest),
+        lambda name, *rest: None if name == "pymeshfix" else find(name, *rest),
     )
 
 

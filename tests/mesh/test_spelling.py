@@ -14,14 +14,14 @@ from supple.mesh.surface import SurfaceMesh
 @pytest.mark.parametrize(
     ("writer", "expected"),
     [
-        ("python", ["repair=True", "tets=500", 'mesher="ftetwild"', "max_volume=0.0001", "time_limit"]),
-        ("yaml", ["repair: true", "tets: 500", "mesher: ftetwild", "max_volume: 0.0001", "time_limit"]),
-        ("shell", ["--repair", "--tets 500", "--mesher ftetwild", "--max-volume 0.0001", "--time-limit"]),
+        ("python", ["repair=True", "tets=500", 'mesher="stuffing"', "max_volume=0.0001", "time_limit"]),
+        ("yaml", ["repair: true", "tets: 500", "mesher: stuffing", "max_volume: 0.0001", "time_limit"]),
+        ("shell", ["--repair", "--tets 500", "--mesher stuffing", "--max-volume 0.0001", "--time-limit"]),
     ],
 )
 def test_options(writer, expected):
     with spelled_for(writer):
-        given = {"repair": True, "tets": 500, "mesher": "ftetwild", "max_volume": 1e-4, "time_limit": None}
+        given = {"repair": True, "tets": 500, "mesher": "stuffing", "max_volume": 1e-4, "time_limit": None}
         assert [option(name, value) for name, value in given.items()] == expected
     assert option("repair", True) == "repair=True"
 

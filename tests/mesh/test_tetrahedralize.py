@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from supple.errors import MeshingError
-from supple.mesh.meshing import filling, mesher_worker, meshers
+from supple.mesh.meshing import mesher_worker
 from supple.mesh.meshing.child_process import Limits, MesherFailure
 from supple.mesh.meshing.meshers import mesh_with_tetgen
 from supple.mesh.meshing.tetrahedralize import tetrahedralize as fill
@@ -139,12 +139,6 @@ def test_surfaces_with_faults_are_errors_with_place_and_remedy(case: str) -> Non
     assert "\n" not in str(error.value)
 
 
-def test_the_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(filling, "ftetwild_installed", lambda: False)
-    with pytest.raises(MeshingError, match=r'pip install "supple\[dirty\]"'):
-        fill(SPHERE, mesher="ftetwild")
-
-
 def test_triangles_that_disagree_are_turned_first(caplog: pytest.LogCaptureFixture) -> None:
     mixed = SurfaceMesh(SPHERE.vertices, np.vstack([SPHERE.triangles[:5, ::-1], SPHERE.triangles[5:]]))
     mesh, report = tetrahedralize_reported(mixed)
@@ -153,28 +147,17 @@ def test_triangles_that_disagree_are_turned_first(caplog: pytest.LogCaptureFixtu
     assert "turned 5 triangles to agree with their neighbours" in caplog.text
 
 
-@pytest.mark.parametrize("mesher", ["auto", "ftetwild"])
-def test_surfaces_with_faults_are_filled(mesher, caplog: pytest.LogCaptureFixture) -> None:
-    if mesher == "ftetwild":
-        pytest.importorskip("pytetwild")
+def test_surfaces_with_faults_are_filled(caplog: pytest.LogCaptureFixture) -> None:
     ball = sphere_surface(radius=0.5, edge_length=0.35)
     with_hole = SurfaceMesh(ball.vertices, ball.triangles[1:])
     surface = joined(with_hole, moved(ball, 0.5, 0.01, 0.02))
-    mesh, report = tetrahedralize_reported(surface, max_volume=0.02, mesher=mesher)
-    assert report.mesher == ("stuffing" if mesher == "auto" else "ftetwild")
-    assert ("filling it with a lattice, which rounds sharp edges" in caplog.text) == (mesher == "auto")
+    mesh, report = tetrahedralize_reported(surface, max_volume=0.02)
+    assert report.mesher == "stuffing"
+    assert "filling it with a lattice, which rounds sharp edges" in caplog.text
     assert (mesh.volumes > 0).all()
     assert mesh.volumes.max() <= 0.02
     # A union: more than one ball, less than two.
     assert 1.2 * ball.volume < mesh.volume < 1.9 * ball.volume
-
-
-@pytest.mark.parametrize("options", [{"min_dihedral": 10.0}, {"keep_surface": True}])
-def test_options_without_support_in_ftetwild_are_errors(options: dict) -> None:
-    if not meshers.ftetwild_installed():
-        pytest.skip("needs pytetwild")
-    with pytest.raises(MeshingError, match="ftetwild has no"):
-        fill(SPHERE, mesher="ftetwild", **options)
 
 
 @pytest.mark.parametrize(
@@ -365,13 +348,10 @@ def test_two_threads_can_mesh_at_once() -> None:
     np.testing.assert_array_equal(meshes[0].tets, meshes[1].tets)
 
 
-@pytest.mark.parametrize("mesher", ["auto", "ftetwild"])
-def test_a_sheet_encloses_nothing(mesher) -> None:
-    if mesher == "ftetwild":
-        pytest.importorskip("pytetwild")
+def test_a_sheet_encloses_nothing() -> None:
     sheet = SurfaceMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    with pytest.raises(MeshingError, match=r"found no volume inside of the surface|encloses nothing"):
-        fill(sheet, tets=100, mesher=mesher)
+    with pytest.raises(MeshingError, match="encloses nothing"):
+        fill(sheet, tets=100)
 
 
 def crossed_shells(edge: float = 0.2) -> SurfaceMesh:
@@ -407,14 +387,3 @@ def test_a_component_that_faces_inward_is_a_cavity_within_others_and_a_solid_out
     assert report.mesher == "mmg"
     two = tetrahedralize_reported(joined(ball, moved(ball, 0.6, 0.02, 0.01), third), tets=1500)[0]
     assert mesh.volume == pytest.approx(two.volume - 0.4**3 * ball.volume, rel=0.01)
-
-
-@pytest.mark.slow  # half a minute
-def test_ftetwild_fills_thin_walls_that_cross() -> None:
-    pytest.importorskip("pytetwild")
-    surface = crossed_shells()
-    mesh = fill(surface, tets=4000, mesher="ftetwild")
-    assert len(mesh.tets) == pytest.approx(4000, rel=0.15)
-    assert mesh.components.count == 1
-    wall = (1.0 - 0.96**3) * sphere_surface(radius=0.5, edge_length=0.2).volume
-    assert mesh.volume == pytest.approx(wall + 0.28 * 0.05 * 0.02, rel=0.02)

@@ -13,13 +13,7 @@ from supple.errors import MeshError, MeshingError
 from supple.mesh.meshing.child_process import DEFAULT_TETS, Limits, MesherFailure, MesherResult
 from supple.mesh.meshing.decimation import decimate_surface
 from supple.mesh.meshing.facing import facing_outward
-from supple.mesh.meshing.meshers import (
-    INSTALL,
-    ftetwild_installed,
-    mesh_with_ftetwild,
-    mesh_with_mmg,
-    mesh_with_tetgen,
-)
+from supple.mesh.meshing.meshers import mesh_with_mmg, mesh_with_tetgen
 from supple.mesh.meshing.sizes import allow, edge_of_volume, tets_of_walls, volume_of_edge
 from supple.mesh.meshing.spelling import option
 from supple.mesh.meshing.stuffing import stuffed
@@ -30,8 +24,8 @@ from supple.mesh.tetmesh import TetMesh
 
 logger = logging.getLogger(__name__)
 
-Mesher = Literal["auto", "tetgen", "stuffing", "ftetwild"]
-Chosen = Literal["tetgen", "stuffing", "ftetwild"]
+Mesher = Literal["auto", "tetgen", "stuffing"]
+Chosen = Literal["tetgen", "stuffing"]
 
 # Of the volume: what is more is said. TetGen's facets are planar to 0.1 degrees; Mmg's are coarser, and fitted.
 VOLUME_TOLERANCE = 0.02
@@ -81,8 +75,6 @@ class Filling:
         """
         if mesher == "stuffing":
             return mesher, self._by_stuffing()
-        if mesher == "ftetwild":
-            return mesher, self._by_ftetwild()
         tets, bound = self.tets, self.max_volume
         if self.max_volume is self.edge is tets is None and not self.keep_surface:
             if TETS_OF_TRIANGLE * len(self.surface.triangles) <= DEFAULT_TETS:
@@ -122,15 +114,6 @@ class Filling:
         mesh, volume = stuffed(self.surface, self.tets or (DEFAULT_TETS if edge is None else None), edge)
         _say_volume(mesh.volume, volume)
         return mesh
-
-    def _by_ftetwild(self) -> TetMesh:
-        bound = self.max_volume
-        if bound is None and self.edge is not None:
-            bound = 2.0 * volume_of_edge(self.edge)
-        elif bound is None:
-            bound = 2.0 * max(self.enclosed, 1e-3 * self._box) / (self.tets or DEFAULT_TETS)
-        mesh = _used("ftetwild", mesh_with_ftetwild(self.surface, bound, self.limits))
-        return mesh if self.max_volume is not None else self._remeshed(self.tets, mesh.surface.compact(), mesh)
 
     def _remeshed(self, tets: int | None, base: SurfaceMesh, start: TetMesh | None = None) -> TetMesh:
         """Of Mmg, from `start`, or from TetGen's tets in `base`."""
@@ -205,12 +188,10 @@ def _say_volume(made: float, volume: float) -> None:
 
 def choose(mesher: Mesher, report: SurfaceReport, repaired: bool, keep_surface: bool) -> Chosen:
     """Which mesher fills a surface first; raises `MeshingError` where none may."""
-    if mesher not in ("auto", "tetgen", "stuffing", "ftetwild"):
-        names = '"auto", "tetgen", "stuffing" or "ftetwild"'
+    if mesher not in ("auto", "tetgen", "stuffing"):
+        names = '"auto", "tetgen" or "stuffing"'
         raise MeshingError(f"{option('mesher')} must be {names}, not {mesher!r}")
-    if mesher == "ftetwild" and not ftetwild_installed():
-        raise MeshingError(f"fTetWild is not installed: {INSTALL}")
-    if mesher in ("stuffing", "ftetwild"):
+    if mesher == "stuffing":
         return mesher
     if report.ok:
         return "tetgen"

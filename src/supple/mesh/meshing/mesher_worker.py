@@ -45,7 +45,6 @@ def main(folder: Path) -> int:
             vertices, elements = surface["vertices"], surface["elements"]
         runs = {
             "tetgen": _run_tetgen,
-            "ftetwild": _run_ftetwild,
             "meshfix": _run_meshfix,
             "union": _run_union,
             "decimation": _run_decimation,
@@ -226,29 +225,6 @@ def _inside(vertices: Any, triangles: Any, points: Any, tets: Any, regions: Any)
         if np.arctan2(det, la * lb * lc + sum(dots)).sum() < np.pi:
             inside[members] = False
     return inside
-
-
-def _run_ftetwild(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
-    import numpy as np
-    from pytetwild.pytetwild import tetrahedralize
-
-    def run(bound: float | None) -> tuple[Any, Any, Any]:
-        # A regular tet of edge a has the volume a^3 / (6 sqrt 2).
-        edge_length = None if bound is None else (6.0 * np.sqrt(2.0) * bound) ** (1.0 / 3.0)
-        points, tets = tetrahedralize(
-            vertices,
-            triangles,
-            edge_length_abs=edge_length,
-            epsilon=options["envelope"],
-            # Without this, tets come out negative.
-            vtk_ordering=True,
-            quiet=True,
-        )
-        return points, tets, np.ones(len(tets))
-
-    # The edge length is a target for the mean: the largest tets have up to twice the volume.
-    max_volume = options["max_volume"]
-    return _below_volume(run, max_volume, None if max_volume is None else 0.5 * max_volume, notes)
 
 
 def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:

@@ -1,21 +1,18 @@
-"""The meshers: TetGen for clean closed surfaces, Mmg for the size of tets, and fTetWild for surfaces with faults.
+"""The meshers: TetGen for clean closed surfaces, and Mmg for the size of tets.
 
 Sources: Dapogny, Dobrzynski, Frey 2014, "Three-dimensional adaptive domain remeshing, implicit domain meshing, and
 applications to free and moving boundary problems"; Si 2015, "TetGen, a Delaunay-based quality tetrahedral mesh
-generator"; Hu et al. 2020, "Fast tetrahedral meshing in the wild".
+generator".
 """
 
 from __future__ import annotations
 
-import importlib.util
-import logging
 import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from supple.errors import MeshingError
 from supple.mesh.meshing.child_process import Limits, MesherResult, run_mesher
 from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
@@ -95,61 +92,3 @@ def edge_of_count(tets: float, area: float, volume: float) -> float:
     a, b = _OF_VOLUME * abs(volume), TETS_OF_SQUARE * area
     roots = np.roots([tets, 0.0, -b, -a])
     return float(np.real(roots[np.abs(np.imag(roots)) < 1e-9 * np.abs(roots)]).max())
-
-
-logger = logging.getLogger(__name__)
-
-INSTALL = 'pip install "supple[dirty]"'
-# How far fTetWild may move the boundary, as a fraction of the bounding box's diagonal.
-ENVELOPE = 1e-3
-
-
-def ftetwild_installed() -> bool:
-    """Whether the package that holds fTetWild (pytetwild) can be found."""
-    return importlib.util.find_spec("pytetwild") is not None
-
-
-def mesh_with_ftetwild(surface: SurfaceMesh, max_volume: float | None, limits: Limits) -> MesherResult:
-    """Tets inside what a surface most plausibly encloses: holes are closed, and overlaps become a union.
-
-    Parameters
-    ----------
-    max_volume : [m^3], or None for edges of a twentieth of the bounding box's diagonal
-
-    Raises
-    ------
-    MeshingError : where fTetWild is not installed, fails or finds no inside.
-    """
-    if not ftetwild_installed():
-        raise MeshingError(f"fTetWild is not installed: {INSTALL}")
-    low, high = surface.bounds
-    middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low)) or 1.0
-    options = {
-        "max_volume": None if max_volume is None else max_volume / size**3,
-        "envelope": ENVELOPE,
-    }
-    unit = (surface.vertices - middle) / size
-    result = run_mesher(
-        "ftetwild", unit, surface.triangles, options, limits, "; fix the surface in a modelling program"
-    )
-    if len(result.elements) == 0:
-        raise MeshingError("fTetWild found no volume inside of the surface; close its holes, or give another surface")
-    result = replace(result, vertices=result.vertices * size + middle)
-    _warn_of_lost_pieces(surface, result, reach=(ENVELOPE + 0.05) * size)
-    return result
-
-
-def _warn_of_lost_pieces(surface: SurfaceMesh, result: MesherResult, reach: float) -> None:
-    """Log which components of the surface have no tet near them."""
-    from scipy.spatial import KDTree
-
-    tree = KDTree(result.vertices)
-    count, labels = surface.components
-    for k in range(count):
-        triangles = surface.triangles[labels == k]
-        distance, _ = tree.query(surface.vertices[np.unique(triangles)], distance_upper_bound=reach)
-        if not np.isfinite(distance).any():
-            where = ", ".join(f"{x:.4g}" for x in surface.vertices[triangles[0, 0]])
-            logger.warning(
-                "fTetWild dropped component %d of %d (%d triangles) at (%s)", k, count, len(triangles), where
-            )

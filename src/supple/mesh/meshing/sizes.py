@@ -17,7 +17,7 @@ logger = logging.getLogger(__name__)
 TETS_OF_BOUND = 2.5
 # TetGen took 15 s for 0.5 million tets, and 177 s for 2.0 million, which it made more than once (two cores, in use).
 MANY = 1_000_000
-# Of TetGen, which needed 314 to 319 for each tet more, up to two million; fTetWild needs more.
+# Of TetGen, which needed 314 to 319 for each tet more, up to two million.
 BYTES_OF_TET = 300.0
 # Walls may be so many times thinner than edges are long: the smallest angle between the sides of a regular prism's tets
 # is then 7 degrees.

@@ -32,7 +32,7 @@ class MeshingReport:
 
     Attributes
     ----------
-    mesher : "tetgen", "mmg" (which remeshes TetGen's tets), "stuffing" or "ftetwild"; seconds : that it took
+    mesher : "tetgen", "mmg" (which remeshes TetGen's tets) or "stuffing"; seconds : that it took
     repair : what was repaired first; None where nothing was
     fine, filled : the surface, or the union of its components, before it was remeshed, and the boundary of the tets;
         the same one where it was not
@@ -97,9 +97,8 @@ def tetrahedralize(
         TetGen's target for the smallest dihedral angle, below 70, as `quality`. Much above 18, TetGen may not end.
     keep_surface : bool
         Change no triangle, and add no vertices on the surface.
-    mesher : "auto", "tetgen", "stuffing" or "ftetwild"
+    mesher : "auto", "tetgen" or "stuffing"
         "auto": TetGen (and Mmg) for a clean surface, stuffing with a warning for any other, and where both fail.
-        "ftetwild" (the extra `dirty`) takes any surface, and keeps thin walls.
     repair : bool
         Repair a surface that is not clean first, see `repair_surface`. Where that fails, it is filled as it is.
     time_limit : float [s]

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 SCENE_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
-EXTRAS = ("pytetwild", "pymeshfix", "pycollada", "loky", "usd-core", "pyvista")
+EXTRAS = ("pymeshfix", "pycollada", "loky", "usd-core", "pyvista")
 
 
 def info(

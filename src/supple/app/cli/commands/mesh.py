@@ -29,7 +29,7 @@ def mesh(
     quality: float = 1.4,
     min_dihedral: float | None = None,
     keep_surface: Annotated[bool, Parameter(negative="")] = False,
-    mesher: Literal["auto", "tetgen", "stuffing", "ftetwild"] = "auto",
+    mesher: Literal["auto", "tetgen", "stuffing"] = "auto",
     repair: Annotated[bool, Parameter(negative="")] = False,
     time_limit: float = 120.0,
     memory_limit: float = 4.0,
@@ -62,7 +62,7 @@ def mesh(
         Change no triangle of the surface.
     mesher
         "auto" uses TetGen and Mmg for a clean surface, and stuffing, which rounds sharp edges, for any other, and where
-        they fail. "ftetwild" is an extra, for thin walls that are not clean.
+        they fail.
     repair
         Repair a surface that is not clean first, and list the changes. Where that fails, it is filled as it is.
     yes

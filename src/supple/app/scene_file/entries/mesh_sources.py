@@ -62,9 +62,7 @@ class MeshFileModel(Model):
     )
     min_dihedral: float | None = Field(default=None, ge=0.0, lt=70.0, description="[degrees]")
     keep_surface: bool | None = Field(default=None, description="true: no new vertices on the surface")
-    mesher: Literal["auto", "tetgen", "stuffing", "ftetwild"] | None = Field(
-        default=None, description="program for the tetrahedra"
-    )
+    mesher: Literal["auto", "tetgen", "stuffing"] | None = Field(default=None, description="program for the tetrahedra")
     repair: bool | None = Field(default=None, description="true: repair the surface first, if it has faults")
     time_limit: Positive | None = Field(default=None, description="of the mesher [s]")
     keep_axes: bool = Field(default=False, description=KEEP_AXES)
