@@ -12,7 +12,7 @@ from supple.app.viewer.engine.scene.lightening import lighter, linearized
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_process import _in_time
 from supple.app.viewer.protocol.live_source import LiveSource
-from supple.mesh.meshing.coarser import coarser
+from supple.mesh.coarser import coarser
 
 JELLY = sp.StableNeoHookean(youngs=3e4, poisson=0.4)
 

@@ -11,7 +11,7 @@ from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.scene.solvers import SOLVERS, kind_of
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.materials.elastic_tets.regions import Regions
-from supple.mesh.meshing.coarser import coarser
+from supple.mesh.coarser import coarser
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.mesh.topology import without_unused
