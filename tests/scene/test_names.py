@@ -21,6 +21,10 @@ RUBBER = sp.StableNeoHookean(youngs=1e4, poisson=0.3)
         (lambda: sp.Body("b", MESH, RUBBER, positon=(0, 0, 0)), "'positon' does not exist; did you mean 'position'"),
         (lambda: sp.Scene([], obstacle=[]), "'obstacle' does not exist; did you mean 'obstacles'"),
         (lambda: sp.HalfSpace(mu=0.5), "'mu' does not exist; did you mean 'friction'"),
+        (
+            lambda: sp.Body("b", MESH, RUBBER, (0, 1, 0)),
+            "Body takes name, mesh, material without a name, not 4 values; write the others as name=value: .*position",
+        ),
     ],
 )
 def test_an_unknown_argument_names_the_right_one(make, words):

@@ -46,7 +46,9 @@ def test_the_solver_that_was_measured_to_be_faster_is_chosen(part, cost):
 
 
 def test_a_stiff_washer_is_simulated_with_implicit_and_the_reason_is_recorded(tmp_path):
-    washer = sp.Body("washer", sp.shapes.box((0.04, 0.003, 0.04), (8, 1, 8)), box(1, 1, 1e6).material, (0, 0.003, 0))
+    washer = sp.Body(
+        "washer", sp.shapes.box((0.04, 0.003, 0.04), (8, 1, 8)), box(1, 1, 1e6).material, position=(0, 0.003, 0)
+    )
     scene, path = sp.Scene([washer], [FLOOR]), tmp_path / "washer.vtkhdf"
     (frame,) = sp.simulate(scene, dt=1 / 60, steps=1, sinks=[sp.Recorder(path)])
     assert frame.solver == sp.Implicit()
@@ -80,12 +82,14 @@ def test_several_soft_bodies_cost_more_iterations():
 
 
 def test_what_only_one_solver_can_simulate_is_left_to_it():
-    rubber = sp.Body("ring", sp.shapes.box(divisions=(1, 1, 1)), sp.NeoHookean(youngs=1e3, poisson=0.3), (0, 2, 0))
+    rubber = sp.Body(
+        "ring", sp.shapes.box(divisions=(1, 1, 1)), sp.NeoHookean(youngs=1e3, poisson=0.3), position=(0, 2, 0)
+    )
     (chosen,) = Auto().choices(system_of(rubber), 1 / 60)
     assert chosen == sp.Implicit()
     assert "material NeoHookean, which XPBD cannot simulate" in chosen.because
     springs = sp.EdgesAndVolume(edge_compliance=1e-9, volume_compliance=0.0, density=1000)
-    hung = sp.Body("springs", sp.shapes.box(divisions=(1, 1, 1)), springs, (0, 2, 0))
+    hung = sp.Body("springs", sp.shapes.box(divisions=(1, 1, 1)), springs, position=(0, 2, 0))
     (chosen,) = Auto().choices(system_of(hung), 1 / 60)
     assert chosen == sp.XPBD(accuracy=0.02)
     with pytest.raises(sp.SolverError, match="XPBD: body 'ring' has the material NeoHookean"):
@@ -94,7 +98,7 @@ def test_what_only_one_solver_can_simulate_is_left_to_it():
 
 def test_a_part_that_stands_on_the_floor_is_simulated_with_the_solver_that_starts_there():
     stiff = box(0.1, 2, 1e6)
-    resting = sp.Body("part", stiff.mesh, stiff.material, (0, 0.05, 0))
+    resting = sp.Body("part", stiff.mesh, stiff.material, position=(0, 0.05, 0))
     (frame,) = sp.simulate(sp.Scene([resting], [FLOOR]), dt=1 / 60, steps=1)
     assert frame.solver == sp.XPBD()
     assert frame.solver.because.startswith("Implicit cannot start: body 'part' touches obstacle")

@@ -17,9 +17,14 @@ class Described(ABCMeta):
     def __call__(cls, *args: Any, **given: Any) -> Any:
         code = cls.__init__.__code__
         known = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]
+        error, unnamed = getattr(cls, "error", SceneError), known[: code.co_argcount - 1]
+        if len(args) > len(unnamed) and not code.co_flags & inspect.CO_VARARGS:
+            raise error(
+                f"{cls.__name__} takes {', '.join(unnamed) or 'nothing'} without a name, not {len(args)} values; "
+                f"write the others as name=value: {', '.join(known[len(unnamed) :])}"
+            )
         for name in given:
             if name not in known:
-                error = getattr(cls, "error", SceneError)
                 raise error(f"{cls.__name__}: the argument {name!r} does not exist; {suggestion(name, known)}")
         return super().__call__(*args, **given)
 

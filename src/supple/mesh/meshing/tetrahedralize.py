@@ -148,8 +148,10 @@ def tetrahedralize_reported(
         )
     limits = Limits(time_limit, None if memory_limit is None else int(memory_limit))
 
-    repaired = None
+    repaired, unites = None, mesher == "auto" and not keep_surface
     surface, report = facing_outward(surface)
+    if unites:
+        surface, report = united(surface, report, limits)
     if repair and not report.ok:
         try:
             fixed, repaired = repair_surface(surface, time_limit=time_limit, memory_limit=limits.memory)
@@ -160,8 +162,8 @@ def tetrahedralize_reported(
             logger.info("MeshFix cannot repair it without losing parts; meshing the surface without repair")
         else:
             surface, report = facing_outward(fixed)
-    if mesher == "auto" and not keep_surface:
-        surface, report = united(surface, report, limits)
+            if unites:
+                surface, report = united(surface, report, limits)
     chosen = choose(mesher, report, repair, keep_surface)
     if chosen != "tetgen" or edge is not None or tets is not None:
         check_tetgen_options(chosen, quality, min_dihedral, keep_surface)

@@ -326,6 +326,11 @@ def _stitch_rows(stitching: Stitching) -> list[tuple[str, str]]:
     return rows
 
 
+def _time_error(largest: float) -> list[tuple[str, str]]:
+    """Only some integrators estimate it."""
+    return [] if largest != largest else [("time error", f"at most {largest:.3g} m (RMS) in a step")]
+
+
 def _recording(file: Path) -> None:
     import numpy as np
 
@@ -342,7 +347,7 @@ def _recording(file: Path) -> None:
             ("mass", f"{recording.masses.sum():.6g} kg"),
             ("solver", recording.solver or "unknown"),
             ("smallest J", f"{J.min():.6g} at t = {recording.times[int(np.argmin(J))]:.6g} s"),
-            ("time error", f"at most {recording.largest('details/time_error'):.3g} m (RMS) in a step"),
+            *_time_error(recording.largest("details/time_error")),
             ("ended", str(recording.statuses[-1])),
             ("scene file", "inside" if recording.scene_text else "none"),
             ("written by", f"supple {recording.supple_version}"),
