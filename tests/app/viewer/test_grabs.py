@@ -105,7 +105,7 @@ class TestGrabs:
 
     def test_the_barycentric_point_reaches_the_target(self):
         live = LiveScene(free_source())
-        a, b, c = describe(live).body("cube").triangles[5].tolist()
+        a, b, c = describe(live).body("cube").boundary[5].tolist()
         change(Grab(1, "cube", (a, b, c), (0.2, 0.3, 0.5), (1.0, 0.0, 0.0)), live)
         for _ in range(150):
             live.step()

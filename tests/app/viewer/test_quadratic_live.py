@@ -1,12 +1,16 @@
 """A body of quadratic tets on the live page: it moves, is described, drawn with its skin, and XPBD refuses it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import supple as sp
 from supple.app.viewer.engine.describe import describe
 from supple.app.viewer.engine.scene.live_scene import LiveScene
+from supple.app.viewer.engine.simulation_loop import SimulationLoop
 from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
 
 
@@ -19,7 +23,8 @@ def test_it_falls_and_is_drawn():
     described = describe(live)
     (shown,) = described.bodies
     np.testing.assert_array_equal(shown.body.mesh.nodes, ball.nodes)
-    model = MomentBuilder()._model_of(described)
+    loop = SimulationLoop(live, CommandQueue(), None)
+    model = MomentBuilder().moment(replace(loop.snapshot(0.0), description=described)).model
     np.testing.assert_array_equal(model.tets, ball.tets)
     (drawn,) = model.bodies
     assert drawn.skin.corners.shape == (len(skin.vertices), 10)

@@ -34,7 +34,7 @@ def test_it_falls_and_is_measured(live):
     assert (body.material, body.mass) == ("rigid", pytest.approx(2.0))
     assert set(body.values) == {"friction"}
     assert body.skin is not None
-    assert len(body.skin[0]) == 8
+    assert len(body.skin.corners) == 8
     assert described.low[1] == pytest.approx(0.0, abs=1e-3)
     found = contact_points(live)
     assert len(found) == 4

@@ -13,7 +13,7 @@ def drop(rigid, dt, steps=40):
     place = {"position": (0, 0.1, 0), "velocity": (0.1, -1.26, 0)}
     mesh = sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2))
     soft = sp.StableNeoHookean(youngs=1e6, poisson=0.3, density=1000.0)
-    body = sp.RigidBody("cube", mesh, 1000.0, **place) if rigid else sp.Body("cube", mesh, soft, **place)
+    body = sp.RigidBody("cube", mesh, density=1000.0, **place) if rigid else sp.Body("cube", mesh, soft, **place)
     scene = sp.Scene([body], obstacles=[sp.HalfSpace(friction=0.3)])
     frames = converged(sp.simulate(scene, sp.Implicit(integrator="bdf2"), dt, steps))
     made = [frame.report.details.work["numerical"] for frame in frames]
