@@ -37,6 +37,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         "learn/examples.md": examples(),
         "learn/gallery.md": gallery(),
         "reference/scene_keys.md": kinds_page(),
+        "CITATION.cff": (ROOT / "CITATION.cff").read_text(encoding="utf-8"),
     } | api_pages()
     made |= {page: root_page(path) for page, path in OF_ROOT.items()}
     for path, text in made.items():
