@@ -4,13 +4,13 @@ import logging
 
 import numpy as np
 import pytest
-from tests.mesh.cad_parts import CLEAN, cup, housing, noisy_scan, overlapping, turned_tetrahedron
+from tests.mesh.cad_parts import CLEAN, cup, housing, joined, noisy_scan, overlapping, turned_tetrahedron
 
 from supple.errors import MeshingError
 from supple.mesh.meshing.consent import asking
 from supple.mesh.meshing.spelling import spelled_for
 from supple.mesh.meshing.tetrahedralize import tetrahedralize, tetrahedralize_reported
-from supple.mesh.shapes import box_surface
+from supple.mesh.shapes import box_surface, sphere_surface
 
 
 def heights(mesh):
@@ -70,6 +70,17 @@ def test_surfaces_with_holes_keep_their_volume_in_a_lattice(caplog):
     assert 1.25e-4 < mesh.volume < 1.4e-4
     assert mesh.min_dihedrals.min() > 8
     assert "which rounds sharp edges" in caplog.text
+
+
+def test_sides_of_a_gap_that_is_narrower_than_tets_do_not_pass_each_other(caplog):
+    """A ball in a hollow one, 5 mm from it at edges of .2 m: both are joined, with a warning, and start apart."""
+    ball = sphere_surface(0.5, 0.1)
+    sizes = [(1.0, False), (0.8, True), (0.79, False)]
+    shells = [ball.transformed(size).flipped() if inner else ball.transformed(size) for size, inner in sizes]
+    mesh = tetrahedralize(joined(*shells), tets=1500)
+    assert not mesh.surface.compact().check().self_intersecting
+    assert "gaps of the surface are narrower than tets" in caplog.text
+    assert mesh.volume == pytest.approx(sum(shell.volume for shell in shells), rel=0.02)
 
 
 def test_walls_that_need_more_tets_get_them_with_a_warning(caplog):

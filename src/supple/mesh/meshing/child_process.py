@@ -85,7 +85,7 @@ def run_mesher(
 ) -> MesherResult:
     """Run "tetgen", "mmg" (with tets), "meshfix", "union" or "decimation" (with triangles) in a child.
 
-    The input are triangles (m, 3) of vertices (n, 3), for Mmg also tets (m, 4). `remedy` ends the message where the
+    The input are triangles (m, 3) of vertices (n, 3). `remedy` ends the message where the
     mesher failed or crashed. A mesh that the child has written before it failed is its result: Mmg tries several.
 
     Raises

@@ -84,7 +84,7 @@ class Filling:
                     return mesher, self._checked(mesh)
             tets = DEFAULT_TETS
         if self.max_volume is None and not self.keep_surface:
-            mesh = self._remeshed(tets, self.surface)
+            mesh = self._remeshed(tets)
             _say_volume(mesh.volume, self.surface.volume)
             return "mmg", mesh
         if self.edge is not None:
@@ -115,19 +115,24 @@ class Filling:
         _say_volume(mesh.volume, volume)
         return mesh
 
-    def _remeshed(self, tets: int | None, base: SurfaceMesh, start: TetMesh | None = None) -> TetMesh:
-        """Of Mmg, from `start`, or from TetGen's tets in `base`."""
-        wanted = tets
+    def _remeshed(self, tets: int | None) -> TetMesh:
+        """Of Mmg, from TetGen's tets."""
+        base, wanted = self.surface, tets
         if tets is not None:
             wanted = tets_of_walls(base, tets)
-            if start is None and len(base.triangles) > DENSE * wanted:
+            if len(base.triangles) > DENSE * wanted:
                 base = self._fewer(base, DENSE * wanted)
         logger.info("filling %d triangles with %s", len(base.triangles), f"about {wanted} tets" if tets else "tets")
-        result = mesh_with_mmg(base, start, tets=wanted, edge=self.edge, limits=self.limits)
-        mesh = _used("Mmg", result)
+        result = mesh_with_mmg(base, tets=wanted, edge=self.edge, limits=self.limits)
+        mesh = fitted(_used("Mmg", result), self.surface)
+        # Mmg sees the tets on one side of its boundary, not the gap on the other.
+        if mesh.surface.compact().check().self_intersecting:
+            raise MesherFailure(
+                "failed", "gaps of the surface are narrower than tets; more tets keep their sides apart"
+            )
         if wanted is not None:
             _say_count(len(mesh.tets), wanted)
-        return fitted(mesh, self.surface)
+        return mesh
 
     def _fewer(self, surface: SurfaceMesh, triangles: int) -> SurfaceMesh:
         """The surface with fewer triangles, where that changes neither its faults nor its volume."""

@@ -81,16 +81,15 @@ def _run_mmg(
     notes: list[str],
     keep: Callable[[tuple[Any, Any, Any]], None],
 ) -> None:
-    """Tets of a length of edges, or of a number of tets, from a closed surface or from other tets of it.
+    """Tets of a length of edges, or of a number of tets, in a closed surface.
 
     TetGen fills the surface with as few tets as it can, whatever their shape; Mmg moves, splits, collapses and swaps
-    them until their edges have the length. All its meshes are valid, so that the surface never cuts itself.
+    them until their edges have the length. All its meshes are valid, so that walls never cut themselves.
     """
     import numpy as np
     from mmgpy import MmgMesh3D  # pyright: ignore[reportMissingImports]
 
-    if elements.shape[1] == 3:
-        vertices, elements, _ = _run_tetgen(vertices, elements, SHAPELESS, notes)
+    vertices, elements, _ = _run_tetgen(vertices, elements, SHAPELESS, notes)
 
     def run(edge: float) -> tuple[Any, Any, Any]:
         # nofem: tets may have two sides on the surface. Otherwise thin walls get two layers, and ten times the time.

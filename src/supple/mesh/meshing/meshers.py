@@ -16,7 +16,6 @@ import numpy as np
 from supple.mesh.meshing.child_process import Limits, MesherResult, run_mesher
 from supple.mesh.meshing.spelling import option
 from supple.mesh.surface import SurfaceMesh
-from supple.mesh.tetmesh import TetMesh
 
 
 def _remedy() -> str:
@@ -56,17 +55,15 @@ _OF_VOLUME, TETS_OF_SQUARE = 14.0, 4.0
 
 def mesh_with_mmg(
     surface: SurfaceMesh,
-    start: TetMesh | None,
     *,
     tets: int | None,
     edge: float | None,
     limits: Limits,
 ) -> MesherResult:
-    """Tets of a number or of a length of edges [m] in a surface, remeshed; none in its cavities.
+    """Tets of a number or of a length of edges [m] in a clean surface, remeshed; none in its cavities.
 
     Parameters
     ----------
-    start : tets in the surface; None: those of TetGen, which needs a clean surface
     tets, edge : one of them
 
     Raises
@@ -75,14 +72,13 @@ def mesh_with_mmg(
     """
     low, high = surface.bounds
     middle, size = 0.5 * (low + high), float((high - low).max()) or 1.0
-    points, elements = (surface.vertices, surface.triangles) if start is None else (start.vertices, start.tets)
     length = edge if edge is not None else edge_of_count(tets or 1, surface.area, surface.volume)
     options = {
         "tets": None if tets is None else int(tets),
         "edge": length / size,
         "distance": MMG_DISTANCE,
     }
-    result = run_mesher("mmg", (points - middle) / size, elements, options, limits, _remedy())
+    result = run_mesher("mmg", (surface.vertices - middle) / size, surface.triangles, options, limits, _remedy())
     return replace(result, vertices=result.vertices * size + middle)
 
 
