@@ -368,6 +368,15 @@ def test_a_lattice_that_is_coarser_than_walls_says_so(tets) -> None:
         fill(crossed_shells(), tets=tets, mesher="stuffing")
 
 
+def test_a_lattice_of_ten_times_the_tets_is_a_question() -> None:
+    """The first one that keeps a wall of 5 cm has thousands of tets."""
+    ball = sphere_surface(radius=0.5, edge_length=0.2)
+    with pytest.raises(
+        MeshingError, match=r"keeps the surface's walls has \S+ tets, \d+ times the 250 that were asked"
+    ):
+        fill(joined(ball, ball.transformed(0.9).flipped()), tets=250, mesher="stuffing")
+
+
 def test_thin_walls_that_cross_are_united() -> None:
     """A cavity and a bar through its wall, at the number of tets and with the volume of their union."""
     surface = crossed_shells(0.1)

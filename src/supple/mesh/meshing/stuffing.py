@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError, MeshingError
 from supple.mesh.meshing.child_process import DEFAULT_TETS
+from supple.mesh.meshing.sizes import allow
 from supple.mesh.meshing.spelling import option
 from supple.mesh.primitives.isosurface_stuffing import MEAN_EDGE, stuff
 from supple.mesh.surface import SurfaceMesh
@@ -93,6 +94,7 @@ def stuffed(surface: SurfaceMesh, tets: int | None, edge: float | None) -> tuple
             f"ask for more tets ({option('tets', more)}), or clean the surface ({option('repair', True)})"
         )
     if tets and len(best.tets) > 1.25 * tets and longest < np.inf:
+        allow(f"a lattice that keeps the surface's walls has {len(best.tets):,} tets", len(best.tets), tets)
         logger.warning("%s tets instead of %s: longer ones lose walls", f"{len(best.tets):,}", f"{tets:,}")
     return as_large(best, volume), volume
 
