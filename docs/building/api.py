@@ -70,7 +70,7 @@ def page_of(module: str) -> str:
 
     Raises
     ------
-    LookupError : where there is none.
+    LookupError : where none exists.
     """
     fitting = [
         (len(part), page) for page, _, parts in API for part in parts if module == part or module.startswith(part + ".")

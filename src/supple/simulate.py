@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.contact.parting import with_parted_sides
+from supple.contact.separated_sides import with_separated_sides
 from supple.errors import SceneError, SolverError, SuppleError, SuppleWarning
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.materials.laws.internal import checked
@@ -236,7 +236,7 @@ def prepared_after_breaks(
     """What a step has led to, with the pairs broken that carry too much, and the workspace for what is left."""
     left, state, step = after_breaks(system, state, step)
     if step.status.can_go_on:
-        left, state = with_parted_sides(left, state)
+        left, state = with_separated_sides(left, state)
     if left is not system:
         try:
             workspace = solver.prepare(left)

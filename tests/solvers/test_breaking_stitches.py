@@ -165,7 +165,7 @@ def same_bits(one, other):
         one.state.positions.tobytes() == other.state.positions.tobytes()
         and one.state.velocities.tobytes() == other.state.velocities.tobytes()
         and one.state.broken_stitches.tolist() == other.state.broken_stitches.tolist()
-        and one.state.parted_stitches.tolist() == other.state.parted_stitches.tolist()
+        and one.state.separated_stitches.tolist() == other.state.separated_stitches.tolist()
     )
 
 
@@ -185,20 +185,20 @@ def test_what_was_torn_off_falls_back_onto_what_it_was_stitched_to(tmp_path, sol
     path = tmp_path / "r.vtkhdf"
     frames = list(sp.simulate(scene, solver, DT, 24, sinks=[sp.Recorder(path)]))
     assert len(broken(frames)) >= 1
-    assert len(frames[-1].state.parted_stitches) == len(scene.stitching) >= 5
+    assert len(frames[-1].state.separated_stitches) == len(scene.stitching) >= 5
     heights = [frame.positions["top"][:, 1].min() for frame in frames]
     assert max(heights) > 0.03
     assert min(heights) > 0.0245
     assert heights[-1] < 0.026
     assert {str(frame.report.status) for frame in frames} == {"converged"}
-    begun = next(frame for frame in frames if len(frame.state.parted_stitches))
+    begun = next(frame for frame in frames if len(frame.state.separated_stitches))
     rest = sp.simulate(scene, solver, DT, 24 - begun.index, start=begun)
     assert all(map(same_bits, frames[begun.index :], rest))
     with sp.read_recording(path) as recording:
         report = recording.check()
         assert report.ok, str(report)
         for one, other in zip(frames, recording[1:], strict=True):
-            assert one.state.parted_stitches.tolist() == other.state.parted_stitches.tolist()
+            assert one.state.separated_stitches.tolist() == other.state.separated_stitches.tolist()
 
 
 def test_sides_that_touch_collide_only_when_they_are_apart():
@@ -209,9 +209,9 @@ def test_sides_that_touch_collide_only_when_they_are_apart():
     seam = sp.SoftVertexTriangleStitch("top", "cube", max_distance=1e-6, youngs=1e4, poisson=0.3, strength=0.05)
     held = sp.Pin("cube", sp.InBox((-1, -1, -1), (1, -0.0249, 1)))
     frames = list(sp.simulate(sp.Scene([base, top], pins=[held], stitches=[seam]), sp.Implicit(), DT, 20))
-    counts = [(len(frame.state.broken_stitches), len(frame.state.parted_stitches)) for frame in frames]
+    counts = [(len(frame.state.broken_stitches), len(frame.state.separated_stitches)) for frame in frames]
     assert counts[-1] == (9, 9)
-    assert all(parted <= of for of, parted in counts)
+    assert all(separated <= of for of, separated in counts)
     assert counts == sorted(counts)
     assert {str(frame.report.status) for frame in frames} == {"converged"}
     assert min(frame.positions["top"][:, 1].min() for frame in frames[5:]) > 0.0245

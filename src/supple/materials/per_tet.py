@@ -27,7 +27,7 @@ class Law(ABC):
     counts : numbers of parameters that a row may have
     infinite_when_flat : whether psi goes to infinity wherever J goes to zero. No law has an energy for J <= 0.
     bulk : the parameter K of the law, where psi has the volume term K/2 (J - 1)^2, of which quadratic tets average J.
-        None where there is none.
+        None where none exists.
     """
 
     counts: range

@@ -19,16 +19,16 @@ from supple.scene.stitches.measures import stitch_energies, stitch_loads
 
 def are_of(state: State, scene: Scene) -> bool:
     """Whether the scene has the stitches that have broken in a state."""
-    broken, parted = state.broken_stitches, state.parted_stitches
-    return bool(np.isin(broken, np.arange(len(scene.stitching))).all() and np.isin(parted, broken).all())
+    broken, separated = state.broken_stitches, state.separated_stitches
+    return bool(np.isin(broken, np.arange(len(scene.stitching))).all() and np.isin(separated, broken).all())
 
 
-def without_broken(system: System, broken: NDArray[np.int64], parted: NDArray[np.int64]) -> System:
+def without_broken(system: System, broken: NDArray[np.int64], separated: NDArray[np.int64]) -> System:
     """The system with all stitches of its scene but `broken` ones, see `State`; the same one where that is so."""
     stitching = system.stitching
-    if np.array_equal(stitching.broken, broken) and np.array_equal(stitching.parted, parted):
+    if np.array_equal(stitching.broken, broken) and np.array_equal(stitching.separated, separated):
         return system
-    return replace(system, stitching=system.scene.stitching.without(broken, parted))
+    return replace(system, stitching=system.scene.stitching.without(broken, separated))
 
 
 def after_breaks(system: System, state: State, step: StepReport) -> tuple[System, State, StepReport]:
@@ -36,7 +36,7 @@ def after_breaks(system: System, state: State, step: StepReport) -> tuple[System
     stitching, names = system.stitching, system.scene.stitching.names
     if not names.breakable and not len(stitching.broken):
         return system, state, step
-    broken, parted = stitching.broken, stitching.parted
+    broken, separated = stitching.broken, stitching.separated
     holding = np.delete(np.arange(len(names)), broken)
     if len(holding) and step.status.can_go_on:
         points = stitching.points(state.positions, state.time)
@@ -47,5 +47,5 @@ def after_breaks(system: System, state: State, step: StepReport) -> tuple[System
             new = holding[over]
             step = replace(step, details=replace(step.details, work=work), broken_stitches=names.named(new))
             broken = np.union1d(broken, new)
-    state = replace(state, broken_stitches=broken, parted_stitches=parted)
-    return without_broken(system, broken, parted), state, step
+    state = replace(state, broken_stitches=broken, separated_stitches=separated)
+    return without_broken(system, broken, separated), state, step

@@ -149,7 +149,7 @@ class State:
     hinge_angles : angles of hinges over all turns [rad], by name; those that are missing are as at a start, see
         `HingeJoint`
     broken_stitches : (b,) numbers of the pairs that have broken, ascending; see `Stitching`
-    parted_stitches : (c,) those of them whose sides have been apart since, so that they collide
+    separated_stitches : (c,) those of them whose sides have been apart since, so that they collide
     """
 
     time: float
@@ -160,7 +160,7 @@ class State:
     internal: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 11)))
     hinge_angles: Mapping[str, float] = field(default_factory=dict)
     broken_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    parted_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    separated_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True, eq=False)

@@ -256,7 +256,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching
         if start is None
-        else scene.stitching.without(start.broken_stitches, start.parted_stitches),
+        else scene.stitching.without(start.broken_stitches, start.separated_stitches),
         welding=scene.welding,
         start_states=start_states,
         quadratic=_quadratic_tets(ranges, rest_positions),

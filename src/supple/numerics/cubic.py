@@ -175,7 +175,7 @@ def _first_roots(coefficients, tol, out):
 def smallest_positive_cubic_root(
     a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike, tol: float = 1e-6
 ) -> float | NDArray[np.float64]:
-    """The smallest positive root of a t^3 + b t^2 + c t + d; a negative number where there is none.
+    """The smallest positive root of a t^3 + b t^2 + c t + d; a negative number where none exists.
 
     Scale the coefficients by the constant term first: d = 1 for the first inversion of a tetrahedron, d = 0.8 for the
     first loss of 80 % of its volume. Beyond t = 1 leading coefficients of at most `tol` count as zero, so that the

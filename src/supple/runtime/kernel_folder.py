@@ -100,7 +100,7 @@ def _warn(folder: Path) -> None:
 
 
 def read(path: Path) -> bytes | None:
-    """The content of an entry; None where there is none, it is damaged, or others can write it."""
+    """The content of an entry; None where none exists, it is damaged, or others can write it."""
     try:
         with path.open("rb") as file:
             # Of what is opened, which may be another file than the path names a moment later.

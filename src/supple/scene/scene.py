@@ -314,7 +314,7 @@ class Scene(Showable, metaclass=Described):
 
         Raises
         ------
-        SceneError : where there is none.
+        SceneError : where none exists.
         """
         for body in self.bodies:
             if body.name == name:

@@ -56,7 +56,7 @@ def distinct_numbers(value: Any, what: str, thing: str, things: str, else_: str)
 
     Raises
     ------
-    SceneError : where there is none, or they are not whole, negative, or not distinct.
+    SceneError : where none exists, or they are not whole, negative, or not distinct.
     """
     try:
         rows = np.atleast_1d(np.asarray(value))

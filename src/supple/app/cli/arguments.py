@@ -96,7 +96,7 @@ def recording_at(path: Path) -> Path:
 
     Raises
     ------
-    OutputError : where there is none in the folder.
+    OutputError : where none exists in the folder.
     """
     inside = path / "recording.vtkhdf"
     if path.is_dir() and not inside.exists():

@@ -22,7 +22,7 @@ def find_demo(name: str) -> Demo:
 
     Raises
     ------
-    SceneError : where there is none.
+    SceneError : where none exists.
     """
     if name not in DEMOS:
         raise SceneError(f"demo {name!r} does not exist; there are {', '.join(DEMOS)}")

@@ -53,7 +53,7 @@ def frame_of(checkpoint: Checkpoint, scene: Scene, solver: Solver) -> Frame | No
     state = checkpoint.state
     if scene_hash(system, *checkpoint.run.span) != checkpoint.run.scene or not are_of(state, scene):
         return None
-    system = without_broken(system, state.broken_stitches, state.parted_stitches)
+    system = without_broken(system, state.broken_stitches, state.separated_stitches)
     return start_frame(system, state, checkpoint.index, solver)
 
 

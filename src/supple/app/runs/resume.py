@@ -113,7 +113,7 @@ def last_checkpoint(paths: RunPaths) -> Checkpoint:
 
     Raises
     ------
-    OutputError : where there is none, or the recording cannot be read.
+    OutputError : where none exists, or the recording cannot be read.
     """
     recorded = -1
     if paths.recording.exists():

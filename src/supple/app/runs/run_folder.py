@@ -33,7 +33,7 @@ class SceneSource:
     Attributes
     ----------
     origin : for the journal; a run of another kind than "scene_file" is resumed with its scene
-    text : of the scene file as given, for the recording; None where there is none
+    text : of the scene file as given, for the recording; None where none exists
     files : by their paths in `RunPaths.own`, texts to write, or files to copy
     """
 

@@ -72,7 +72,7 @@ def write_result(folder: Path, result: CaseResult) -> None:
 
 
 def read_result(folder: Path) -> CaseResult | None:
-    """The result in a case's folder; None where there is none, or none that can be understood."""
+    """The result in a case's folder; None where none exists, or none that can be understood."""
     try:
         data = json.loads((folder / RESULT).read_text(encoding="utf-8"))
         result = CaseResult(**data)

@@ -70,7 +70,7 @@ class HalfSpaces:
 
         Returns
         -------
-        step, row : of the pair that allows no more, -1 where there is none; 0 where a point is not before its plane
+        step, row : of the pair that allows no more, -1 where none exists; 0 where a point is not before its plane
         """
         return noninverting_step(x, way, self.tets, self._all, _KEEP) if len(self.tets) else (1.0, -1)
 

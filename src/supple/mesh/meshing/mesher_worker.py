@@ -248,7 +248,7 @@ def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: 
 def _run_union(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
     """The boundary of what the closed components of a surface of size 1 enclose together.
 
-    Those that face inward are cavities of the smallest one around them, or solids where there is none.
+    Those that face inward are cavities of the smallest one around them, or solids where none exists.
     """
     import manifold3d
     import numpy as np

@@ -64,9 +64,8 @@ def stuffed(surface: SurfaceMesh, tets: int | None, edge: float | None) -> tuple
     volume = float((inside(middle + half * grid) < 0.0).mean() * np.prod(2.0 * half))
     if volume < 1e-6 * float((high - low).max()) ** 3:
         raise MeshingError("the surface encloses nothing: close its holes, or give it a thickness")
-    # Shorter edges make another mesh than that which is asked for, and take very long.
     length = edge or MEAN_EDGE * (12.0 * volume / (tets or 1)) ** (1.0 / 3.0)
-    best, made, longest = None, None, np.inf
+    best, made, longest = None, None, np.inf  # edges of that length lose walls
     for _ in range(_MOST_TRIES if tets else 1):
         try:
             made = stuff("stuffing", inside, (middle - half, middle + half), length, _BISECTIONS)

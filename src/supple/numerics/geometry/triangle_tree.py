@@ -63,7 +63,7 @@ class TriangleTree(NamedTuple):
         Parameters
         ----------
         queries : (q, 3) [m]; within : [m]
-        normals : (q, 3) unit normals of the surface that the points belong to, zero where there is none
+        normals : (q, 3) unit normals of the surface that the points belong to, zero where none exists
 
         Returns
         -------

@@ -17,7 +17,7 @@ UNKNOWN = {
     "tets": "the files have no tets",
     "times": "the time from frame to frame is not known; give --dt or --fps",
     "masses": "masses are not known; it needs tets and --density, or an array of masses",
-    "gravity": "gravity is not known; give --gravity, 0 0 0 where there is none",
+    "gravity": "gravity is not known; give --gravity, 0 0 0 where none exists",
     "material": "the material is not known; it needs tets, --youngs and --poisson",
     "free": "what holds the parts is not known; --free says that nothing but gravity acts on them",
 }

@@ -29,7 +29,7 @@ class CheckResult:
     ----------
     name : of the check; verdict : pass, fail or skipped
     message : what was found, or why the check was skipped
-    worst : the number closest to failing, or furthest beyond, in the unit below; None where there is none
+    worst : the number closest to failing, or furthest beyond, in the unit below; None where none exists
     unit : of that number, "" for a ratio
     frame, time : of that number, frames counted from 0, [s]; None where it belongs to no frame
     where : the body, and its tet, triangle or vertex

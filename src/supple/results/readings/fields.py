@@ -66,7 +66,7 @@ def checked_fields(names: Iterable[str]) -> tuple[Field, ...]:
 
     Raises
     ------
-    OutputError : where there is none of a name, or a name occurs twice.
+    OutputError : where none exists of a name, or a name occurs twice.
     """
     if isinstance(names, str):
         raise OutputError(f"fields is {names!r}; give a list of names, such as [{names!r}]")

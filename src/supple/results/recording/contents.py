@@ -136,7 +136,7 @@ class RecordedContents(Description):
 
         Raises
         ------
-        OutputError : where there is none.
+        OutputError : where none exists.
         """
         for body in self.bodies:
             if body.name == name:
@@ -168,11 +168,11 @@ class RecordedContents(Description):
         """Close the file; frames that were not read before can then not be read."""
         self._file.close()
 
-    def broken_stitches(self, number: int, parted: bool = False) -> NDArray[np.int64]:
-        """(b,) numbers of the pairs of stitches that have broken until a frame, or also parted; see `State`."""
+    def broken_stitches(self, number: int, separated: bool = False) -> NDArray[np.int64]:
+        """(b,) numbers of the pairs of stitches that have broken until a frame, or also separated; see `State`."""
         if BROKEN_STITCHES not in self._series:
             return np.zeros(0, dtype=np.int64)
-        return np.flatnonzero(self._values(BROKEN_STITCHES)[number] > parted)
+        return np.flatnonzero(self._values(BROKEN_STITCHES)[number] > separated)
 
     def _values(self, path: str) -> NDArray[Any]:
         """All frames' rows of a series; read once."""

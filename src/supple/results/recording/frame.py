@@ -51,8 +51,10 @@ class RecordedFrame(TetReadings):
         joints = {name for name, measure in measures.items() if measure is not None and measure.form == "angle"}
         known = self.report.joints.items()
         angles = {name: one.coordinate for name, one in known if name in joints and one.coordinate is not None}
-        broken, parted = (self.recording.broken_stitches(self.number, parted=parted) for parted in (False, True))
-        more = {"hinge_angles": angles, "broken_stitches": broken, "parted_stitches": parted}
+        broken, separated = (
+            self.recording.broken_stitches(self.number, separated=separated) for separated in (False, True)
+        )
+        more = {"hinge_angles": angles, "broken_stitches": broken, "separated_stitches": separated}
         return State(self.time, *vertices, internal=internal, **more)
 
     @property

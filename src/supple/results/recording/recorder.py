@@ -279,7 +279,9 @@ class Recorder:
         names = frame.system.scene.stitching.names
         if names.breakable:
             rows, state = np.arange(len(names)), frame.state
-            file.put(BROKEN_STITCHES, sum(np.isin(rows, of) for of in (state.broken_stitches, state.parted_stitches)))
+            file.put(
+                BROKEN_STITCHES, sum(np.isin(rows, of) for of in (state.broken_stitches, state.separated_stitches))
+            )
         values = values_at(self._functions, frame.time)
         for number, series in function_series(self._at_start).items():
             value = values[number]

@@ -22,7 +22,7 @@ class View:
     Attributes
     ----------
     low, high : (3,) bounds of what is to be seen in all frames [m]
-    up : (3,) unit vector against gravity; y where there is none
+    up : (3,) unit vector against gravity; y where none exists
     outline : (k, 3) points whose convex hull contains what is to be seen [m]; the corners of the bounds without this
     """
 

@@ -69,11 +69,11 @@ class Stage:
         return None if self._forces is None else self._forces.full
 
     def tet_on_ray(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
-        """The tet that a ray meets first; None where there is none, or where no tets are drawn."""
+        """The tet that a ray meets first; None where none exists, or where no tets are drawn."""
         return self._bodies.tet_on_ray(origin, direction) if isinstance(self._bodies, TetView) else None
 
     def value_at(self, tet: int) -> float | None:
-        """The value of the field in a tet; None where there is none."""
+        """The value of the field in a tet; None where none exists."""
         values = self._bodies.values if isinstance(self._bodies, TetView) else None
         return None if values is None or tet >= len(values) else float(values[tet])
 

@@ -210,7 +210,7 @@ _RIM = 0.018  # radius of the rim of a bowl, as a share of that of the scene
 def rim_of(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], up: NDArray[np.float64], radius: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
-    """A tube along the edge of an open surface, which is one loop about `up`; None where there is none."""
+    """A tube along the edge of an open surface, which is one loop about `up`; None where none exists."""
     start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     edges, back = start * np.int64(len(vertices)) + end, end * np.int64(len(vertices)) + start
     follows = dict(zip(*(rows[~np.isin(edges, back)].tolist() for rows in (start, end)), strict=True))

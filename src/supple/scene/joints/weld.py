@@ -73,7 +73,7 @@ class Weld(OnVertices):
 
         Raises
         ------
-        SceneError : where there is none.
+        SceneError : where none exists.
         """
         placed = soft.place(soft.mesh.vertices)
         if self.max_distance is None:

@@ -33,7 +33,7 @@ def body_of(name: str, bodies: Sequence[PlacedBody], label: str) -> PlacedBody:
 
     Raises
     ------
-    SceneError : where there is none.
+    SceneError : where none exists.
     """
     for body in bodies:
         if body.name == name:
@@ -71,7 +71,7 @@ class OnSurface(OnBody):
 
         Raises
         ------
-        SceneError : where there is none, or a row does not exist.
+        SceneError : where none exists, or a row does not exist.
         """
         return surface_region(self.region, body, self.label)
 
@@ -81,7 +81,7 @@ def surface_region(region: Region, body: PlacedBody, label: str) -> NDArray[np.i
 
     Raises
     ------
-    SceneError : where there is none, or a row does not exist.
+    SceneError : where none exists, or a row does not exist.
     """
     triangles = body.triangles
     if region is None:

@@ -22,7 +22,7 @@ def tets_in(tets: TetRegion, body: PlacedBody, label: str) -> NDArray[np.int64]:
 
     Raises
     ------
-    SceneError : where there is none, or one does not exist.
+    SceneError : where none exists, or one does not exist.
     """
     count = len(body.mesh.tets)
     if tets is None:

@@ -103,7 +103,7 @@ class Stitching:
     rigid : points of rigid bodies; anchors : vertices of obstacles, whose numbers are the last ones
     broken : (b,) numbers of the pairs that have broken, of all of the scene, ascending
     old_nodes : (b, 4) their `nodes`
-    parted : (c,) those of them whose sides collide
+    separated : (c,) those of them whose sides collide
     """
 
     body_vertices: int
@@ -114,7 +114,7 @@ class Stitching:
     anchors: Anchors
     broken: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     old_nodes: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
-    parted: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    separated: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __len__(self) -> int:
         return len(self.tets) + len(self.springs)
@@ -141,14 +141,16 @@ class Stitching:
         """Of the scene, before any has broken."""
         return max((part.tets.stop for part in self.ranges), default=0)
 
-    def without(self, broken: NDArray[np.int64], parted: NDArray[np.int64]) -> Stitching:
+    def without(self, broken: NDArray[np.int64], separated: NDArray[np.int64]) -> Stitching:
         """All stitches of a scene but the pairs that have `broken`; see `Stitching`."""
         if not len(broken):
             return self
         holds = np.ones(len(self), dtype=np.bool_)
         holds[broken] = False
         tets, springs = self.tets.chosen(holds[: len(self.tets)]), self.springs.chosen(holds[len(self.tets) :])
-        return replace(self, tets=tets, springs=springs, broken=broken, old_nodes=self.nodes()[broken], parted=parted)
+        return replace(
+            self, tets=tets, springs=springs, broken=broken, old_nodes=self.nodes()[broken], separated=separated
+        )
 
     @property
     def apart(self) -> RigidNodes:
@@ -174,13 +176,13 @@ class Stitching:
         return np.concatenate([self.tets.vertices, springs]).astype(np.int32)
 
     def seams(self) -> NDArray[np.int32]:
-        """(q, 4) as `nodes`, also of broken pairs that are not parted: what they join, or joined, does not collide."""
-        return np.concatenate([self.nodes(), self.old_nodes[~np.isin(self.broken, self.parted)]])
+        """(q, 4) as `nodes`, also of broken pairs that touch yet: what they join, or joined, does not collide."""
+        return np.concatenate([self.nodes(), self.old_nodes[~np.isin(self.broken, self.separated)]])
 
     @property
     def seamed(self) -> list[Stitch]:
-        """The stitches with a pair that is not parted."""
-        owners = np.unique(np.delete(self.names.owner, self.parted))
+        """The stitches with a pair that is not separated."""
+        owners = np.unique(np.delete(self.names.owner, self.separated))
         return [self.ranges[k].stitch for k in owners]
 
     def elements(self) -> NDArray[np.int32]:

@@ -92,7 +92,7 @@ class InversionGuard:
         return not ((inverted & self.by_coefficients).any() or (inverted & ~are_positive(tets, x)).any())
 
     def quadratic_barrier(self, onset: float) -> BernsteinBarrier | None:
-        """The barrier below J = `onset` of the guarded quadratic tets; None where there is none."""
+        """The barrier below J = `onset` of the guarded quadratic tets; None where none exists."""
         if (tets := self.system.quadratic) is None:
             return None
         material = self.system.laws.material

@@ -29,7 +29,7 @@ def collide(dt, steps, **solver):
     scene = oblique()
     frames = converged(sp.simulate(scene, sp.Implicit(**solver), dt, steps))
     assert any(frame.report.details.contacts for frame in frames)
-    assert frames[-1].report.details.contacts == 0  # they have parted again
+    assert frames[-1].report.details.contacts == 0  # they have separated again
     return [first_frame(scene, initial_state(scene)), *frames]
 
 
@@ -50,8 +50,8 @@ def test_a_collision_keeps_linear_momentum(integrator):
     # The bodies' momenta cancel: what counts is what went from one to the other.
     part = frames[0].system.masses[:8] @ frames[0].velocities["one"]
     assert np.abs(momenta - momenta[0]).max() < 1e-9 * np.linalg.norm(part)
-    parted = frames[-1].velocities["two"].mean(axis=0)[0] - frames[-1].velocities["one"].mean(axis=0)[0]
-    assert parted > 0.5
+    separated = frames[-1].velocities["two"].mean(axis=0)[0] - frames[-1].velocities["one"].mean(axis=0)[0]
+    assert separated > 0.5
 
 
 @pytest.mark.parametrize("integrator", ["backward_euler", "bdf2", "newmark"])

@@ -118,7 +118,7 @@ def test_a_body_that_is_crushed_does_not_pass_through_itself():
         assert not surfaces_meet(frame)
 
 
-def test_bars_that_begin_through_each_other_are_parted():
+def test_bars_that_begin_through_each_other_are_separated():
     """There, what passes through something is on its way out."""
     scene = crossing(0.0)
     low, high = scene.bodies

@@ -61,8 +61,8 @@ def mesh(
     keep_surface
         Change no triangle of the surface.
     mesher
-        "auto" uses TetGen and Mmg for a clean surface, and stuffing, which rounds sharp edges, for any other, and where
-        they fail.
+        "auto" unites closed components that overlap, uses TetGen and Mmg for a clean surface, and stuffing, which
+        rounds sharp edges, for any other, and where they fail.
     repair
         Repair a surface that is not clean first, and list the changes. Where that fails, it is filled as it is.
     yes

@@ -52,14 +52,14 @@ class Element:
         return found[0] if found else None
 
     def child(self, tag: str) -> Element:
-        """The only child with a tag; raises `Problem` where there is none, or another one."""
+        """The only child with a tag; raises `Problem` where none exists, or another one."""
         found = self.only(tag)
         if found is None:
             raise self.problem(f"its <{self.tag}> has no <{tag}>")
         return found
 
     def text(self, key: str) -> str:
-        """An attribute; raises `Problem` where there is none."""
+        """An attribute; raises `Problem` where none exists."""
         value = self.attributes.get(key, "").strip()
         if not value:
             raise self.problem(f"its <{self.tag}> has no {key}")

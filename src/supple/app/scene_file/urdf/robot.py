@@ -104,7 +104,7 @@ class RobotJoint:
     """One joint: kind of `JOINTS`; placement of the child's frame in the parent's; axis (3,) in the child's.
 
     limits : lower and upper end, or None; damping, friction : efforts of the joint
-    effort : the largest of its motor; velocity : the largest of its coordinate; zero where there is none
+    effort : the largest of its motor; velocity : the largest of its coordinate; zero where none exists
     """
 
     name: str

@@ -156,7 +156,7 @@ PARAMETERS: dict[str, Parameter] = {
 
 
 def find_parameter(name: object) -> Parameter:
-    """The parameter of that name; raises `CommandError` where there is none."""
+    """The parameter of that name; raises `CommandError` where none exists."""
     if not isinstance(name, str) or name not in PARAMETERS:
         raise CommandError(f"parameter {displayed(name)} does not exist; there are {', '.join(PARAMETERS)}")
     return PARAMETERS[name]

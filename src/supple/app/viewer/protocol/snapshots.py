@@ -73,7 +73,7 @@ class SceneDescription:
     joints: tuple[PlacedJoint, ...] = ()
 
     def body(self, name: str) -> BodyDescription:
-        """The body of that name; raises `KeyError` where there is none."""
+        """The body of that name; raises `KeyError` where none exists."""
         for body in self.bodies:
             if body.name == name:
                 return body

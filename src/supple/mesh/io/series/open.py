@@ -72,7 +72,7 @@ def open_series(path: str | Path, *more: Path) -> Series:
 
     Raises
     ------
-    MeshError : where there is none, or it cannot be read.
+    MeshError : where none exists, or it cannot be read.
     """
     path = Path(path)
     if more:

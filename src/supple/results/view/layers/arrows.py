@@ -21,7 +21,7 @@ class ForceView(Layer):
     Attributes
     ----------
     full : the force of an arrow of half the size of the scene [N], a round number that follows the strongest one; None
-        where there is none
+        where none exists
     """
 
     def __init__(self, scene: Any, moment: Moment) -> None:

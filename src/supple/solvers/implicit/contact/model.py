@@ -155,8 +155,8 @@ def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np
     widest = largest_dhat(system)
     # A run that is continued keeps its dhat: what rests on something is nearer to it than at the start. What collides
     # since its stitches have broken does not change it.
-    whole = replace(extended, stitching=replace(extended.stitching, parted=extended.stitching.parted[:0]))
-    begun_mesh = contact_mesh(whole, obstacles, table.collide, placed) if len(extended.stitching.parted) else mesh
+    whole = replace(extended, stitching=replace(extended.stitching, separated=extended.stitching.separated[:0]))
+    begun_mesh = contact_mesh(whole, obstacles, table.collide, placed) if len(extended.stitching.separated) else mesh
     collisions = Collisions(begun_mesh, obstacles, widest)
     gaps = []
     for start in system.start_states:

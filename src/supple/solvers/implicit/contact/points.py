@@ -78,7 +78,7 @@ def contact_points(
 
 
 def _rows_of(rows: NDArray[np.integer], among: NDArray[np.integer]) -> NDArray[np.int64]:
-    """For each of `rows` (k, c), the first of the rows `among` (m, c) that is equal; -1 where there is none."""
+    """For each of `rows` (k, c), the first of the rows `among` (m, c) that is equal; -1 where none exists."""
     _, number = np.unique(np.concatenate([among, rows]), axis=0, return_inverse=True)
     number = number.ravel()
     place = np.full(len(number), -1)

@@ -184,7 +184,7 @@ class BDF2(Integrator):
 
 
 def _history(state: State, h: float) -> History | None:
-    """What BDF2 needs for a step of h [s]; None where there is none that suits."""
+    """What BDF2 needs for a step of h [s]; None where none exists that suits."""
     past = state.memory
     fits = isinstance(past, History) and h <= 2.0 * past.step and past.positions.shape == state.positions.shape
     return past if fits else None

@@ -35,7 +35,7 @@ from supple.solvers.xpbd.rigid.joint_rows import JointRows
 
 # Of the mean edge: how far nodes may go beyond the places that were expected when rows were found.
 SLACK = 0.0125
-# Of the mean edge: by how much things that are through each other are parted in a frame.
+# Of the mean edge: by how much things that are through each other are separated in a frame.
 RECOVERED = 0.05
 # Of the gap: cuts that do not count.
 HARMLESS = 0.5

@@ -265,7 +265,7 @@ def _add(live: LiveScene, body: PlacedBody) -> None:
         internal=np.concatenate([_internal(live), at_rest(count_of(laws))]),
         hinge_angles=live.state.hinge_angles,
         broken_stitches=live.state.broken_stitches,
-        parted_stitches=live.state.parted_stitches,
+        separated_stitches=live.state.separated_stitches,
     )
     live.adopt_checked(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
 
@@ -289,9 +289,9 @@ def _(command: commands.RemoveBody, live: LiveScene) -> None:
     others = ~np.isin(
         stitches.owner, [k for k, one in enumerate(setup.scene.stitches) if part.name in (one.first, one.second)]
     )
-    old = live.state.broken_stitches, live.state.parted_stitches
-    broken, parted = (np.flatnonzero(np.isin(np.flatnonzero(others), numbers)) for numbers in old)
-    more = {"hinge_angles": angles, "broken_stitches": broken, "parted_stitches": parted}
+    old = live.state.broken_stitches, live.state.separated_stitches
+    broken, separated = (np.flatnonzero(np.isin(np.flatnonzero(others), numbers)) for numbers in old)
+    more = {"hinge_angles": angles, "broken_stitches": broken, "separated_stitches": separated}
     state = State(live.state.time, x, v, internal=internal, **more)
     smaller = replace(
         setup,

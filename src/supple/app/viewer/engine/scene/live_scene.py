@@ -283,7 +283,7 @@ class LiveScene:
         )
 
     def part(self, name: str) -> BodyRange:
-        """The rows of one body; raises `CommandError` where there is none of that name."""
+        """The rows of one body; raises `CommandError` where none exists of that name."""
         parts = self.system.bodies
         for part in parts:
             if part.name == name:

@@ -25,12 +25,12 @@ from supple.numerics.geometry.triangle_tree import pair_distances
 _APART = 5e-4
 
 
-def with_parted_sides(system: System, state: State) -> tuple[System, State]:
+def with_separated_sides(system: System, state: State) -> tuple[System, State]:
     """The system in which broken pairs collide whose sides are apart at `state`, and the state with these.
 
     The same ones where nothing changes.
     """
-    waiting = np.setdiff1d(state.broken_stitches, state.parted_stitches)
+    waiting = np.setdiff1d(state.broken_stitches, state.separated_stitches)
     if not len(waiting):
         return system, state
     least = _APART * min(float(np.linalg.norm(np.ptp(system.rest_points[p.points], axis=0))) for p in system.bodies)
@@ -40,13 +40,13 @@ def with_parted_sides(system: System, state: State) -> tuple[System, State]:
     places = stitching.points(state.positions, state.time)
     waiting = waiting[pair_distances(places[nodes[:, 0]], places, partner) > least]
     if len(waiting):
-        tried = without_broken(system, state.broken_stitches, np.union1d(state.parted_stitches, waiting))
+        tried = without_broken(system, state.broken_stitches, np.union1d(state.separated_stitches, waiting))
         near = tried.stitching.broken[_are_near(tried, state, waiting, least)]
         waiting = np.setdiff1d(waiting, near)
     if not len(waiting):
         return system, state
-    state = replace(state, parted_stitches=np.union1d(state.parted_stitches, waiting))
-    return without_broken(system, state.broken_stitches, state.parted_stitches), state
+    state = replace(state, separated_stitches=np.union1d(state.separated_stitches, waiting))
+    return without_broken(system, state.broken_stitches, state.separated_stitches), state
 
 
 def _are_near(system: System, state: State, waiting: NDArray[np.int64], least: float) -> NDArray[np.bool_]:
