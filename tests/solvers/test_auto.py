@@ -10,7 +10,7 @@ from supple.app.cli.run_estimate import RunEstimate, faster_ways
 from supple.app.cli.run_rows import run_rows
 from supple.app.scene_file.loader import load_run
 from supple.app.scene_file.new_scenes import new_scene
-from supple.app.studies.sources import FunctionSource
+from supple.app.studies.sources import varied_function
 from supple.model.system import build_system, initial_state
 from supple.results import progress
 from supple.solvers.auto import Auto, Counts
@@ -128,8 +128,8 @@ def test_a_scene_file_leaves_the_choice_to_the_scene(tmp_path):
     assert run.chosen_solver == sp.XPBD(accuracy=0.1)
     (tmp_path / "ball.yaml").write_text(text.replace("youngs: 5e4", "youngs: 1e9"))
     assert load_run(tmp_path / "ball.yaml").chosen_solver == sp.Implicit()
-    job = FunctionSource(lambda: load_run(tmp_path / "ball.yaml").scene, None, 1 / 60, 3).job({})
-    assert job.load(tmp_path).chosen_solver == sp.Implicit()
+    job = varied_function(lambda: load_run(tmp_path / "ball.yaml").scene, None, 1 / 60, 3)({}).job
+    assert job(tmp_path).chosen_solver == sp.Implicit()
 
 
 def test_a_run_folder_keeps_the_choice_and_resume_takes_it(tmp_path):

@@ -18,9 +18,10 @@ def test_the_files_of_the_page(tmp_path):
     points = described.design.points(described.factors)
     assert len(points) == 12
     for point in points:
-        described.source.check(
+        case = described.source(
             {path: point[name] for name in point for path in described.factors[name].paths or [name]}
         )
+        assert case.refusal == ""
 
 
 def test_the_program_of_the_page_runs(tmp_path, monkeypatch):

@@ -40,7 +40,7 @@ def test_the_contents_of_a_study_file(write):
         "size": Factor(loguniform=(0.1, 1.0), count=2, paths=("bodies.cube.shape.size.0", "bodies.cube.shape.size.1")),
     }
     assert study.design == sp.studies.Grid()
-    assert study.units == {"drop": "m", "energy": "J"}
+    assert study.units == {"gravity.1": "m/s^2", "size": "m", "drop": "m", "energy": "J"}
     assert len(study.design.points(study.factors)) == 4
     assert Draft202012Validator(study_schema()).is_valid(yaml.safe_load(STUDY))
 

@@ -325,10 +325,10 @@ def test_two_studies_in_one_folder_are_refused(tmp_path):
 
 def test_a_case_that_another_worker_is_busy_with_is_lost_and_not_damaged(tmp_path):
     from supple.app.studies.run_case import Measuring, run_case
-    from supple.app.studies.sources import FunctionJob
+    from supple.app.studies.sources import varied_function
     from supple.runtime.lock import FolderLock
 
-    job = FunctionJob(make_fall, {"gravity": 1.0}, SETTINGS["solver"], FALL_DT, FALL_STEPS)
+    job = varied_function(make_fall, SETTINGS["solver"], FALL_DT, FALL_STEPS)({"gravity": 1.0}).job
     held = FolderLock(tmp_path)
     result = run_case(job, tmp_path, Measuring(DROP, "", 30.0))
     assert (result.status, result.lost) == ("failed", True)

@@ -7,19 +7,21 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.studies.cases import Case, CaseResult, read_result, write_result
+from supple.app.studies.run_case import CaseResult, read_result, write_result
+from supple.app.studies.sources import Case
 from supple.app.studies.table import StudyTable
 
 
 def table_of(points, measure, failed=(), units=None):
-    cases = [Case(f"{k:04x}", point) for k, point in enumerate(points)]
-    results = {
-        case.key: CaseResult("failed", reason="no, really")
-        if k in failed
-        else CaseResult("done", {"y": measure(**case.values)})
-        for k, case in enumerate(cases)
-    }
-    return StudyTable.of(Path("s"), tuple(points[0]), units or {}, cases, results)
+    def job(folder):
+        raise AssertionError
+
+    results = [
+        CaseResult("failed", reason="no, really") if k in failed else CaseResult("done", {"y": measure(**point)})
+        for k, point in enumerate(points)
+    ]
+    cases = [Case(f"{k:04x}", point, job) for k, point in enumerate(points)]
+    return StudyTable(Path("s"), tuple(points[0]), units or {}, tuple(zip(cases, results, strict=True)))
 
 
 GRID = sp.studies.Grid().points(
@@ -52,7 +54,7 @@ def test_columns_and_csv(tmp_path):
 
 
 def test_results_are_read_back_and_damaged_ones_are_ignored(tmp_path):
-    result = CaseResult("done", {"y": 0.1 + 0.2}, measured_by="m", frames=3, wall_seconds=1.5, simulated=True)
+    result = CaseResult("done", {"y": 0.1 + 0.2}, measured_by="m", wall_seconds=1.5, simulated=True)
     write_result(tmp_path, result)
     assert read_result(tmp_path) == result
     path = tmp_path / "result.json"

@@ -3,105 +3,81 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-from supple.app.studies.cases import Case, CaseResult
-from supple.app.studies.run_case import Measuring, run_case
-from supple.app.studies.sources import Job
+from supple.app.studies.run_case import CaseResult, Measuring, run_case
+from supple.app.studies.sources import Case
 from supple.errors import StudyError
-from supple.runtime.memory import available_bytes, end_with_parent, in_words
+from supple.runtime.memory import available_bytes, end_with_parent
 
 # Of the memory that is available, what all processes of a study on this machine may use together.
 _SHARE = 0.9
 _CONNECT_SECONDS = 30
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
 
-
-@dataclass(frozen=True)
-class Task:
-    """A case that is to be simulated."""
-
-    case: Case
-    job: Job
-    folder: Path
+Results = Generator[tuple[Case, CaseResult]]
 
 
-Keep = Callable[[Task, CaseResult], None]
+def results_of(
+    cases: Sequence[Case], study: Path, workers: int | None, scheduler: str | None, measuring: Measuring
+) -> Results:
+    """The results of cases as they end, which are kept in the folder of the study.
 
-
-def run_here(tasks: list[Task], workers: int | None, measuring: Measuring, keep: Keep) -> None:
-    """Simulate cases in processes of this machine, which share its cores and memory equally (None: one per core).
-
-    Cases whose process was lost, and those that need more memory than a share, are simulated one at a time at the end.
-    """
-    count = workers or os.cpu_count() or 1
-    available = available_bytes()
-    budget = None if available is None else int(_SHARE * available)
-    queue, alone = deque(tasks), []
-    while queue:
-        with _processes(count) as executor:
-            share = replace(measuring, memory=None if budget is None else budget // count)
-            for task, result in _results(executor, queue, count, share):
-                if result.lost or result.status == "deferred":
-                    alone.append(task)
-                else:
-                    keep(task, result)
-    queue = deque(alone)
-    while queue:
-        with _processes(1) as executor:
-            for task, result in _results(executor, queue, 1, replace(measuring, memory=budget)):
-                if result.status == "deferred":
-                    need = f"needs about {in_words(result.bytes_needed)} of memory"
-                    result = replace(
-                        result, status="failed", reason=f"{need}; {in_words(budget or 0)} can be used here"
-                    )
-                keep(task, result)
-
-
-def run_on_cluster(tasks: list[Task], scheduler: str, measuring: Measuring, keep: Keep) -> None:
-    """Simulate cases on the workers of a scheduler of `dask.distributed`, such as "tcp://node1:8786".
+    They are simulated in processes of this machine, which share its cores and memory equally (None: one per core).
+    Cases whose process was lost, and those that need more memory than a share, come at the end, one at a time. With
+    a scheduler of `dask.distributed`, such as "tcp://node1:8786", its workers simulate them.
 
     Raises
     ------
     StudyError : where the scheduler cannot be reached.
     """
-    with _cluster(scheduler) as executor:
-        for task, result in _results(executor, deque(tasks), len(tasks), measuring):
-            keep(task, result)
+    waiting, alone = deque(cases), deque[Case]()
+    if scheduler is not None and waiting:
+        with _cluster(scheduler) as executor:
+            yield from _results(executor, waiting, len(waiting), study, measuring)
+    available = available_bytes()
+    budget = math.inf if available is None else _SHARE * available
+    for queue, count in (waiting, workers or os.cpu_count() or 1), (alone, 1):
+        share = replace(measuring, memory=budget / count)
+        while queue:
+            with _processes(count) as executor:
+                for case, result in _results(executor, queue, count, study, share):
+                    if queue is waiting and (result.lost or result.status == "deferred"):
+                        alone.append(case)
+                    else:
+                        yield case, replace(result, status="done" if result.status == "done" else "failed")
 
 
-def _results(
-    executor: Executor, queue: deque[Task], width: int, measuring: Measuring
-) -> Iterator[tuple[Task, CaseResult]]:
+def _results(executor: Executor, queue: deque[Case], width: int, study: Path, measuring: Measuring) -> Results:
     """The results of the cases as they end, at most `width` at a time; ends early where the executor is broken.
 
     The cases that a broken executor was busy with are lost; the others are still in the queue.
     """
-    running: dict[Future[CaseResult], Task] = {}
+    running: dict[Future[CaseResult], Case] = {}
     broken = False
     while running or (queue and not broken):
         while queue and len(running) < width and not broken:
-            task = queue.popleft()
             try:
-                running[executor.submit(run_case, task.job, task.folder, measuring)] = task
+                running[executor.submit(run_case, queue[0].job, queue[0].folder(study), measuring)] = queue[0]
+                queue.popleft()
             except BrokenProcessPool:
                 broken = True
-                queue.appendleft(task)
         for future in wait(running, return_when=FIRST_COMPLETED).done:
-            task = running.pop(future)
+            case = running.pop(future)
             try:
                 result = future.result()
             except Exception as error:  # in sending the job or the result, or a lost worker
                 broken = broken or isinstance(error, BrokenProcessPool)
                 result = CaseResult("failed", reason=_reason(error), measured_by=measuring.identity, lost=True)
-            yield task, result
+            yield case, result
 
 
 def _reason(error: Exception) -> str:

@@ -1,20 +1,23 @@
-"""The factors of a study: the values that one quantity takes, as a list or as a range with a distribution."""
+"""Factors of a study, which are the values that one quantity takes, and designs, which choose their combinations."""
 
 from __future__ import annotations
 
+import itertools
+import json
 import math
-from collections.abc import Sequence
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import methodcaller
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.errors import SceneError, StudyError
 from supple.kinds.forms import Form, Limits, Name, Whole
 from supple.kinds.kind import Kind
 
-MOST_LEVELS = 100_000
+MOST_LEVELS, MOST_CASES = 100_000, 1_000_000
 
 
 @dataclass(frozen=True)
@@ -63,11 +66,9 @@ class Factor(Kind):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key in ("uniform", "loguniform"):
-            ends = getattr(self, key)
-            if ends is not None and not (np.isfinite(ends).all() and (key == "uniform" or ends[0] > 0.0)):
-                bound = "finite" if key == "uniform" else "finite and above zero"
-                raise StudyError(f"factor: {key} is {list(ends)}; both ends must be {bound}")
+        for ends, least, bound in (self.uniform, -math.inf, "finite"), (self.loguniform, 0.0, "finite and above zero"):
+            if ends is not None and not least < ends[0] < ends[1] < math.inf:
+                raise StudyError(f"factor: the range is {list(ends)}; both ends must be {bound}")
 
     def levels(self, name: str) -> list[Any]:
         """The values that a grid uses.
@@ -80,21 +81,19 @@ class Factor(Kind):
             return list(self.values)
         if self.count is None:
             raise StudyError(f"factor {name!r}: a grid needs the number of levels of a range; give its count")
-        return self.quantiles(np.linspace(0.0, 1.0, self.count))
+        return self.quantiles(np.linspace(0.0, 1.0, self.count).tolist())
 
-    def quantiles(self, u: NDArray[np.float64]) -> list[Any]:
-        """The values at the shares u (n,) of the distribution, 0 <= u <= 1."""
+    def quantiles(self, shares: Iterable[float]) -> list[Any]:
+        """The values at shares of the distribution, from 0 to 1. Those at the ends are exact."""
         if self.values is not None:
-            last = len(self.values) - 1
-            return [self.values[min(int(share * len(self.values)), last)] for share in u]
+            count = len(self.values)
+            return [self.values[min(int(share * count), count - 1)] for share in shares]
         if self.uniform is not None:
             low, high = self.uniform
-            # Not low + u (high - low), which can miss `high` by round-off at u = 1.
-            return [float((1.0 - share) * low + share * high) for share in u]
+            return [(1.0 - share) * low + share * high for share in shares]
         assert self.loguniform is not None
         low, high = self.loguniform
-        ratio = math.log(high / low)
-        return [high if share == 1.0 else min(low * math.exp(share * ratio), high) for share in u]
+        return [min(max(low ** (1.0 - share) * high**share, low), high) for share in shares]
 
 
 def uniform(low: float, high: float, count: int | None = None) -> Factor:
@@ -134,15 +133,11 @@ def as_factor(name: str, given: Any) -> Factor:
     ------
     StudyError : where it is neither, or a value is not one of JSON's.
     """
-    if isinstance(given, Factor):
-        return given
-    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
-        hint = "give a list of values, sp.studies.uniform(...) or sp.studies.loguniform(...)"
-        raise StudyError(f"factor {name!r} is {given!r}; {hint}")
     try:
-        return Factor(values=tuple(given))
+        return given if isinstance(given, Factor) else Factor(values=given)
     except StudyError as error:
-        raise StudyError(f"factor {name!r}: {str(error).removeprefix('factor: ')}") from None
+        of_name = str(error).replace("factor: values", f"factor {name!r}").replace("factor: ", f"factor {name!r}: ")
+        raise StudyError(of_name) from None
 
 
 def plain(value: Any, what: str) -> Any:
@@ -152,14 +147,73 @@ def plain(value: Any, what: str) -> Any:
     ------
     SceneError : where it is none of these; the text begins with `what`.
     """
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, float) and not math.isfinite(value):
-        raise SceneError(f"{what}: the value {value!r} is not finite")
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if isinstance(value, list | tuple):
-        return [plain(item, what) for item in value]
-    if isinstance(value, dict) and all(isinstance(key, str) for key in value):
-        return {key: plain(item, what) for key, item in value.items()}
-    raise SceneError(f"{what}: the value {value!r} is a {type(value).__name__}; give numbers, texts, or lists of these")
+    try:
+        return json.loads(json.dumps(value, allow_nan=False, default=methodcaller("tolist")))
+    except (AttributeError, TypeError, RecursionError):
+        kind = type(value).__name__
+        raise SceneError(f"{what}: the value {value!r} is a {kind}; give numbers, texts, or lists of these") from None
+    except ValueError:
+        raise SceneError(f"{what}: the value {value!r} is not finite") from None
+
+
+@dataclass(frozen=True)
+class Design(Kind):
+    """How the cases of a study are chosen."""
+
+    error: ClassVar[type[StudyError]] = StudyError
+
+    @abstractmethod
+    def points(self, factors: Mapping[str, Factor]) -> list[dict[str, Any]]:
+        """The value of every factor in each case.
+
+        Raises
+        ------
+        StudyError : where the factors do not fit the design.
+        """
+
+
+@dataclass(frozen=True)
+class Grid(Design):
+    """Every combination of all levels; the last factor varies fastest."""
+
+    kind: ClassVar[str] = "grid"
+
+    def points(self, factors: Mapping[str, Factor]) -> list[dict[str, Any]]:
+        levels = [factor.levels(name) for name, factor in factors.items()]
+        count = math.prod(map(len, levels))
+        if count > MOST_CASES:
+            raise StudyError(f"the study has {count:.4g} cases; at most {MOST_CASES} are allowed: use fewer levels")
+        return [dict(zip(factors, values, strict=True)) for values in itertools.product(*levels)]
+
+
+@dataclass(frozen=True)
+class LatinHypercube(Design):
+    """Random points, of which exactly one lies in each of `samples` equally likely strata of every factor.
+
+    McKay, Beckman, Conover, "A comparison of three methods for selecting values of input variables in the analysis of
+    output from a computer code", Technometrics 21 (1979).
+
+    Parameters
+    ----------
+    samples : number of cases
+    seed : of the random numbers
+
+    Raises
+    ------
+    StudyError : where `samples` is not a whole number above zero.
+    """
+
+    kind: ClassVar[str] = "latin_hypercube"
+
+    samples: Annotated[int, Whole(1, MOST_CASES)]
+    seed: Annotated[int, Whole(0, 2**63 - 1)] = 0
+
+    def points(self, factors: Mapping[str, Factor]) -> list[dict[str, Any]]:
+        from scipy.stats import qmc
+
+        shares = qmc.LatinHypercube(len(factors), rng=self.seed).random(self.samples).T.tolist()
+        columns = [factor.quantiles(own) for factor, own in zip(factors.values(), shares, strict=True)]
+        return [dict(zip(factors, values, strict=True)) for values in zip(*columns, strict=True)]
+
+
+DESIGNS = (Grid, LatinHypercube)

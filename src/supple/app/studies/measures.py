@@ -1,9 +1,10 @@
-"""Measures that a study file can name: numbers taken from a recording."""
+"""Measures: functions of a recording that return numbers, and those that a study file can name."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
 
 Array = NDArray[np.float64]
+MeasureFunction = Callable[[Recording], "float | Mapping[str, float]"]
 AXES = ("x", "y", "z")
 NUMBERS = {
     "kinetic_energy": "J",
@@ -108,9 +110,7 @@ class Measure(Kind):
         return np.array([OVER[self.over or "mean"](self._component(of_frame)) for of_frame in of_frames])
 
     def _component(self, vectors: Array) -> Array:
-        if self.axis in AXES:
-            return vectors[..., AXES.index(self.axis)]
-        return np.linalg.norm(vectors, axis=-1)
+        return vectors[..., AXES.index(self.axis)] if self.axis in AXES else np.linalg.norm(vectors, axis=-1)
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,27 @@ class Measures:
     def __call__(self, recording: Recording) -> dict[str, float]:
         return {name: measure.of(recording) for name, measure in self.named.items()}
 
-    def __repr__(self) -> str:
-        return repr({name: asdict(measure) for name, measure in self.named.items()})
-
     @property
     def units(self) -> dict[str, str]:
         return {name: measure.unit for name, measure in self.named.items()}
+
+
+def measured(recording: Recording, measure: MeasureFunction) -> dict[str, float]:
+    """The finite numbers that a measure returns, by name.
+
+    Raises
+    ------
+    StudyError : where it returns anything else.
+    """
+    given: Any = measure(recording)
+    measures = {}
+    for name, value in (given if isinstance(given, Mapping) else {"measure": given}).items():
+        number = np.asarray(value)
+        if number.shape != () or number.dtype.kind not in "iufb":
+            raise StudyError(f"the measure {name!r} is {value!r}; return a number, or numbers by name")
+        if not math.isfinite(number):
+            raise StudyError(f"the measure {name!r} is {float(number)!r}; it must be finite")
+        measures[str(name)] = float(number)
+    if not measures:
+        raise StudyError("no measure was returned; return a number, or numbers by name")
+    return measures

@@ -1,36 +1,60 @@
-"""Simulating one case, in a worker process."""
+"""Simulating one case, in a worker process, and the result that it leaves in the case's folder."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import os
 import threading
 import time
 import traceback
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
-import numpy as np
 from numba.core import config
 
 from supple.app.runs.recorded import simulate_recorded
-from supple.app.studies.cases import CHECKPOINT, LOG, RECORDING, CaseResult, read_result, write_result
+from supple.app.studies.measures import MeasureFunction, measured
 from supple.app.studies.sources import Job
-from supple.errors import StudyError, SuppleError
-from supple.results.recording.reader import Recording, read_recording
+from supple.errors import SuppleError
+from supple.results.recording.reader import read_recording
 from supple.runtime.lock import FolderLock
+from supple.runtime.memory import in_words
+from supple.runtime.replacing import whole_file
 from supple.runtime.threads import numba_threads
 
-Measure = Callable[[Recording], "float | Mapping[str, float]"]
-
+RESULT, RECORDING, LOG, CHECKPOINT = "result.json", "recording.vtkhdf", "log.txt", "checkpoint"
 # A worker has cores and memory for one case.
 _ONE_CASE = threading.Lock()
 _LONGEST_REASON = 500
 # The memory of a worker that has simulated a small scene: Python, NumPy, Numba, compiled kernels [bytes].
 _PROGRAM = 300_000_000
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """How a case ended.
+
+    Attributes
+    ----------
+    status : "done", "failed", or "deferred" where the worker has not enough memory for it
+    measures : by name; empty unless done
+    reason : one line, why it is not done
+    measured_by : the identity of what measured; other measures are taken from the recording
+    simulated : whether the recording is complete, so that other measures can be taken from it
+    lost : whether it failed because its worker was lost, which is worth another try
+    wall_seconds : of the simulation and the first measures
+    """
+
+    status: Literal["done", "failed", "deferred"]
+    measures: dict[str, float] = field(default_factory=dict)
+    reason: str = ""
+    measured_by: str = ""
+    simulated: bool = False
+    lost: bool = False
+    wall_seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -40,14 +64,29 @@ class Measuring:
     Attributes
     ----------
     measure : takes the recording; identity : of the measure
-    checkpoint_seconds : time from checkpoint to checkpoint [s]
-    memory : what a case may use [bytes]; None where it is unknown
+    checkpoint_seconds : time from checkpoint to checkpoint [s]; memory : what a case may use [bytes]
     """
 
-    measure: Measure
+    measure: MeasureFunction
     identity: str
     checkpoint_seconds: float
-    memory: int | None = None
+    memory: float = math.inf
+
+
+def write_result(folder: Path, result: CaseResult) -> None:
+    """Keep a result in the case's folder."""
+    with whole_file(folder / RESULT) as fresh:
+        fresh.write_text(json.dumps(asdict(result), indent=1) + "\n", encoding="utf-8")
+
+
+def read_result(folder: Path) -> CaseResult | None:
+    """The result in a case's folder; None where none exists, or none that can be understood."""
+    try:
+        result = CaseResult(**json.loads((folder / RESULT).read_text(encoding="utf-8")))
+        result = replace(result, measures={str(name): float(value) for name, value in result.measures.items()})
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
+        return None
+    return result if result.status in ("done", "failed") and isinstance(result.reason, str) else None
 
 
 def run_case(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
@@ -63,67 +102,40 @@ def run_case(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
         except (SuppleError, OSError) as error:
             return CaseResult("failed", reason=_reason(error), lost=True)
         try:
-            return _kept(job, folder, measuring)
+            result = _ended(job, folder, measuring)
+            if result.status != "deferred":
+                write_result(folder, result)
+            return result
+        except (SuppleError, OSError) as error:
+            return CaseResult("failed", reason=_reason(error))
         finally:
             lock.release()
 
 
-def _kept(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
-    """The result of a case in a folder that no other worker uses; it is kept there."""
-    began = time.perf_counter()
-    result = CaseResult("failed")
+def _ended(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
+    """How a case ends in a folder that no other worker uses."""
+    began, result = time.perf_counter(), read_result(folder)
+    if result is None or not result.simulated or not (folder / RECORDING).exists():
+        result = CaseResult("failed")
+    result = replace(result, status="failed", measures={}, measured_by=measuring.identity)
     try:
-        result = _earlier(folder) or _simulated(job, folder, measuring)
+        if not result.simulated:
+            run = job(folder)
+            needed = _PROGRAM + run.chosen_solver.bytes_needed(run.scene)
+            if needed > measuring.memory:
+                need = f"needs about {in_words(needed)} of memory; {in_words(measuring.memory)} can be used here"
+                return CaseResult("deferred", reason=need)
+            _, problem = simulate_recorded(run, folder / RECORDING, folder / CHECKPOINT, measuring.checkpoint_seconds)
+            result = replace(result, simulated=not problem, reason=problem[:_LONGEST_REASON])
         if result.simulated:
-            result = replace(result, status="failed", reason="", measures={})
-            result = replace(result, status="done", measures=_measured(folder / RECORDING, measuring.measure))
+            with read_recording(folder / RECORDING) as recording:
+                result = replace(result, status="done", measures=measured(recording, measuring.measure), reason="")
     # Of any kind: the function that makes the scene, and the measure, are the user's.
     except (Exception, SystemExit) as error:
         with contextlib.suppress(OSError):
             (folder / LOG).write_text(traceback.format_exc(), encoding="utf-8")
         result = replace(result, reason=_reason(error))
-    if result.status == "deferred":
-        return result
-    result = replace(result, measured_by=measuring.identity, wall_seconds=result.wall_seconds or _since(began))
-    try:
-        write_result(folder, result)
-    except (SuppleError, OSError) as error:
-        return CaseResult("failed", reason=_reason(error))
-    return result
-
-
-def _earlier(folder: Path) -> CaseResult | None:
-    """The result of an earlier run of the study, where its recording is complete."""
-    result = read_result(folder)
-    return result if result is not None and result.simulated and (folder / RECORDING).exists() else None
-
-
-def _simulated(job: Job, folder: Path, measuring: Measuring) -> CaseResult:
-    run = job.load(folder)
-    needed = _PROGRAM + run.chosen_solver.bytes_needed(run.scene)
-    if measuring.memory is not None and needed > measuring.memory:
-        return CaseResult("deferred", bytes_needed=needed)
-    frames, problem = simulate_recorded(run, folder / RECORDING, folder / CHECKPOINT, measuring.checkpoint_seconds)
-    status = "failed" if problem else "done"
-    reason = problem[:_LONGEST_REASON]
-    return CaseResult(status, reason=reason, frames=frames, simulated=not problem, bytes_needed=needed)
-
-
-def _measured(path: Path, measure: Measure) -> dict[str, float]:
-    with read_recording(path) as recording:
-        given: Any = measure(recording)
-    named = given if isinstance(given, Mapping) else {"measure": given}
-    measures = {}
-    for name, value in named.items():
-        number = np.asarray(value)
-        if number.shape != () or number.dtype.kind not in "iufb":
-            raise StudyError(f"the measure {name!r} is {value!r}; return a number, or numbers by name")
-        if not math.isfinite(number):
-            raise StudyError(f"the measure {name!r} is {float(number)!r}; it must be finite")
-        measures[str(name)] = float(number)
-    if not measures:
-        raise StudyError("no measure was returned; return a number, or numbers by name")
-    return measures
+    return replace(result, wall_seconds=result.wall_seconds or round(time.perf_counter() - began, 3))
 
 
 def _threads() -> int:
@@ -137,7 +149,3 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         text = f"there was not enough memory: {error or 'make the meshes coarser'}"
     return " ".join(text.split())[:_LONGEST_REASON]
-
-
-def _since(began: float) -> float:
-    return round(time.perf_counter() - began, 3)

@@ -1,189 +1,154 @@
-"""What a study varies: a scene file, or a function that makes a scene. Either one gives a job for each case."""
+"""What a study varies: a scene file, or a function that makes a scene. Either one prepares each case."""
 
 from __future__ import annotations
 
 import hashlib
 import inspect
 import json
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache, partial
+from glob import escape
 from pathlib import Path
 from typing import Any
 
+from supple import __version__
 from supple.app.scene_file.loader import Run, load_run, validated
-from supple.app.scene_file.paths import unit_of, with_values
-from supple.app.scene_file.yaml_files import YamlDocument, read_yaml, yaml_text
-from supple.errors import StudyError
+from supple.app.scene_file.paths import with_values
+from supple.app.scene_file.yaml_files import read_yaml, yaml_text
+from supple.errors import StudyError, SuppleError
 from supple.runtime.replacing import whole_file
 from supple.scene.scene import Scene
 from supple.solvers.auto import Auto
 from supple.solvers.solver import Solver
 
-SCENE_FILE = "scene.yaml"
-_BLOCK = 1 << 20
-
-
-class Job(ABC):
-    """One case of a study, as it is sent to a worker."""
-
-    @abstractmethod
-    def load(self, folder: Path) -> Run:
-        """What is to be simulated; `folder` is the case's own.
-
-        Raises
-        ------
-        SuppleError : where the case cannot be simulated.
-        """
-
-
-class Source(ABC):
-    """What is varied."""
-
-    @abstractmethod
-    def job(self, values: Mapping[str, Any]) -> Job:
-        """The job for one combination of values.
-
-        Raises
-        ------
-        StudyError : where a factor does not exist: a fault of the study, not of one case.
-        """
-
-    @abstractmethod
-    def identity(self, values: Mapping[str, Any]) -> str:
-        """What the results of the case depend on, as a text: equal texts have equal results."""
-
-    def check(self, values: Mapping[str, Any]) -> None:
-        """Raise `SuppleError` where the values are not allowed, as far as this can be known without building anything.
-
-        Sources that know nothing before they build do not override this method.
-        """
-        return
-
-    def unit(self, name: str) -> str:
-        """The unit of a factor, where it is known."""
-        return ""
+Job = Callable[[Path], Run]
+"""What a worker gets of a case: takes the case's folder, and returns what is to be simulated, or raises."""
+_DIGITS = 16  # of a hash: a chance of 1e-8 that two of a million cases have the same
 
 
 @dataclass(frozen=True)
-class FileJob(Job):
-    """A scene file, complete, with absolute paths of its meshes."""
+class Case:
+    """One combination of values.
 
-    text: str
+    Attributes
+    ----------
+    key : hash of everything that the results depend on; name of the case's folder
+    values : of the factors
+    job : what a worker does; refusal : why the values are not allowed, as far as is known without building anything
+    """
 
-    def load(self, folder: Path) -> Run:
-        path = folder / SCENE_FILE
-        with whole_file(path) as fresh:
-            fresh.write_text(self.text, encoding="utf-8")
-        return load_run(path)
+    key: str
+    values: Mapping[str, Any]
+    job: Job
+    refusal: str = ""
+
+    def folder(self, study: Path) -> Path:
+        return study / "cases" / self.key
 
 
-class FileSource(Source):
+Source = Callable[[Mapping[str, Any]], Case]
+"""What is varied: gives the case with some values; raises `SuppleError` for a fault of the study, not of one case."""
+
+
+def varied_file(path: str | Path) -> Source:
     """A scene file; factors are dotted paths into it.
 
     Raises
     ------
-    SceneError : where the file cannot be read.
+    SceneError : where the file cannot be read, and of the source, where a path leads to no place in it.
+    """
+    folder, document, digest = Path(path).parent, read_yaml(path), cache(_digest)
+
+    def case(values: Mapping[str, Any]) -> Case:
+        data = with_values(document.data, values)
+        digests = [digest(folder / entry["file"]) for entry in _mesh_files(data)]
+        key, refusal = digest_of(__version__, json.dumps([data, digests], sort_keys=True)), ""
+        try:
+            validated(replace(document, data=data))
+        except SuppleError as error:
+            refusal = str(error)
+        for entry in _mesh_files(data):
+            entry["file"] = str((folder / entry["file"]).absolute())
+        return Case(key, values, partial(_run_of_text, yaml_text(data)), refusal)
+
+    return case
+
+
+def varied_function(make: Callable[..., Any], solver: Solver | Auto | None, dt: float, steps: int) -> Source:
+    """A function of the factors. `solver`, `dt` [s] and `steps` are for functions that return a `Scene`.
+
+    The source raises `StudyError` where the function does not take the factors.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        self._document = read_yaml(self.path)
-        self._digests: dict[Path, str] = {}
-        self._factors: set[str] = set()
-
-    def job(self, values: Mapping[str, Any]) -> FileJob:
-        data = with_values(self._document.data, values)
-        for entry in _mesh_files(data):
-            entry["file"] = str((self.path.parent / entry["file"]).absolute())
-        return FileJob(yaml_text(data))
-
-    def identity(self, values: Mapping[str, Any]) -> str:
-        data = with_values(self._document.data, values)
-        files = [self._digest(self.path.parent / entry["file"]) for entry in _mesh_files(data)]
-        return json.dumps([data, files], sort_keys=True)
-
-    def check(self, values: Mapping[str, Any]) -> None:
-        validated(self._changed(values))
-
-    def unit(self, name: str) -> str:
-        return unit_of(name)
-
-    def _changed(self, values: Mapping[str, Any]) -> YamlDocument:
-        return replace(self._document, data=with_values(self._document.data, values))
-
-    def _digest(self, path: Path) -> str:
-        """Of the contents of a mesh file, and of its siblings: a TetGen mesh consists of several files of one stem."""
-        if path not in self._digests:
-            digest = hashlib.sha256()
-            try:
-                for file in sorted(other for other in path.parent.iterdir() if other.stem == path.stem):
-                    if file.is_file():
-                        digest.update(file.name.encode())
-                        with file.open("rb") as opened:
-                            while block := opened.read(_BLOCK):
-                                digest.update(block)
-            except OSError as error:
-                digest.update(str(error).encode())  # the case itself reports what cannot be read
-            self._digests[path] = digest.hexdigest()
-        return self._digests[path]
-
-
-@dataclass(frozen=True)
-class FunctionJob(Job):
-    """A call of a function that returns a `Scene` or a `Run`."""
-
-    make: Callable[..., Any]
-    values: Mapping[str, Any]
-    solver: Solver | Auto | None
-    dt: float
-    steps: int
-
-    def load(self, folder: Path) -> Run:
-        made = self.make(**self.values)
-        if isinstance(made, Run):
-            return made
-        name = getattr(self.make, "__name__", "the function")
-        if not isinstance(made, Scene):
-            raise StudyError(f"{name} returned a {type(made).__name__}; return a Scene, or a Run with its own solver")
-        return Run(made, self.solver or Auto(), self.dt, self.steps)
-
-
-class FunctionSource(Source):
-    """A function of the factors. `solver`, `dt` [s] and `steps` are for functions that return a `Scene`."""
-
-    def __init__(self, make: Callable[..., Any], solver: Solver | Auto | None, dt: float, steps: int) -> None:
-        self.make, self.solver, self.dt, self.steps = make, solver, dt, steps
-
-    def job(self, values: Mapping[str, Any]) -> FunctionJob:
+    def case(values: Mapping[str, Any]) -> Case:
         try:
-            inspect.signature(self.make).bind(**values)
+            inspect.signature(make).bind(**values)
         except TypeError as error:
-            name = getattr(self.make, "__name__", repr(self.make))
-            raise StudyError(f"{name} cannot be called with {', '.join(values)}: {error}") from None
+            raise StudyError(f"{_name(make)} cannot be called with {', '.join(values)}: {error}") from None
         except ValueError:  # a built-in function without a signature
             pass
-        return FunctionJob(self.make, values, self.solver, self.dt, self.steps)
+        text = json.dumps([text_of(make), repr(solver), dt, steps, dict(values)], sort_keys=True)
+        return Case(digest_of(__version__, text), values, partial(_run_of_function, make, values, solver, dt, steps))
 
-    def identity(self, values: Mapping[str, Any]) -> str:
-        return json.dumps([self._code, repr(self.solver), self.dt, self.steps, dict(values)], sort_keys=True)
+    return case
 
-    @property
-    def _code(self) -> str:
-        """The function's name and text. What it calls is not included."""
-        try:
-            return f"{self.make.__qualname__}\n{inspect.getsource(self.make)}"
-        except (OSError, TypeError, AttributeError):
-            return repr(getattr(self.make, "__qualname__", type(self.make).__qualname__))
+
+def digest_of(*texts: str) -> str:
+    """A short hash of texts."""
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:_DIGITS]
+
+
+def text_of(function: Callable[..., Any]) -> str:
+    """A function's name and text. What it calls is not included."""
+    name = getattr(function, "__qualname__", type(function).__qualname__)
+    try:
+        return f"{name}\n{inspect.getsource(function)}"
+    except (OSError, TypeError):
+        return name
+
+
+def _name(function: Callable[..., Any]) -> str:
+    return getattr(function, "__name__", repr(function))
+
+
+def _run_of_text(text: str, folder: Path) -> Run:
+    """Of a complete scene file, with absolute paths of its meshes; it stays in the folder."""
+    path = folder / "scene.yaml"
+    with whole_file(path) as fresh:
+        fresh.write_text(text, encoding="utf-8")
+    return load_run(path)
+
+
+def _run_of_function(
+    make: Callable[..., Any], values: Mapping[str, Any], solver: Solver | Auto | None, dt: float, steps: int, _: Path
+) -> Run:
+    made = make(**values)
+    if isinstance(made, Scene):
+        return Run(made, solver or Auto(), dt, steps)
+    if not isinstance(made, Run):
+        kind = type(made).__name__
+        raise StudyError(f"{_name(make)} returned a {kind}; return a Scene, or a Run with its own solver")
+    return made
+
+
+def _digest(path: Path) -> str:
+    """Of the contents of a mesh file, and of its siblings: a TetGen mesh consists of several files of one stem."""
+    files = [path, *sorted(path.parent.glob(f"{escape(path.stem)}.*"))]
+    try:
+        return digest_of(*(f"{file.name} {_digest_of_bytes(file)}" for file in files if file.is_file()))
+    except OSError as error:
+        return str(error)  # the case itself reports what cannot be read
+
+
+def _digest_of_bytes(file: Path) -> str:
+    with file.open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
 def _mesh_files(data: Any) -> Iterator[dict[str, Any]]:
     """Every mapping in the data that names a file."""
-    if isinstance(data, dict):
-        if isinstance(data.get("file"), str):
-            yield data
-        for value in data.values():
-            yield from _mesh_files(value)
-    elif isinstance(data, list):
-        for value in data:
-            yield from _mesh_files(value)
+    if isinstance(data, dict) and isinstance(data.get("file"), str):
+        yield data
+    for value in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        yield from _mesh_files(value)

@@ -13,11 +13,10 @@ from supple.app.scene_file.entries.mesh_sources import MeshStore
 from supple.app.scene_file.model import FilePath, Model, Name
 from supple.app.scene_file.validation_errors import scene_error
 from supple.app.scene_file.yaml_files import read_yaml
-from supple.app.studies.designs import DESIGNS, Grid
-from supple.app.studies.factors import MOST_LEVELS, Factor, Values
+from supple.app.studies.factors import DESIGNS, MOST_LEVELS, Factor, Grid, Values
 from supple.app.studies.measures import Measure, Measures
-from supple.app.studies.sources import FileSource
-from supple.app.studies.study import Study
+from supple.app.studies.sources import varied_file
+from supple.app.studies.study import Study, units_of_paths
 from supple.errors import StudyError
 from supple.scene.located import LocatedError
 
@@ -83,8 +82,8 @@ def load_study(path: str | Path) -> Study:
         raise StudyError(str(document.error((*names[int(index)], *keys), str(error)))) from None
     factors = dict(zip(model.factors, parts, strict=False))
     measures = Measures(dict(zip(model.measures, parts[len(factors) + 1 :], strict=True)))
-    source = FileSource(Path(path).parent / model.scene)
-    return Study(source, factors, parts[len(factors)] or Grid(), measures, measures.units)
+    units = units_of_paths(factors) | measures.units
+    return Study(varied_file(Path(path).parent / model.scene), factors, parts[len(factors)] or Grid(), measures, units)
 
 
 def _explicit(data: Any) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.app.studies.cases import Case, CaseResult
+from supple.app.studies.run_case import CaseResult
+from supple.app.studies.sources import Case
 from supple.errors import StudyError
 from supple.kinds.suggestion import suggestion
 from supple.runtime.replacing import whole_file
@@ -20,60 +21,42 @@ from supple.runtime.replacing import whole_file
 
 @dataclass(frozen=True, eq=False)
 class StudyTable:
-    """The cases of a study in the order of its design.
+    """The cases of a study that have ended, in the order of its design.
 
     Attributes
     ----------
     folder : of the study
     factors : names of the factors; measures : names of the measures, which failed cases do not have
     units : of both, where they are known
+    rows : (cases,) each case, and what it gave
     keys : (cases,) names of the cases' folders
-    values : (cases,) of the factors, by name; results : (cases,) what each case gave
     reasons : (cases,) why a case failed; empty where it did not
     """
 
     folder: Path
     factors: tuple[str, ...]
-    measures: tuple[str, ...]
     units: Mapping[str, str]
-    keys: tuple[str, ...]
-    values: tuple[Mapping[str, Any], ...]
-    results: tuple[CaseResult, ...]
-
-    @classmethod
-    def of(
-        cls,
-        folder: Path,
-        factors: Sequence[str],
-        units: Mapping[str, str],
-        cases: Sequence[Case],
-        results: Mapping[str, CaseResult],
-    ) -> StudyTable:
-        """The table of those cases that have a result."""
-        ended = [case for case in cases if case.key in results]
-        own = [results[case.key] for case in ended]
-        measures = dict.fromkeys(name for result in own for name in result.measures)
-        return cls(
-            folder,
-            tuple(factors),
-            tuple(measures),
-            dict(units),
-            tuple(case.key for case in ended),
-            tuple(case.values for case in ended),
-            tuple(own),
-        )
+    rows: tuple[tuple[Case, CaseResult], ...]
 
     def __len__(self) -> int:
-        return len(self.keys)
+        return len(self.rows)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(name for _, result in self.rows for name in result.measures))
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        return tuple(case.key for case, _ in self.rows)
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        return tuple(result.reason if result.status == "failed" else "" for result in self.results)
+        return tuple(result.reason if result.status == "failed" else "" for _, result in self.rows)
 
     @property
     def done(self) -> NDArray[np.bool_]:
         """(cases,) whether a case has measures."""
-        return np.array([result.status == "done" for result in self.results], dtype=bool)
+        return np.array([result.status == "done" for _, result in self.rows], dtype=bool)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """(cases,) the values of a factor, or a measure, which is NaN where the case failed.
@@ -83,9 +66,9 @@ class StudyTable:
         StudyError : where no such column exists.
         """
         if name in self.measures:
-            return np.array([result.measures.get(name, np.nan) for result in self.results])
+            return np.array([result.measures.get(name, np.nan) for _, result in self.rows])
         if name in self.factors:
-            column = [values[name] for values in self.values]
+            column = [case.values[name] for case, _ in self.rows]
             numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in column)
             if numbers:
                 return np.array(column)
@@ -109,18 +92,13 @@ class StudyTable:
         path = Path(path)
         with whole_file(path) as fresh, fresh.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            names = [*self.factors, *self.measures]
-            writer.writerow(["case", *(self.label(name) for name in names), "status", "reason"])
-            for key, values, result, reason in zip(self.keys, self.values, self.results, self.reasons, strict=True):
-                given = [_cell(values[name]) for name in self.factors]
-                measured = [_cell(result.measures.get(name)) for name in self.measures]
-                writer.writerow([key, *given, *measured, result.status, reason])
+            measures = self.measures
+            writer.writerow(["case", *map(self.label, [*self.factors, *measures]), "status", "reason"])
+            for (case, result), reason in zip(self.rows, self.reasons, strict=True):
+                values = [case.values[name] for name in self.factors] + [result.measures.get(name) for name in measures]
+                writer.writerow([case.key, *map(_cell, values), result.status, reason])
         return path
 
 
 def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, str):
-        return value
-    return json.dumps(value)
+    return "" if value is None else value if isinstance(value, str) else json.dumps(value)
