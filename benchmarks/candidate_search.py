@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import supple as sp
-from benchmarks.published import publish
 from benchmarks.table import Table
 from supple.contact.candidates import CandidateFinder
 from supple.contact.ccd import largest_step
@@ -99,13 +98,13 @@ def main(counts: tuple[int, ...] = COUNTS) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/validation/benchmarks.md."""
-    publish("candidate_search", main())
+    """Measure, and print the table."""
+    main()
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="the three smallest piles; nothing is written")
+    parser.add_argument("--quick", action="store_true", help="the three smallest piles")
     if parser.parse_args().quick:
         main(COUNTS[:3])
     else:

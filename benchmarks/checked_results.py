@@ -47,7 +47,7 @@ def ours(solver: sp.Solver) -> Callable[[str, Path], dict[str, str]]:
             if str(frame.report.status) != "converged":
                 status = str(frame.report.status)
         scenes.save(out, frames, own, scenes.lumped_masses(own))
-        return {"version": sp.__version__, "settings": f"defaults; {status}"}
+        return {"version": sp.__version__ if status == "converged" else f"{sp.__version__}, {status}"}
 
     return run
 
@@ -67,7 +67,7 @@ def main(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         "Supple XPBD": ours(sp.XPBD()),
         "Supple Implicit": ours(sp.Implicit()),
     }
-    columns = {"scene": "", "program": "", "settings": "", "verdict": "", "inverted": "", "crossing": "", "passing": "",
+    columns = {"scene": "", "program": "", "verdict": "", "inverted": "", "crossing": "", "passing": "",
                "volume": ".1%", "energy": ".1%"}  # fmt: skip
     table = Table(f"{scenes.FRAMES + 1} frames each; inverted, crossing, passing: frames with such a fault", columns)
     short: dict[str, list[str]] = {name: [] for name in programs}
@@ -86,7 +86,7 @@ def main(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
             counted = [report[check].failed_frames for check in ("inversion", "intersection", "tunnelling")]
             failed = ", ".join(result.name for result in report.failures)
             table.add(
-                name, f"{program} {about['version']}", about["settings"], failed or "passes", *map(str, counted),
+                name, f"{program} {about['version']}", failed or "passes", *map(str, counted),
                 report["volume"].worst, report["energy"].worst,
             )  # fmt: skip
             short[program].append(failed or "passes")

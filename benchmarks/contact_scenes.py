@@ -175,16 +175,14 @@ def _add(table: Table, item: str, result: dict[str, float]) -> None:
 
 
 def run() -> None:
-    """Measure the small scenes, and write the figures of docs/validation/benchmarks.md."""
-    from benchmarks.published import publish  # not above: `measured` also runs with the package of other versions
-
-    publish("contact_scenes", main(quick=True))
+    """Measure the small scenes, and print the table."""
+    main(quick=True)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
-    parser.add_argument("--quick", action="store_true", help="the small scenes, whose figures are written")
+    parser.add_argument("--quick", action="store_true", help="the small scenes, of `make bench`")
     parser.add_argument("--steps", type=int, default=MAX_STEPS, metavar="N", help="of each scene at most")
     parser.add_argument("--against", metavar="PATH", help="the folder src of another checkout")
     given = parser.parse_args()

@@ -30,7 +30,6 @@ from numba.core import config
 from numpy.ctypeslib import ndpointer
 
 import supple as sp
-from benchmarks.published import publish
 from benchmarks.table import Table
 from supple.model.system import System, build_system, initial_state
 from supple.solvers.xpbd.solver import XPBD
@@ -156,13 +155,13 @@ def main(quick: bool = False) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/validation/benchmarks.md and README.md."""
-    publish("projections", main())
+    """Measure, and print the table."""
+    main()
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="small meshes only, few rounds; nothing is written")
+    parser.add_argument("--quick", action="store_true", help="small meshes only, few rounds")
     if parser.parse_args().quick:
         main(quick=True)
     else:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from benchmarks.measuring import ROOT
 from benchmarks.table import table_text
-from benchmarks.tables import live_text, reading_text, rigid_bodies_text
+from benchmarks.tables import live_text
 from supple.runtime.replacing import whole_file
 
 DOCS = ROOT / "docs"
@@ -26,18 +26,11 @@ class Shown(NamedTuple):
 # By the name between the marks, which is that of the file.
 SHOWN = {
     "live": Shown("validation/benchmarks.md", live_text),
-    "rigid_bodies": Shown("validation/benchmarks.md", rigid_bodies_text),
-    "reading_fields": Shown("reference/forces_and_stresses.md", reading_text),
-    "tolerances": Shown("theory/implicit.md", table_text),
     "quadratic_tets": Shown("theory/locking.md", table_text),
     "checked_results": Shown("learn/check_your_simulator.md", table_text),
     "checked_results_short": Shown("../README.md", table_text),
-    "rigid_heap": Shown("theory/rigid_bodies.md", table_text),
     **dict.fromkeys(
-        (
-            *("startup", "projections", "hanging_beam", "work_precision", "implicit_scaling"),
-            *("contact_scenes", "small_scenes", "bear_pile", "candidate_search", "automatic_substeps"),
-        ),
+        ("startup", "hanging_beam", "work_precision", "implicit_scaling", "bear_pile", "automatic_substeps"),
         Shown("validation/benchmarks.md", table_text),
     ),
 }

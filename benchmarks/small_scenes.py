@@ -144,10 +144,8 @@ def main(names: list[str], against: str | None, rounds: int) -> dict[str, Any]:
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/validation/benchmarks.md."""
-    from benchmarks.published import publish  # not above: `measured` also runs with the package of other versions
-
-    publish("small_scenes", main([], None, 3))
+    """Measure, and print the table."""
+    main([], None, 3)
 
 
 if __name__ == "__main__":

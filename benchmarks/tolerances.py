@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 import supple as sp
-from benchmarks.published import publish
 from benchmarks.table import Table
 from supple.solvers.implicit.details import ImplicitDetails
 
@@ -81,8 +80,8 @@ def main(steps: int = 20) -> dict[str, Any]:
 
 
 def write() -> None:
-    """Measure, and write the figures of docs/theory/implicit.md."""
-    publish("tolerances", main())
+    """Measure, and print the table."""
+    main()
 
 
 if __name__ == "__main__":

@@ -86,8 +86,6 @@ def families(scale: int, quick: bool, threads: int | None) -> list[Family]:
                 "BDF2, 1/60 s": implicit(1, "bdf2"),
                 "BDF2, 1/240 s": implicit(4, "bdf2"),
                 "Newmark, 1/60 s": implicit(1, "newmark"),
-                "Newmark, 1/60 s, tolerance 1e-1": implicit(1, "newmark", 1e-1),
-                "Newmark, 1/120 s": implicit(2, "newmark"),
                 "Newmark, 1/240 s": implicit(4, "newmark"),
             },
         ),
@@ -97,18 +95,18 @@ def families(scale: int, quick: bool, threads: int | None) -> list[Family]:
                 "1,280 substeps" if quick else "2,560 substeps",
                 ours("xpbd_without_contact", scale, 1280 if quick else 2560),
             ),
-            {f"{n} substeps": ours("xpbd_without_contact", scale, n) for n in (10, 20, 40, 80, 160, 320)},
+            {f"{n} substeps": ours("xpbd_without_contact", scale, n) for n in (10, 20, 80, 320)},
         ),
         Family(
             "Newton VBD",
             # With more substeps it does not converge: 80 x 20 differs from 40 x 20 by 4 %, 20 x 20 by much less.
             ("40 x 20", newton("vbd", 40, 20)),
-            {f"{n} substeps x {k} iterations": newton("vbd", n, k) for n, k in ((5, 5), (10, 10), (20, 10), (20, 20))},
+            {f"{n} substeps x {k} iterations": newton("vbd", n, k) for n, k in ((10, 10), (20, 20))},
         ),
         Family(
             "Newton XPBD",
             ("320 x 1" if quick else "640 x 1", newton("xpbd", 320 if quick else 640, 1)),
-            {f"{n} substeps x {k} iterations": newton("xpbd", n, k) for n, k in ((20, 1), (80, 1), (160, 1))},
+            {f"{n} substeps x {k} iterations": newton("xpbd", n, k) for n, k in ((20, 1), (160, 1))},
         ),
         Family(
             "MuJoCo flex",
@@ -117,7 +115,6 @@ def families(scale: int, quick: bool, threads: int | None) -> list[Family]:
                 "explicit Euler, 1 ms": mujoco(1e-3, "Euler"),
                 "explicit Euler, 1/4 ms": mujoco(1 / 4e3, "Euler"),
                 "discrete, 1/60 s": mujoco(1 / 60, "discrete"),
-                "discrete, 1/240 s": mujoco(1 / 240, "discrete"),
                 "discrete, 1 ms": mujoco(1e-3, "discrete"),
             },
         ),

@@ -140,14 +140,13 @@ def test_quadratic_tets_are_compared_with_linear_ones(capsys):
 
 
 def test_plates_that_are_bodies_are_compared_with_obstacles(capsys):
-    from benchmarks import rigid_bodies, tables
+    from benchmarks import rigid_bodies
 
     figures = rigid_bodies.main(0.03, steps=4, skipped=2, rounds=1)
     assert list(figures["solvers"]) == ["Implicit", "XPBD"]
     for plates in figures["solvers"].values():
         assert list(plates) == ["obstacles", "scripted bodies", "free bodies"]
         assert all(each["ms_per_step"] > 0.0 for each in plates.values())
-    assert "| obstacles of triangles, the upper one moved as the free plate |" in tables.rigid_bodies_text(figures)
     assert "between two plates" in capsys.readouterr().out
 
 
@@ -175,10 +174,9 @@ def test_a_pile_of_bears_presses_on_itself_and_stays_apart():
 
 @pytest.mark.slow
 def test_reading_all_fields_of_a_finger_is_measured(capsys):
-    from benchmarks import reading_fields, tables
+    from benchmarks import reading_fields
 
     figures = reading_fields.main(chambers=1, frames=2, skipped=1)
     assert list(figures["fields"]) == list(FIELDS)
     assert 0.0 < figures["share"] < 1.0
-    assert f"{figures['tets']:,} tets" in tables.reading_text(figures)
     assert "all fields" in capsys.readouterr().out

@@ -66,4 +66,4 @@ for _ in range(FRAMES):
         p.stepSimulation()
     frames.append(positions())
 save(out, frames, own, np.concatenate(masses))
-print(json.dumps({"version": version("pybullet"), "settings": f"{STEPS} steps, Neo-Hookean"}))
+print(json.dumps({"version": version("pybullet")}))
