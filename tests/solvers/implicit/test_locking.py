@@ -23,30 +23,6 @@ def equilibrium(scene):
     return frame
 
 
-def cook(cells, poisson):
-    """Deflection of the middle of the loaded edge of Cook's membrane per load, with equal cells."""
-    unit = sp.shapes.box((1, 1, 1), (cells, cells, 1))
-    X = unit.vertices + 0.5
-    places = np.column_stack([48 * X[:, 0], 44 * X[:, 0] + X[:, 1] * (44 - 28 * X[:, 0]), 10 * X[:, 2]])
-    mesh = sp.TetMesh(places, unit.tets).to_order(2)
-    x, load = mesh.vertices, 1e-5
-    end = np.flatnonzero((x[mesh.surface.triangles][:, :, 0] > 48 - 1e-9).all(axis=1))
-    scene = sp.Scene(
-        [sp.Body("cook", mesh, rubber(poisson))],
-        pins=[sp.Pin("cook", np.flatnonzero(x[:, 0] < 1e-9))],
-        loads=[sp.Traction("cook", (0.0, load / 16, 0.0), end)],
-        gravity=(0, 0, 0),
-    )
-    middle = (x[:, 0] > 48 - 1e-9) & (np.abs(x[:, 1] - 52) < 1e-6)
-    return (equilibrium(scene).positions["cook"] - x)[middle, 1].mean() / load
-
-
-@pytest.mark.parametrize("poisson", [0.499, 0.4999])
-def test_cooks_membrane_with_eight_equal_cells_on_a_side(poisson):
-    """The limit is that of 16 cells that are smaller at the clamp (docs/theory/locking.md)."""
-    assert cook(8, poisson) == pytest.approx(23.778, rel=0.01)
-
-
 def test_the_share_begins_at_a_third_and_leaves_a_first_parameter_between_mu_and_twice_mu():
     nu = np.array([-0.3, 0.0, 0.25, 1 / 3, 0.334, 0.4, 0.45, 0.49, 0.4999])
     lam = 2 * nu / (1 - 2 * nu)
@@ -136,8 +112,7 @@ def test_a_turned_and_inflated_element_has_the_energy_of_its_volume():
         assert swollen == pytest.approx(material.energy_density(1.2 * turn), rel=1e-9)
 
 
-@pytest.mark.parametrize("integrator", ["backward_euler", "bdf2"])
-def test_a_fall_is_recorded_and_checked(integrator, tmp_path):
+def test_a_fall_is_recorded_and_checked(tmp_path):
     """A soft block falls on a plane; the check computes the energy of mean volumes on its own."""
     body = sp.Body(
         "block",
@@ -147,35 +122,9 @@ def test_a_fall_is_recorded_and_checked(integrator, tmp_path):
     )
     scene = sp.Scene([body], obstacles=[sp.HalfSpace(point=(0, 0, 0), normal=(0, 1, 0), friction=0.5)])
     path = tmp_path / "fall.vtkhdf"
-    solver = sp.Implicit(integrator=integrator)
+    solver = sp.Implicit(integrator="bdf2")
     for frame in sp.simulate(scene, solver, 1 / 60, 16, sinks=[sp.Recorder(path, solver=solver)]):
         assert frame.report.status == "converged"
     report = sp.check_recording(path)
     assert report.ok, report
     assert str(report["records"].verdict) == "pass"
-
-
-@pytest.mark.parametrize("integrator", ["backward_euler", "newmark"])
-def test_a_free_body_keeps_its_momenta(integrator):
-    """A stretched block that flies and turns; the midpoint rule keeps angular momentum, both keep the linear one."""
-    mesh = sp.shapes.box((0.3, 0.2, 0.2), (2, 1, 1), order=2)
-    body = sp.Body("block", mesh, sp.StableNeoHookean(youngs=1e4, poisson=0.48))
-    spin = np.cross([1.0, 2.0, 3.0], mesh.vertices) + np.array([0.5, 0.0, 0.0])
-    frames = list(
-        sp.simulate(
-            sp.Scene([body], gravity=(0, 0, 0)),
-            sp.Implicit(integrator=integrator, contact=None),
-            1 / 120,
-            20,
-            initial_positions={"block": mesh.vertices * [1.1, 0.95, 0.97]},
-            initial_velocities={"block": spin},
-        )
-    )
-    first, last = frames[0].report, frames[-1].report
-    assert last.status == "converged"
-    np.testing.assert_allclose(last.linear_momentum, first.linear_momentum, atol=1e-10)
-    if integrator == "newmark":
-        size = float(np.linalg.norm(first.angular_momentum))
-        np.testing.assert_allclose(last.angular_momentum, first.angular_momentum, atol=1e-9 * size)
-        begin, end = (r.kinetic_energy + r.elastic_energy for r in (first, last))
-        assert end == pytest.approx(begin, rel=0.03)

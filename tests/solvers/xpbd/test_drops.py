@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.model.crushed import CRUSHED
 from supple.solvers.xpbd.solver import XPBD
 
 DT = 1.0 / 60.0
@@ -43,17 +44,21 @@ def drop(seed, smallest=6e-3, stiffest=2e6):
     return sp.Scene(bodies, [sp.HalfSpace(friction=0.5)])
 
 
+def is_as_told(report):
+    """A blow may crush a tet, sooner of a body too soft for its weight, which is told; nothing else may happen."""
+    J = report.min_det_F
+    return (report.status == "converged" and J >= CRUSHED) or (report.status == "crushed" and J < 5 * CRUSHED)
+
+
 def check(scene, steps, most=0.02):
     start = first_energy(scene)
     for frame in sp.simulate(scene, XPBD(), DT, steps):
         report = frame.report
         assert report.min_det_F > 0.0
-        assert report.status not in ("inverted", "energy_gained", "not_finite"), report.message
+        assert is_as_told(report), report.message
         energy = report.kinetic_energy + report.elastic_energy + report.potential_energy
         assert energy < (1.0 + most) * start
-        deepest = -min(x[:, 1].min() for x in frame.positions.values())
-        assert deepest < 1e-3 * np.ptp(frame.state.positions) or report.status == "intersecting"
-        assert all(x[:, 1].mean() > 0.0 for x in frame.positions.values())
+        assert min(x[:, 1].min() for x in frame.positions.values()) > -1e-3 * np.ptp(frame.state.positions)
 
 
 def first_energy(scene):
@@ -100,12 +105,13 @@ def pile(seed):
     return sp.Scene(bodies, [sp.HalfSpace(friction=generator.uniform(0.0, 1.0))])
 
 
-def check_recorded(scene, path, steps):
+def check_recorded(scene, path, steps, any_status=False):
     """What a frame claims is true: an independent check passes where all frames are converged. Returns the statuses."""
     statuses, start = set(), first_energy(scene)
     for frame in sp.simulate(scene, XPBD(), DT, steps, sinks=[sp.Recorder(path)]):
         report = frame.report
         statuses.add(str(report.status))
+        assert any_status or is_as_told(report), report.message
         assert report.min_det_F > 0.0
         energy = report.kinetic_energy + report.elastic_energy + report.potential_energy
         # Impacts of stiff small bodies at the cap of the substeps may gain energy.
@@ -130,25 +136,16 @@ def test_random_piles_converge_and_pass_the_check(seed, tmp_path):
     assert check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 12) == {"converged"}
 
 
-def test_a_blow_that_crushes_is_told(tmp_path):
-    """J of the lowest body falls to about .05; of `Implicit` with a quarter of the step to .03."""
-    assert check_recorded(pile(268), tmp_path / "pile.vtkhdf", 12) <= {"converged", "crushed"}
-    with sp.read_recording(tmp_path / "pile.vtkhdf") as recording:
-        J, statuses = recording.series("min_det_F")[1:], recording.statuses[1:]
-    assert 0.0 < J.min() < 0.1
-    assert [status == "crushed" for status in statuses] == [least < 0.05 for least in J]
-
-
 @pytest.mark.parametrize("seed", [104, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (23, 70, 131))])
 def test_bodies_between_others_and_a_floor_are_not_pushed_through_either(seed, tmp_path):
     """Contact with other bodies moved them into the floor, contact with the floor or the last resort through bodies."""
-    assert check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 8) <= {"converged", "held_back"}
+    check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 8)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 300))
 def test_many_random_piles_are_what_their_statuses_say(seed, tmp_path):
-    statuses = check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 20)
+    statuses = check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 20, any_status=True)
     assert not statuses & {"inverted", "not_finite"}
 
 

@@ -32,19 +32,6 @@ def test_pardiso_and_superlu_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(with_pardiso, _step("direct"), atol=1e-9)
 
 
-def test_pardiso_solves_one_system(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pypardiso")
-    pattern = build_pattern(np.array([[0, 1, 2, 3]], dtype=np.int32), 4)
-    root = np.random.default_rng(3).normal(size=(12, 12))
-    dense = root @ root.T + 12.0 * np.eye(12)
-    rows = np.repeat(np.arange(4), np.diff(pattern.row_start))
-    data = np.stack([dense[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] for i, j in zip(rows, pattern.columns, strict=True)])
-    b = np.arange(12.0).reshape(4, 3)
-    solved = direct_solver.solve_directly(pattern, np.ascontiguousarray(data), b)
-    assert solved is not None
-    np.testing.assert_allclose(dense @ solved.ravel(), b.ravel(), atol=1e-10)
-
-
 @pytest.mark.parametrize("factorization", ["pardiso", "superlu"])
 @pytest.mark.parametrize(("integrator", "dt"), [("backward_euler", 0.25), ("static", 1.0)])
 def test_a_bar_that_buckles_converges_with_a_factorization(factorization, integrator, dt, monkeypatch) -> None:

@@ -1,6 +1,5 @@
 """Collisions as a whole: settings, same bits, and what is reported."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -37,16 +36,6 @@ def test_wrong_settings_raise_an_error_that_names_them(wrong, message):
     with pytest.raises(SolverError, match=message) as caught:
         XPBDContact(**wrong)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.slow
-def test_the_result_has_the_same_bits_on_any_number_of_threads():
-    def run(threads):
-        return [f.state.positions for f in sp.simulate(pile(), XPBD(substeps=10, threads=threads), 1 / 60, 20)][-1]
-
-    more = min(2, numba.config.NUMBA_NUM_THREADS)
-    assert (run(1) == run(1)).all()
-    assert (run(1) == run(more)).all()
 
 
 def test_bodies_stop_at_the_given_thickness():

@@ -37,9 +37,10 @@ def test_two_spinning_bodies_that_collide_keep_both_momenta(shape, other):
     m = system.masses
     scale = np.sum(m * np.linalg.norm(state.velocities, axis=1))
     arms = np.sum(m * np.linalg.norm(state.velocities, axis=1) * np.linalg.norm(state.positions, axis=1))
-    touched = 0
+    energy, touched = 0.5 * m @ (state.velocities**2).sum(axis=1), 0
     for frame in sp.simulate(scene, XPBD(substeps=20), 1 / 60, 24):
         touched += frame.report.details.contacts
+        assert frame.report.kinetic_energy + frame.report.elastic_energy <= energy * (1 + 1e-9)
         now = momenta(system, frame.state)
         assert np.abs(now[0] - linear).max() < 1e-12 * scale
         assert np.abs(now[1] - angular).max() < 1e-10 * arms

@@ -77,3 +77,16 @@ def test_a_light_box_carries_a_heavy_one_without_a_gain_of_energy(ratio, substep
         assert r.min_det_F > 0.3
     fall = ratio * 9.81 * 0.01
     assert max(energies) - energies[0] < 0.02 * fall
+
+
+@pytest.mark.slow
+def test_ten_boxes_stand_on_each_other():
+    """Each is shorter by its mean pressure over the modulus, and keeps the gap that it began with."""
+    stuff = sp.StableNeoHookean(youngs=1e6, poisson=0.3, density=1000.0, damping=0.005)
+    starts = 0.0503 + 0.1005 * np.arange(10)
+    bodies = [box(f"{k}", (0.1, 0.1, 0.1), (2, 2, 2), (0, y, 0), stuff) for k, y in enumerate(starts)]
+    *_, last = sp.simulate(sp.Scene(bodies, [sp.HalfSpace(friction=0.5)]), XPBD(substeps=60), 1 / 60, 40)
+    centers = np.array([last.positions[body.name].mean(axis=0) for body in bodies])
+    strains = 9.81e-4 * (9.5 - np.arange(10))
+    np.testing.assert_allclose(centers[:, 1], starts - 0.1 * (np.cumsum(strains) - 0.5 * strains), atol=8e-4)
+    assert np.abs(centers[:, [0, 2]]).max() < 0.006

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.model.system import initial_state
 from supple.solvers.xpbd.contact.settings import XPBDContact
 from supple.solvers.xpbd.solver import XPBD
 
@@ -34,28 +33,6 @@ def overlapping(frame):
 def ball(name, position, velocity=(0, 0, 0), friction=0.0, edge=0.06):
     mesh = sp.shapes.sphere(radius=0.1, edge_length=edge)
     return sp.Body(name, mesh, SOFT, position=position, velocity=velocity, friction=friction)
-
-
-@pytest.mark.parametrize("offset", [0.0, 0.06])
-def test_two_balls_collide_and_keep_their_momentum(offset):
-    bodies = [ball("a", (-0.15, offset, 0.01), (1.5, 0, 0)), ball("b", (0.15, 0, 0), (-1.5, 0, 0))]
-    scene = sp.Scene(bodies, gravity=(0, 0, 0))
-    frames = list(sp.simulate(scene, XPBD(substeps=20), 1 / 60, 24))
-    first = initial_state(scene)
-    m = frames[0].system.masses
-    momentum, scale = m @ first.velocities, np.sum(m * np.linalg.norm(first.velocities, axis=1))
-    energy = 0.5 * np.sum(m * np.sum(first.velocities**2, axis=1))
-    moment = np.sum(m[:, None] * np.cross(first.positions, first.velocities), axis=0)
-    for frame in frames:
-        assert np.abs(m @ frame.state.velocities - momentum).max() < 1e-12 * scale
-        assert frame.report.kinetic_energy < energy * (1 + 1e-9)
-        assert overlapping(frame) == 0
-        now = np.sum(m[:, None] * np.cross(frame.state.positions, frame.state.velocities), axis=0)
-        assert np.abs(now - moment).max() < 2e-4 * scale
-    last = frames[-1]
-    apart = last.velocities["b"].mean(axis=0) - last.velocities["a"].mean(axis=0)
-    assert apart @ [1, 0, 0] > 0.3  # they are moving apart again
-    assert min(f.report.details.smallest_gap for f in frames if f.report.details.smallest_gap is not None) > 0
 
 
 @pytest.mark.parametrize("speed", [1.0, 4.0])

@@ -203,31 +203,13 @@ def test_cycles_are_short_and_make_up_the_frame(substeps):
     assert max(lengths) - min(lengths) <= 1
 
 
-def spectral_radius(substeps, share, w, tau):
-    """Of one mode of frequency w over a cycle in substeps of 1 s, as `Damping` and the constraints move it.
-
-    A step of the solution takes this share of the way to the viscous force.
-    """
-    H, k = substeps, max(tau - 1.0, 0.0) * w**2
-
-    def moved(state):
-        x, v, f, v_before = state
-        f, v_before = f - share * (f + k * (2.0 * v - v_before)) / (1.0 + H * k), v
-        for _ in range(substeps):
-            x, before = (x + v + f) / (1.0 + w**2), x
-            v = x - before
-        return x, v, f, v_before
-
-    return np.abs(np.linalg.eigvals(np.array([moved(unit) for unit in np.eye(4)]).T)).max()
-
-
-def test_no_mode_grows_over_cycles():
-    """Of any frequency and damping, however far a step goes towards the solution; longer cycles let modes grow."""
-    w, tau = 10.0 ** np.linspace(-3.0, 2.0, 20), 10.0 ** np.linspace(0.1, 6.0, 12)
-
-    def largest(substeps, share):
-        return max(spectral_radius(substeps, share, a, b) for a in w for b in tau)
-
-    for substeps in range(1, LONGEST_CYCLE + 1):
-        assert max(largest(substeps, share) for share in (0.1, 0.5, 1.0)) <= 1.0 + 1e-9
-    assert largest(2 * LONGEST_CYCLE, 1.0) > 1.01
+@pytest.mark.parametrize("tau", [0.01, 0.1, 1.0, 100.0])
+def test_no_mode_grows(tau):
+    """Of a ball whose vertices begin with velocities at random. With cycles of 8 substeps, energies grow 50-fold."""
+    v = 0.01 * np.random.default_rng(0).normal(size=BALL.vertices.shape)
+    jelly = sp.StableNeoHookean(youngs=1e5, poisson=0.3, damping=tau)
+    scene = sp.Scene([sp.Body("ball", BALL, jelly)], gravity=(0, 0, 0))
+    frames = sp.simulate(scene, XPBD(substeps=8, contact=None), DT, 30, initial_velocities={"ball": v})
+    energies = [frame.report.kinetic_energy + frame.report.elastic_energy for frame in frames]
+    assert max(energies) == energies[0]
+    assert energies[-1] < 0.25 * energies[0]
