@@ -18,7 +18,6 @@ from statistics import median
 from typing import Any
 
 import supple as sp
-from benchmarks.published import publish
 from benchmarks.table import circumstances
 from supple.app.viewer.app import opened_page
 from supple.app.viewer.engine.engine import Engine
@@ -138,8 +137,8 @@ def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: 
 
 
 def run() -> None:
-    """Measure, and write the figures of docs/validation/benchmarks.md."""
-    publish("live", main())
+    """Measure, and print the table."""
+    main()
 
 
 if __name__ == "__main__":

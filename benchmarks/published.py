@@ -4,41 +4,31 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from benchmarks.measuring import ROOT
 from benchmarks.table import table_text
-from benchmarks.tables import live_text
 from supple.runtime.replacing import whole_file
 
 DOCS = ROOT / "docs"
 
 
-class Shown(NamedTuple):
-    """A table of a page: the page, and the text of the figures."""
-
-    page: str
-    text: Callable[[dict[str, Any]], str]
-
-
-# By the name between the marks, which is that of the file.
+# The page that shows a table, by the name between the marks, which is that of the file.
 SHOWN = {
-    "live": Shown("validation/benchmarks.md", live_text),
-    "quadratic_tets": Shown("theory/locking.md", table_text),
-    "checked_results": Shown("learn/check_your_simulator.md", table_text),
-    "checked_results_short": Shown("../README.md", table_text),
+    "quadratic_tets": "theory/locking.md",
+    "checked_results": "learn/check_your_simulator.md",
+    "checked_results_short": "../README.md",
     **dict.fromkeys(
-        ("startup", "hanging_beam", "work_precision", "implicit_scaling", "bear_pile", "automatic_substeps"),
-        Shown("validation/benchmarks.md", table_text),
+        ("startup", "hanging_beam", "work_precision", "implicit_scaling", "automatic_substeps"),
+        "validation/benchmarks.md",
     ),
 }
 
 
 def publish(name: str, figures: Any) -> None:
     """Write the figures of this name, and the table that shows them."""
-    path, page = file_of(name), DOCS / SHOWN[name].page
+    path, page = file_of(name), DOCS / SHOWN[name]
     path.parent.mkdir(exist_ok=True)
     _write(path, json.dumps(figures, indent=1) + "\n")
     _write(page, with_table(page.read_text(encoding="utf-8"), name))
@@ -58,7 +48,7 @@ def file_of(name: str) -> Path:
 def with_table(page: str, name: str) -> str:
     """The text of a page, with the table of the file between the two marks."""
     begin, end = f"<!-- figures: {name} -->\n", "<!-- end of figures -->"
-    text = SHOWN[name].text(json.loads(file_of(name).read_text(encoding="utf-8")))
+    text = table_text(json.loads(file_of(name).read_text(encoding="utf-8")))
     pattern = f"{re.escape(begin)}.*?{re.escape(end)}"
     changed, count = re.subn(pattern, lambda _: f"{begin}\n{text}\n\n{end}", page, flags=re.S)
     assert count == 1, f"the page of {name} needs the marks {begin.strip()} and {end}"

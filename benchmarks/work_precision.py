@@ -192,9 +192,9 @@ def main(quick: bool = False, scale: int = 1, threads: int | None = 1) -> dict[s
     with tempfile.TemporaryDirectory() as folder:
         for family in families(scale, quick, threads):
             rows, references[family.name] = measure(family, 1 if quick else 2, Path(folder))
-            for row in rows:
-                known = np.isfinite(row.seconds)
-                table.add(row.family, row.name, *((row.seconds, row.error) if known else (None, None)), row.note)
+            table.note(f"{family.name}: {rows[0].name}")
+            for row in rows[1:]:
+                table.add(row.family, row.name, row.seconds, row.error, row.note)
             all_rows += rows
     apart = relative_error(references["Supple XPBD"], references["Supple Implicit"])
     table.note(f"The references of Supple Implicit and Supple XPBD are {apart:.2e} of the tip's displacement apart.")

@@ -22,7 +22,7 @@ def beyond_figures(page: str) -> str:
 
 @pytest.mark.parametrize("name", published.SHOWN)
 def test_a_page_shows_its_files(name):
-    page = (published.DOCS / published.SHOWN[name].page).read_text(encoding="utf-8")
+    page = (published.DOCS / published.SHOWN[name]).read_text(encoding="utf-8")
     assert published.with_table(page, name) == page
 
 
@@ -33,7 +33,7 @@ def test_every_file_is_shown():
 @pytest.mark.parametrize("name", published.SHOWN)
 def test_between_the_marks_is_a_caption_and_a_table(name):
     """Benchmarks rewrite tables, and no prose."""
-    text = published.SHOWN[name].text(json.loads(published.file_of(name).read_text(encoding="utf-8")))
+    text = table_text(json.loads(published.file_of(name).read_text(encoding="utf-8")))
     caption, empty, *rows = text.splitlines()
     assert "2026-" in caption
     assert empty == ""
@@ -46,9 +46,7 @@ def test_marks_of_a_page_name_parts_that_belong_there(page):
     text = page.read_text(encoding="utf-8")
     found = re.findall(SHOWN, text, flags=re.S)
     assert len(found) == len(re.findall("<!-- *figures", text)) == len(re.findall("<!-- *end of figures", text))
-    assert set(found) == {
-        name for name, shown in published.SHOWN.items() if (published.DOCS / shown.page).resolve() == page
-    }
+    assert set(found) == {name for name, shown in published.SHOWN.items() if (published.DOCS / shown).resolve() == page}
 
 
 def test_the_page_of_benchmarks_has_no_figures_of_its_own():

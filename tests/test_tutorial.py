@@ -37,7 +37,7 @@ def test_every_block_of_the_tutorial_runs(tmp_path, monkeypatch, capsys):
             in_python(block, number, names)
         else:
             in_the_shell(block)
-    assert [kind for kind, _ in blocks] == ["python", "sh", *["python"] * 7]
+    assert [kind for kind, _ in blocks] == ["python", "sh", *["python"] * 6]
     assert Path("part/index.html").stat().st_size > 10_000
     said, told = capsys.readouterr()
     assert "taken to be in millimetres (scale: 0.001)" in said + told
