@@ -120,19 +120,3 @@ def test_a_vertex_in_the_plane_settles_at_the_separate_distance_along_the_normal
     assert np.abs(path[:, 0, [0, 2]]).max() < 1e-3
     assert path[-1, 0, 1] == pytest.approx(0.95, abs=1e-3)
     assert np.abs(path[-1] - path[-2]).max() < 1e-6, "it has settled"
-
-
-@pytest.mark.slow
-@SOLVERS
-def test_three_of_four_stay_and_the_one_in_the_plane_settles_at_the_distance(solve, damping):
-    triangle = [(0, 1, 0), (1, 1, 0), (0, 1, 1)]
-    vertices = np.array([(0.25, 0.5, 0.25), (0.5, 0.7, 0.1), (0.1, 0.6, 0.5), (0.3, 1, 0.3)])
-    system, x, pairs = stitched_system(vertices, triangle, max_distance=1.0, min_separate_distance=0.1, damping=damping)
-    assert pairs.vertices.tolist() == [0, 1, 2, 3]
-    assert pairs.rows.tolist() == [0, 0, 0, 0]
-    assert pairs.distances == pytest.approx([0.5, 0.3, 0.4, 0.0])
-    assert system.stitching.tets.offset.tolist() == [False, False, False, True]
-    path = solve(system, x)
-    assert np.abs(path[:, :3] - vertices[:3]).max() < 1e-9
-    assert path[-1, 3] == pytest.approx([0.3, 0.9, 0.3], abs=1e-3)
-    assert np.abs(path[:, 3, [0, 2]] - 0.3).max() < 1e-3

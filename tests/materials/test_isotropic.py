@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -245,20 +244,6 @@ def with_lame(cls, mu, lam):
             return self._tet_material(n_tets, cls.energy_kind(), mu, lam)
 
     return Given(youngs=1.0, poisson=0.0)
-
-
-def test_same_bits_on_any_number_of_threads(soup):
-    m = len(soup[1])
-    results = []
-    for threads in (1, numba.config.NUMBA_NUM_THREADS):
-        numba.set_num_threads(threads)
-        out = np.empty(m), np.empty((m, 4, 3)), np.empty((m, 12, 12))
-        element_energies(*soup, out[0])
-        element_gradients(*soup, out[1])
-        element_hessians(*soup, True, out[2])
-        results.append(out)
-    for one, many in zip(*results, strict=True):
-        np.testing.assert_array_equal(one, many)
 
 
 def test_compiled_kernels_come_from_the_cache_in_a_new_process(soup):

@@ -1,12 +1,10 @@
 """Block CSR: the assembled matrix is the sum of the element matrices, for all elements."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from supple.numerics.sparse.block_csr import build_pattern
-from supple.runtime import parallel_kernel
 
 
 def dense_sum(elements, matrices, diagonal):
@@ -62,25 +60,3 @@ def test_columns_ascend_and_mirrors_are_mutual():
     for i in range(40):
         assert np.all(np.diff(pattern.columns[pattern.row_start[i] : pattern.row_start[i + 1]]) > 0)
     assert np.array_equal(pattern.columns[pattern.diagonal], np.arange(40))
-
-
-@pytest.mark.parametrize("threads", [1, 2])
-def test_same_bits_on_any_number_of_threads(threads, monkeypatch):
-    import numba
-
-    if threads > numba.config.NUMBA_NUM_THREADS:
-        pytest.skip("this machine has one core")
-    rng = np.random.default_rng(0)
-    elements = np.array([rng.permutation(300)[:4] for _ in range(1000)], dtype=np.int32)
-    pattern = build_pattern(elements, 300)
-    matrices, diagonal = symmetric(rng, 1000, 12), symmetric(rng, 300, 3)
-    first, second = np.zeros((pattern.blocks, 3, 3)), np.zeros((pattern.blocks, 3, 3))
-    pattern.assemble(matrices, diagonal, first)
-    monkeypatch.setattr(parallel_kernel, "_has_rows", lambda arguments, least: True)
-    before = numba.get_num_threads()
-    try:
-        numba.set_num_threads(threads)
-        pattern.assemble(matrices, diagonal, second)
-    finally:
-        numba.set_num_threads(before)
-    assert first.tobytes() == second.tobytes()

@@ -1,6 +1,5 @@
 """Conjugate gradients and their two-level preconditioner, on elasticity matrices and against dense algebra."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -10,7 +9,6 @@ from supple.numerics.sparse.partition import bisected_groups
 from supple.numerics.sparse.pcg import conjugate_gradients
 from supple.numerics.sparse.preconditioner import order_rows, two_level
 from supple.numerics.sparse.skyline_cholesky import factorize, solve
-from supple.runtime import parallel_kernel
 
 
 def linear_elasticity(mesh, mu, lam):
@@ -94,26 +92,6 @@ def test_an_indefinite_matrix_is_noticed():
     result = conjugate_gradients(preconditioner, b, np.zeros_like(b), 1e-12, 500)
     assert result.indefinite
     assert not result.converged
-
-
-@pytest.mark.slow
-def test_same_bits_on_any_number_of_threads(monkeypatch):
-    if numba.config.NUMBA_NUM_THREADS < 2:
-        pytest.skip("this machine has one core")
-    pattern, preconditioner, _ = beam_problem((12, 6, 6))
-    b = np.random.default_rng(0).normal(size=(pattern.rows, 3))
-    monkeypatch.setattr(parallel_kernel, "_has_rows", lambda arguments, least: True)
-    found = []
-    before = numba.get_num_threads()
-    try:
-        for threads in (1, 2):
-            numba.set_num_threads(threads)
-            x = np.zeros_like(b)
-            conjugate_gradients(preconditioner, b, x, 1e-6, 500)
-            found.append(x.tobytes())
-    finally:
-        numba.set_num_threads(before)
-    assert found[0] == found[1]
 
 
 def test_envelope_cholesky_agrees_with_dense_algebra():

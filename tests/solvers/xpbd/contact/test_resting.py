@@ -31,7 +31,7 @@ def test_resting_contact_passes_the_checks_of_contact(tmp_path, name, floor):
     path = tmp_path / "rest.vtkhdf"
     scene = sp.Scene([low, high], [floor])
     solver = XPBD(substeps=20)
-    *_, frame = sp.simulate(scene, solver, 1 / 60, 40, sinks=[sp.Recorder(path, solver=solver)])
+    *_, frame = sp.simulate(scene, solver, 1 / 60, 25, sinks=[sp.Recorder(path, solver=solver)])
     report = sp.check_recording(path, only=["intersection", "containment", "distance"])
     assert {result.name: result.verdict for result in report.results if result.verdict == "fail"} == {}
     assert frame.positions["high"][:, 1].mean() > frame.positions["low"][:, 1].mean() + 0.055
@@ -50,15 +50,13 @@ def test_friction_holds_a_stack_on_a_slope():
         for k in range(5)
     ]  # fmt: skip
     scene = sp.Scene(bodies, [sp.HalfSpace(normal=normal, friction=1.0)])
-    frames = sp.simulate(scene, XPBD(substeps=20), 1 / 60, 240)
+    frames = sp.simulate(scene, XPBD(substeps=20), 1 / 60, 120)
     travel = np.array([[frame.positions[body.name].mean(axis=0) @ down for body in bodies] for frame in frames])
-    assert np.ptp(travel[-120:], axis=0).max() < 1e-4
+    assert np.ptp(travel[-60:], axis=0).max() < 1e-4
     assert np.abs(travel[-1] - travel[0]).max() < 0.02
 
 
-@pytest.mark.parametrize(
-    ("ratio", "substeps"), [(50, 100), (200, 200), pytest.param(1000, 400, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("ratio", "substeps"), [(200, 200), pytest.param(1000, 400, marks=pytest.mark.slow)])
 def test_a_light_box_carries_a_heavy_one_without_a_gain_of_energy(ratio, substeps):
     heavy = sp.StableNeoHookean(youngs=1e6 * max(1.0, ratio / 200), poisson=0.4, density=1000.0 * ratio)
     light = sp.StableNeoHookean(youngs=1e6 * max(1.0, ratio / 200), poisson=0.4, density=1000.0)

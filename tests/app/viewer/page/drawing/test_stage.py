@@ -11,7 +11,6 @@ from supple.results.view.fields import FIELDS
 from supple.results.view.layers.connections import length_text
 from supple.results.view.layers.section import Cut, surface
 from supple.results.view.layers.tets import exploded_facets
-from supple.results.view.look import background, body_color, floor_disc
 from supple.results.view.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.results.view.stage import Stage
 
@@ -60,23 +59,6 @@ def test_changed_options_remove_all_old_layers(server, fake):
     drawn = {name for name in names if name.startswith(("/bodies/", "/velocities", "/contacts"))}
     # Empty groups stay: viser creates them.
     assert drawn - {"/bodies/tets", "/contacts"} == {"/bodies/0 body 0", "/bodies/1 body 1"}
-
-
-def test_bodies_cast_shadows_on_the_floor(server, fake):
-    """Darker where a body is near the floor, and none without a floor."""
-    builder = MomentBuilder()
-    stage = Stage(server, builder.moment(fake.snapshot), ViewOptions())
-    shadow = server.scene._handle_from_node_name["/shadow"]
-    lift = np.array([0.0, 50.0, 0.0])
-    near = shadow.image[..., 3].astype(int)
-    stage.show(builder.moment(fake.show(positions=fake.snapshot.positions + lift)))
-    far = shadow.image[..., 3].astype(int)
-    assert near.max() > 50
-    assert far.max() < 0.5 * near.max()
-    assert near[0].max() == near[-1].max() == 0
-    description = replace(fake.snapshot.description, obstacles=())
-    none = (np.zeros((0, 3, 3)), np.zeros((0, 3)))
-    Stage(server, MomentBuilder().moment(fake.show(description=description, obstacle_poses=none)), ViewOptions())
 
 
 def test_values_that_are_not_finite_are_not_sent(server, fake):
@@ -160,17 +142,6 @@ def test_a_cut_is_a_closed_surface_with_a_plane_section(fake, axis, place):
     assert len(exploded_facets(model).owner) == 4 * len(model.tets)
 
 
-def test_a_scene_without_floor_has_no_grid(server, fake):
-    moment = MomentBuilder().moment(fake.snapshot)
-    Stage(server, moment, ViewOptions())
-    assert "/ground" in server.scene._handle_from_node_name
-    server.scene.reset()
-    empty = replace(fake.snapshot.description, obstacles=())
-    none = np.zeros((0, 3, 3)), np.zeros((0, 3))
-    Stage(server, MomentBuilder().moment(fake.show(description=empty, obstacle_poses=none)), ViewOptions())
-    assert "/ground" not in server.scene._handle_from_node_name
-
-
 def test_forces_are_arrows_with_a_scale(server, fake):
     translator = MomentBuilder()
     points, forces = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), np.array([[0.0, 30.0, 0.0], [0.0, 0.0, 15.0]])
@@ -203,19 +174,3 @@ def test_a_room_is_drawn_open(server, fake):
     rim = server.scene._handle_from_node_name["/obstacles/1 bowl, rim"]
     away = np.hypot(rim.vertices[:, 0], rim.vertices[:, 2])
     assert 2.0 < away.min() < away.max() < 4.0
-
-
-@pytest.mark.parametrize("dark", [False, True])
-def test_the_floor_is_a_disc_that_fades_to_the_background(server, fake, dark):
-    Stage(server, MomentBuilder().moment(fake.snapshot), ViewOptions(dark=dark))
-    assert not any(name.startswith("/obstacles/0") for name in server.scene._handle_from_node_name)
-    disc = floor_disc(dark, 64)
-    assert (disc[32, 32, 3], disc[0, 0, 3], disc[32, 0, 3]) == (255, 0, 0)
-    assert (disc[32, 32, :3].mean() < 100) == dark == (background(dark).mean() < 100)
-
-
-def test_the_colors_of_many_bodies_differ():
-    colors = np.array([body_color(k) for k in range(64)], dtype=float)
-    apart = np.linalg.norm(colors[:, None] - colors, axis=2) + 1e3 * np.eye(64)
-    assert apart.min() > 12.0
-    assert min(apart[k, k + 1] for k in range(63)) > 60.0
