@@ -18,7 +18,7 @@ from supple.app.cli.app import register as register_command
 from supple.app.scene_file.document import json_schema
 from supple.app.scene_file.loader import load_run
 from supple.app.scene_file.yaml_files import read_yaml
-from supple.kinds.forms import ANY_NUMBER, POSITIVE, BodyName, Name, NumberPerTet, Vector
+from supple.kinds.validators import ANY_NUMBER, POSITIVE, BodyName, Name, NumberPerTet, Vector
 from supple.materials.by_law import ByLaw
 from supple.materials.per_tet import Law
 from supple.mesh.primitives.shape import SHAPES, shape

@@ -52,7 +52,7 @@ def kinds_page() -> str:
 def _rows(name: str, field: Any) -> list[str]:
     """A row for each key that a field has."""
     found = []
-    for key, (_, words) in keys_of(field.form, name).items():
+    for key, (_, words) in keys_of(field.validator, name).items():
         text = (words or field.description.replace("None", "null")).replace("|", "\\|")
         default = field.default
         shown = "required" if default is MISSING else "" if default is None else f"`{_short(default)}`"

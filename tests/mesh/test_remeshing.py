@@ -8,7 +8,7 @@ from tests.mesh.cad_parts import CLEAN, cup, housing, joined, noisy_scan, overla
 
 from supple.errors import MeshingError
 from supple.mesh.meshing.consent import asking
-from supple.mesh.meshing.spelling import spelled_for
+from supple.mesh.meshing.option_names import named_for
 from supple.mesh.meshing.tetrahedralize import tetrahedralize, tetrahedralize_reported
 from supple.mesh.shapes import box_surface, sphere_surface
 
@@ -97,7 +97,7 @@ def test_ten_times_the_tets_are_a_question():
         tetrahedralize(surface, tets=2000)
     asked = []
     with (
-        spelled_for("shell"),
+        named_for("shell"),
         asking(asked.append, "--yes"),
         pytest.raises(MeshingError, match=r"--tets 180000, --yes"),
     ):

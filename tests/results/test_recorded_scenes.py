@@ -13,8 +13,8 @@ from tests.recordings import set_in_scene
 import supple as sp
 from supple.kinds.checks import unit_vectors
 from supple.kinds.described import Described
-from supple.kinds.forms import POSITIVE
 from supple.kinds.kind import Kind
+from supple.kinds.validators import POSITIVE
 from supple.materials.per_tet import NOT_ELASTIC
 from supple.model.system import initial_state
 from supple.scene.materials import MATERIALS

@@ -8,7 +8,7 @@ import pytest
 from tests.scenes import converged
 
 import supple as sp
-from supple.kinds.forms import POSITIVE
+from supple.kinds.validators import POSITIVE
 from supple.numerics.geometry.convex_hull import convex_hull
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.polyhedra import round_ball

@@ -44,7 +44,7 @@ class Described(ABCMeta):
 
 
 def written_types(described: type) -> dict[str, Any]:
-    """By name, the types of a class's fields with their forms, as they are written."""
+    """By name, the types of a class's fields with their validators, as they are written."""
     found: dict[str, Any] = {}
     for base in reversed(described.__mro__):
         names = {"__annotations__": base.__dict__.get("_written", {}), "__module__": base.__module__}

@@ -4,9 +4,9 @@
     class Spring(Load):
         stiffness: Annotated[float, POSITIVE]
 
-The form beside the type checks the field and says how a scene file writes it. The text under "Parameters" in the
+The validator beside the type checks the field and says how a scene file writes it. The text under "Parameters" in the
 docstring describes it in the schema of scene files, in `supple info` and in the tables of the documentation. A function
-whose parameters have forms is a kind as well, such as a shape that it makes.
+whose parameters have validators is a kind as well, such as a shape that it makes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 
 from supple.errors import SceneError, SuppleError
 from supple.kinds.described import Described, written_types
-from supple.kinds.forms import Form, Name
+from supple.kinds.validators import Name, Validator
 
 _HEADING = re.compile(r"^(Parameters|Attributes|Raises|Returns|Yields)\n-+\n", flags=re.M)
 _ITEM = re.compile(r"(?:^|; )((?:[a-zA-Z_]\w*(?:, )?)+) : (.*?)(?=(?:; [a-z_]\w*(?:, \w+)* : )|^\S|\Z)", re.S | re.M)
@@ -58,10 +58,10 @@ class Declared:
 
     Attributes
     ----------
-    form : how it is checked; default : `MISSING` where it must be given; optional : whether it may be None
+    validator : how it is checked; default : `MISSING` where it must be given; optional : whether it may be None
     """
 
-    form: Form
+    validator: Validator
     default: Any
     description: str
     optional: bool
@@ -72,12 +72,14 @@ def declared(kind: type | Callable[..., Any]) -> Mapping[str, Declared]:
     """The declared fields of a class, or parameters of a function, by name, in their order."""
     texts, found = descriptions(kind), {}
     for name, hint, default in _fields(kind) if isinstance(kind, type) else _parameters(kind):
-        forms = [one for one in get_args(hint) if isinstance(one, Form)] if get_origin(hint) is Annotated else []
-        if forms:
+        validators = (
+            [one for one in get_args(hint) if isinstance(one, Validator)] if get_origin(hint) is Annotated else []
+        )
+        if validators:
             required = name in getattr(kind, "required", ())
             optional = not required and (default is None or type(None) in get_args(get_args(hint)[0]))
             default = MISSING if required else default
-            found[name] = Declared(forms[0], default, texts.get(name, ""), optional)
+            found[name] = Declared(validators[0], default, texts.get(name, ""), optional)
     return found
 
 
@@ -116,13 +118,13 @@ class Kind(metaclass=Described):
         for of_names in (True, False):
             for key, one in all_declared.items():
                 value = getattr(self, key)
-                if isinstance(one.form, Name) != of_names or (value is None and one.optional):
+                if isinstance(one.validator, Name) != of_names or (value is None and one.optional):
                     continue
                 if value is None and key in self.required:
                     raise self.error(f"{self.label}: {key} is missing; give {key}=..., {one.description}")
                 what = (self.word if key == "name" else f"{self.word}: {key}") if of_names else f"{self.label}: {key}"
                 try:
-                    object.__setattr__(self, key, one.form.checked(value, what))
+                    object.__setattr__(self, key, one.validator.checked(value, what))
                 except SceneError as error:
                     raise self.error(str(error)) from None
         if self.exactly_one:
@@ -146,15 +148,15 @@ class Kind(metaclass=Described):
     @property
     def bodies(self) -> tuple[str, ...]:
         """The names of the bodies, and of things that may stand for one, that it names."""
-        given = ((one.form, getattr(self, key)) for key, one in declared(type(self)).items())
-        return tuple(name for form, value in given if value is not None for name in form.bodies(value))
+        given = ((one.validator, getattr(self, key)) for key, one in declared(type(self)).items())
+        return tuple(name for validator, value in given if value is not None for name in validator.bodies(value))
 
     def summary(self) -> str:
         """What was given, without names and what has its default."""
         parts = []
         for key, one in declared(type(self)).items():
             value = getattr(self, key)
-            if not isinstance(one.form, Name) and not _same(value, one.default):
+            if not isinstance(one.validator, Name) and not _same(value, one.default):
                 parts.append(f"{key.replace('_', ' ')} {_short(value)}")
         return ", ".join(parts)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, NumberPerTet
+from supple.kinds.validators import POSITIVE, NumberPerTet
 from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import BY_LAW, Law, LawTets, TetMaterial, one_per_tet
 

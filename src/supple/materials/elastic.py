@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.kinds.forms import NON_NEGATIVE, NumberPerTet
+from supple.kinds.validators import NON_NEGATIVE, NumberPerTet
 from supple.materials.material import Elastic, Material, lame_from_engineering
 from supple.materials.per_tet import NOT_ELASTIC, TetMaterial
 from supple.materials.stretch_energies import (

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import unit_vectors
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, ListOf, Number, NumberPerTet
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE, ListOf, Number, NumberPerTet
 from supple.materials.by_law import ByLaw
 from supple.materials.laws.fibres import FIBRES
 from supple.materials.laws.ogden import OGDEN

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, NumberPerTet
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE, NumberPerTet
 from supple.materials.laws.hencky import HENCKY
 from supple.materials.laws.j2 import J2_FLOW
 from supple.materials.material import POISSON, Hyperelastic, lame_from_engineering

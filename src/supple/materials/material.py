@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name, Number, NumberPerTet
 from supple.kinds.kind import Kind
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE, Name, Number, NumberPerTet
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.laws.internal import add_resting_densities, add_resting_hessians, add_resting_piolas
 from supple.materials.laws.pointwise import densities_at, hessians_at, piolas_at

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import ANY_NUMBER, ListOf, NumberPerTet
+from supple.kinds.validators import ANY_NUMBER, ListOf, NumberPerTet
 from supple.materials.by_law import ByLaw
 from supple.materials.laws.ogden import OGDEN
 from supple.materials.laws.yeoh import YEOH

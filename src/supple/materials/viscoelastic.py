@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import ListOf, OneOf
+from supple.kinds.validators import ListOf, OneOf
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.j2_plastic import J2Plastic
 from supple.materials.laws.hencky import MAXWELL

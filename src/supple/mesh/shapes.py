@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.kinds.forms import POSITIVE, Counts, Extents
+from supple.kinds.validators import POSITIVE, Counts, Extents
 from supple.mesh.primitives import gummy_bear as bear
 from supple.mesh.primitives.filling import of_order, tets_between_layers
 from supple.mesh.primitives.gummy_bear import gummy_bear_surface

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import NON_NEGATIVE, Choice, Instance, Name, OneOf, Vector
 from supple.kinds.kind import Kind
+from supple.kinds.validators import NON_NEGATIVE, Choice, Instance, Name, OneOf, Vector
 from supple.materials.material import Material
 from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.quadratic import node_volumes

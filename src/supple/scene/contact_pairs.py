@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, Flag, Form
 from supple.kinds.kind import Kind
 from supple.kinds.suggestion import suggestion
+from supple.kinds.validators import NON_NEGATIVE, Boolean, Validator
 from supple.scene.body import PlacedBody
 from supple.scene.joints.joint import Joint
 from supple.scene.located import at
@@ -22,7 +22,7 @@ from supple.scene.rigid.rigid_body import RigidBody
 
 
 @dataclass(frozen=True)
-class NameList(Form):
+class NameList(Validator):
     """A name, or a list of names, which may have `*` and `?`."""
 
     def checked(self, value: Any, what: str) -> tuple[str, ...]:
@@ -60,7 +60,7 @@ class ContactPair(Kind):
     first: Annotated[str | Sequence[str], NameList()]
     second: Annotated[str | Sequence[str], NameList()]
     friction: Annotated[float | None, NON_NEGATIVE] = None
-    collide: Annotated[bool, Flag()] = True
+    collide: Annotated[bool, Boolean()] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

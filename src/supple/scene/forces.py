@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import POSITIVE, BodyName, Form, Name
-from supple.scene.motion import Motion, MotionForm
+from supple.kinds.validators import POSITIVE, BodyName, Name, Validator
+from supple.scene.motion import Motion, MotionValidator
 from supple.scene.selection import OnVertices, Selection, Vertices
 
 
 @dataclass(frozen=True)
-class ForceForm(Form):
+class ForceValidator(Validator):
     """(3,) or (k, 3), or a function of time; a scene file has one vector."""
 
     def checked(self, value: Any, what: str) -> Any:
@@ -61,7 +61,7 @@ class Force(OnVertices):
 
     body: Annotated[str, BodyName()]
     vertices: Annotated[Selection, Vertices()]
-    force: Annotated[ArrayLike | Callable[[float], ArrayLike], ForceForm()]
+    force: Annotated[ArrayLike | Callable[[float], ArrayLike], ForceValidator()]
     name: Annotated[str | None, Name()] = None
 
     @property
@@ -123,7 +123,7 @@ class SoftTarget(OnVertices):
     body: Annotated[str, BodyName()]
     vertices: Annotated[Selection, Vertices()]
     stiffness: Annotated[float, POSITIVE]
-    motion: Annotated[Motion, MotionForm()] = None
+    motion: Annotated[Motion, MotionValidator()] = None
     name: Annotated[str | None, Name()] = None
 
     def check_kind_of_body(self, rigid: bool) -> None:

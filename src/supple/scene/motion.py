@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import NUMBERS, VECTORS, Direction, Form, Vector
 from supple.kinds.kind import Kind
+from supple.kinds.validators import NUMBERS, VECTORS, Direction, Validator, Vector
 from supple.scene.rotation import rotation_matrix
 
 
@@ -105,7 +105,7 @@ Motion = Keyframes | Callable[[float], ArrayLike] | None
 
 
 @dataclass(frozen=True)
-class MotionForm(Form):
+class MotionValidator(Validator):
     """None, `Keyframes`, or a function of time."""
 
     def checked(self, value: Any, what: str) -> Any:

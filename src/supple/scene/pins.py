@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from supple.errors import SceneError
-from supple.kinds.forms import BodyName, Name
-from supple.scene.motion import Motion, MotionForm
+from supple.kinds.validators import BodyName, Name
+from supple.scene.motion import Motion, MotionValidator
 from supple.scene.selection import OnVertices, Selection, Vertices
 
 
@@ -33,7 +33,7 @@ class Pin(OnVertices):
 
     body: Annotated[str, BodyName()]
     vertices: Annotated[Selection | None, Vertices()] = None
-    motion: Annotated[Motion, MotionForm()] = None
+    motion: Annotated[Motion, MotionValidator()] = None
     name: Annotated[str | None, Name()] = None
 
     def check_kind_of_body(self, rigid: bool) -> None:

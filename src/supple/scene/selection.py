@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import Form, Vector
 from supple.kinds.kind import Kind
+from supple.kinds.validators import Validator, Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def distinct_numbers(value: Any, what: str, thing: str, things: str, else_: str)
 
 
 @dataclass(frozen=True)
-class Vertices(Form):
+class Vertices(Validator):
     """Numbers of vertices, or an `InBox`, checked as far as possible without their body.
 
     Attributes

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import BodyName, Counts, Direction, Name, Vector
 from supple.kinds.kind import Kind
 from supple.kinds.suggestion import suggestion
+from supple.kinds.validators import BodyName, Counts, Direction, Name, Vector
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TRIANGLES, Region, body_of, surface_region
-from supple.scene.loads.points import Point, PointForm, point_corners
+from supple.scene.loads.points import Point, PointValidator, point_corners
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.selection import OnVertices, Selection, Vertices
 
@@ -186,8 +186,8 @@ class DistanceSensor(Sensor):
     title: ClassVar[str] = "distance sensor"
 
     name: Annotated[str, Name()]
-    first: Annotated[Point, PointForm()]
-    second: Annotated[Point, PointForm()]
+    first: Annotated[Point, PointValidator()]
+    second: Annotated[Point, PointValidator()]
 
     def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
         for key in ("first", "second"):

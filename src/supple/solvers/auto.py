@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
 from supple.errors import SolverError
-from supple.kinds.forms import SHARE
 from supple.kinds.kind import Kind
+from supple.kinds.validators import SHARE
 from supple.model.system import System
 from supple.solvers.solver import Solver
 

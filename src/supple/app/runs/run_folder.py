@@ -14,7 +14,7 @@ from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal
 from supple.app.runs.keeper import Keeper, facts_of
 from supple.errors import OutputError, SceneError
-from supple.kinds.forms import POSITIVE
+from supple.kinds.validators import POSITIVE
 from supple.results.frame import Frame
 from supple.results.readings.fields import checked_fields
 from supple.results.recording.recorder import Recorder

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
 
-from supple.app.scene_file.entries import spelling as spelling  # registers how values are written
+from supple.app.scene_file.entries import schema_types as schema_types  # registers how values are written
 from supple.app.scene_file.entries.body import BodyEntry, body_model
 from supple.app.scene_file.entries.kinds import KindModel, entry_of, model_of
 from supple.app.scene_file.entries.mesh_sources import surface_model

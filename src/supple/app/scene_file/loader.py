@@ -22,7 +22,7 @@ from supple.app.scene_file.urdf.document import read_urdf
 from supple.app.scene_file.validation_errors import scene_error
 from supple.app.scene_file.yaml_files import Key, YamlDocument, read_yaml
 from supple.errors import SceneError
-from supple.mesh.meshing.spelling import spelled_for
+from supple.mesh.meshing.option_names import named_for
 from supple.model.system import build_system, initial_state
 from supple.scene.body import PlacedBody
 from supple.scene.inputs import MotorInput
@@ -124,7 +124,7 @@ def load_run(path: str | Path, *, confine: bool = False, scale: float | None = N
 def _run(path: str | Path, document: YamlDocument, store: MeshStore) -> Run:
     model = validated(document)
     try:
-        with spelled_for("yaml"):
+        with named_for("yaml"):
             run = _built(model, store)
         return replace(run, text=document.text, description=model, folder=Path(path).parent)
     except LocatedError as error:

@@ -14,17 +14,17 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from supple.errors import SceneError, StudyError
-from supple.kinds.forms import Form, Limits, Name, Whole
 from supple.kinds.kind import Kind
+from supple.kinds.validators import Integer, Limits, Name, Validator
 
 MOST_LEVELS, MOST_CASES = 100_000, 1_000_000
 
 
 @dataclass(frozen=True)
-class Values(Form):
-    """A list of values of the form `item`, or of any that JSON has."""
+class Values(Validator):
+    """A list of values that `item` allows, or of any that JSON has."""
 
-    item: Form | None = None
+    item: Validator | None = None
 
     def checked(self, value: Any, what: str) -> tuple[Any, ...]:
         if isinstance(value, str) or not isinstance(value, Sequence | np.ndarray):
@@ -61,7 +61,7 @@ class Factor(Kind):
     values: Annotated[tuple[Any, ...] | None, Values()] = None
     uniform: Annotated[tuple[float, float] | None, _RANGE] = None
     loguniform: Annotated[tuple[float, float] | None, _RANGE] = None
-    count: Annotated[int | None, Whole(1, MOST_LEVELS)] = None
+    count: Annotated[int | None, Integer(1, MOST_LEVELS)] = None
     paths: Annotated[tuple[str, ...] | None, Values(Name())] = None
 
     def __post_init__(self) -> None:
@@ -205,8 +205,8 @@ class LatinHypercube(Design):
 
     kind: ClassVar[str] = "latin_hypercube"
 
-    samples: Annotated[int, Whole(1, MOST_CASES)]
-    seed: Annotated[int, Whole(0, 2**63 - 1)] = 0
+    samples: Annotated[int, Integer(1, MOST_CASES)]
+    seed: Annotated[int, Integer(0, 2**63 - 1)] = 0
 
     def points(self, factors: Mapping[str, Factor]) -> list[dict[str, Any]]:
         from scipy.stats import qmc

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from supple.app.studies.factors import Values
 from supple.errors import StudyError
-from supple.kinds.forms import Choice, Name, Whole
 from supple.kinds.kind import Kind
+from supple.kinds.validators import Choice, Integer, Name
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
 
@@ -66,7 +66,7 @@ class Measure(Kind):
     quantity: Annotated[str, Choice((*NUMBERS, *VECTORS, *OF_BODY))]
     body: Annotated[str | None, Name()] = None
     axis: Annotated[str | None, Choice((*AXES, "length"))] = None
-    vertices: Annotated[tuple[int, ...] | None, Values(Whole())] = None
+    vertices: Annotated[tuple[int, ...] | None, Values(Integer())] = None
     over: Annotated[str | None, Choice(tuple(OVER))] = None
     time: Annotated[str, Choice(tuple(IN_TIME))] = "last"
 

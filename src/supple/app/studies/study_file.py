@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
-from supple.app.scene_file.entries.kinds import built, entry_of, model_of, spelled
+from supple.app.scene_file.entries.kinds import built, entry_of, model_of, schema_type
 from supple.app.scene_file.entries.mesh_sources import MeshStore
 from supple.app.scene_file.model import FilePath, Model, Name
 from supple.app.scene_file.validation_errors import scene_error
@@ -21,9 +21,9 @@ from supple.errors import StudyError
 from supple.scene.located import LocatedError
 
 
-@spelled.register
-def _(form: Values) -> Any:
-    item: Any = Any if form.item is None else spelled(form.item)
+@schema_type.register
+def _(validator: Values) -> Any:
+    item: Any = Any if validator.item is None else schema_type(validator.item)
     return Annotated[list[item], Field(min_length=1, max_length=MOST_LEVELS)]
 
 
@@ -87,7 +87,7 @@ def load_study(path: str | Path) -> Study:
 
 
 def _explicit(data: Any) -> Any:
-    """The data with `[1, 2]` written as `{values: [1, 2]}`: errors then name one form, not two."""
+    """The data with `[1, 2]` written as `{values: [1, 2]}`: errors then name one schema, not two."""
     if not isinstance(data, dict) or not isinstance(data.get("factors"), dict):
         return data
     factors = {name: {"values": given} if isinstance(given, list) else given for name, given in data["factors"].items()}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, Choice, Form, NumberPerTet
+from supple.kinds.validators import NON_NEGATIVE, Choice, NumberPerTet, Validator
 from supple.materials.by_law import ByLaw
 from supple.materials.material import Material, NotRecorded
 from supple.materials.own.derivation import (
@@ -27,7 +27,7 @@ from supple.materials.own.formula_law import FormulaLaw
 
 
 @dataclass(frozen=True)
-class FormulaText(Form):
+class FormulaText(Validator):
     """A formula as a text, or a function of symbols."""
 
     def checked(self, value: Any, what: str) -> Any:
@@ -37,7 +37,7 @@ class FormulaText(Form):
 
 
 @dataclass(frozen=True)
-class NamedNumbers(Form):
+class NamedNumbers(Validator):
     """Finite numbers by name, each one or one per tetrahedron."""
 
     def checked(self, value: Any, what: str) -> Any:

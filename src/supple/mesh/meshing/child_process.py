@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from supple.errors import MeshingError
 from supple.mesh.io.in_child import PREFIX
 from supple.mesh.meshing import mesher_worker
-from supple.mesh.meshing.spelling import option
+from supple.mesh.meshing.option_names import option
 
 logger = logging.getLogger(__name__)
 

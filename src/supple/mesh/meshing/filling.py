@@ -14,8 +14,8 @@ from supple.mesh.meshing.child_process import DEFAULT_TETS, Limits, MesherFailur
 from supple.mesh.meshing.decimation import decimate_surface
 from supple.mesh.meshing.facing import facing_outward
 from supple.mesh.meshing.meshers import mesh_with_mmg, mesh_with_tetgen
+from supple.mesh.meshing.option_names import option
 from supple.mesh.meshing.sizes import allow, edge_of_volume, tets_of_walls, volume_of_edge
-from supple.mesh.meshing.spelling import option
 from supple.mesh.meshing.stuffing import stuffed
 from supple.mesh.meshing.surface_fit import fitted
 from supple.mesh.surface import SurfaceMesh

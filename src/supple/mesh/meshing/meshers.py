@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from supple.mesh.meshing.child_process import Limits, MesherResult, run_mesher
-from supple.mesh.meshing.spelling import option
+from supple.mesh.meshing.option_names import option
 from supple.mesh.surface import SurfaceMesh
 
 

@@ -8,7 +8,7 @@ import math
 from supple.errors import MeshingError
 from supple.mesh.meshing.consent import agreed, beforehand
 from supple.mesh.meshing.meshers import TETS_OF_SQUARE
-from supple.mesh.meshing.spelling import option
+from supple.mesh.meshing.option_names import option
 from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)

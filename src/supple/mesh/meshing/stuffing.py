@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError, MeshingError
 from supple.mesh.meshing.child_process import DEFAULT_TETS
+from supple.mesh.meshing.option_names import option
 from supple.mesh.meshing.sizes import allow
-from supple.mesh.meshing.spelling import option
 from supple.mesh.primitives.isosurface_stuffing import MEAN_EDGE, stuff
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh

@@ -12,9 +12,9 @@ from supple.errors import MeshingError
 from supple.mesh.meshing.child_process import DAMAGED, Limits, MesherFailure
 from supple.mesh.meshing.facing import facing_outward
 from supple.mesh.meshing.filling import DEFAULT_QUALITY, Filling, Mesher, check_tetgen_options, choose
+from supple.mesh.meshing.option_names import option
 from supple.mesh.meshing.repair import RepairReport, repair_surface
 from supple.mesh.meshing.sizes import TETS_OF_BOUND, refuse_too_many, volume_of_edge, warn_of_many
-from supple.mesh.meshing.spelling import option
 from supple.mesh.meshing.surface_fit import distance
 from supple.mesh.meshing.union import united
 from supple.mesh.surface import SurfaceMesh

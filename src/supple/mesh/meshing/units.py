@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.meshing.spelling import option
+from supple.mesh.meshing.option_names import option
 
 logger = logging.getLogger(__name__)
 

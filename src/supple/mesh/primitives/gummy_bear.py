@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.kinds.forms import POSITIVE, Whole
+from supple.kinds.validators import POSITIVE, Integer
 from supple.mesh.primitives.isosurface_stuffing import stuff
 from supple.mesh.primitives.shape import shape
 from supple.mesh.primitives.sizes import fits, not_too_many, positive
@@ -56,7 +56,7 @@ def gummy_bear(height: float = 1.0, edge_length: float = 0.08) -> TetMesh:
 
 @shape
 def gummy_bear_surface(
-    height: Annotated[float, POSITIVE] = 1.0, resolution: Annotated[int, Whole(16, 1_000_000)] = 64
+    height: Annotated[float, POSITIVE] = 1.0, resolution: Annotated[int, Integer(16, 1_000_000)] = 64
 ) -> SurfaceMesh:
     """The bear's surface, watertight: that of its tets.
 

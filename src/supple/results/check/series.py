@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError, OutputError, SuppleError
-from supple.kinds.forms import POSITIVE, Choice, Flag, Vector
 from supple.kinds.kind import Kind
+from supple.kinds.validators import POSITIVE, Boolean, Choice, Vector
 from supple.materials.elastic import Elastic, FixedCorotated, NeoHookean, StableNeoHookean, StVenantKirchhoff
 from supple.materials.material import POISSON, NotRecorded
 from supple.materials.per_tet import TetMaterial
@@ -54,7 +54,7 @@ class Given(Kind):
     poisson: Annotated[float | None, POISSON] = None
     gravity: Annotated[ArrayLike | None, Vector()] = None
     dt: Annotated[float | None, POSITIVE] = None
-    free: Annotated[bool, Flag()] = False
+    free: Annotated[bool, Boolean()] = False
     law: Annotated[str, Choice(tuple(LAWS))] = "stable_neo_hookean"
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from supple.errors import OutputError, SceneError
 from supple.kinds.checks import finite_vector
-from supple.kinds.forms import Limits
+from supple.kinds.validators import Limits
 from supple.results.recording.reader import Recording
 from supple.results.view.camera import PRESETS
 from supple.results.view.fields import FIELDS

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.kinds.forms import ANY_NUMBER, NON_NEGATIVE, POSITIVE, Direction, Limits, OneOf
+from supple.kinds.validators import ANY_NUMBER, NON_NEGATIVE, POSITIVE, Direction, Limits, OneOf
 from supple.scene.joints.joint import FREE, Conditions, Function, Joint
 from supple.scene.joints.motors import MOTORS, Motor
 from supple.scene.rotation import rotation_matrix

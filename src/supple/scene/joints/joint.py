@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import BodyName, Flag, Name, Vector
 from supple.kinds.kind import Kind
 from supple.kinds.suggestion import suggestion
+from supple.kinds.validators import BodyName, Boolean, Name, Vector
 from supple.scene.body import PlacedBody
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
@@ -99,7 +99,7 @@ class Joint(Kind, ABC):
     first: Annotated[str, BodyName()]
     second: Annotated[str | None, BodyName()] = None
     point: Annotated[ArrayLike | None, Vector()] = None
-    collide: Annotated[bool, Flag()] = False
+    collide: Annotated[bool, Boolean()] = False
     name: Annotated[str | None, Name()] = None
 
     def __post_init__(self) -> None:

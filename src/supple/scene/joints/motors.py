@@ -13,8 +13,8 @@ from typing import Annotated, Any, ClassVar, cast
 import numpy as np
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE
 from supple.kinds.kind import Kind
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE
 from supple.scene.loads.over_time import OverTime, OverTimeOf, value_at
 
 _SCRIPT = OverTimeOf(inputs=True)

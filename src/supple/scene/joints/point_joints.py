@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, Direction, Limits
+from supple.kinds.validators import POSITIVE, Direction, Limits
 from supple.scene.joints.joint import Conditions, Function, Joint
 
 # The swing has no direction at zero and at half a turn: limits stay away from them.

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, BodyName, Name
 from supple.kinds.suggestion import suggestion
+from supple.kinds.validators import POSITIVE, BodyName, Name
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.body import PlacedBody
 from supple.scene.located import at

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import BodyName, Name
+from supple.kinds.validators import BodyName, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Load, body_of
 from supple.scene.loads.over_time import Curve, OverTimeOf, value_at

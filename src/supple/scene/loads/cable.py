@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name
 from supple.kinds.kind import Kind
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.over_time import OverTime, OverTimeOf
 from supple.scene.loads.points import Point, PointList, point_corners

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, BodyName, Name, OneOf, Whole
 from supple.kinds.kind import Kind
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE, BodyName, Integer, Name, OneOf
 from supple.mesh.closed_surfaces import enclosed_voids, is_closed, signed_volumes
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Rows, body_of
@@ -78,7 +78,7 @@ class Cavity(Kind):
     pressure: Annotated[OverTime | None, OverTimeOf()] = None
     volume: Annotated[OverTime | None, OverTimeOf(bounds=POSITIVE)] = None
     gas: Annotated[Gas | None, OneOf((Gas,), "a Gas")] = None
-    void: Annotated[int, Whole()] = 0
+    void: Annotated[int, Integer()] = 0
     triangles: Annotated[ArrayLike | None, Rows("triangles", boxes=False)] = None
     name: Annotated[str | None, Name()] = None
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import BodyName, Name, Number
+from supple.kinds.validators import BodyName, Name, Number
 from supple.materials.elastic import EdgesAndVolume
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TETS, OnBody, body_of

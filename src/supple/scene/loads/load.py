@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import Form
 from supple.kinds.kind import Kind
 from supple.kinds.suggestion import suggestion
+from supple.kinds.validators import Validator
 from supple.scene.body import PlacedBody
 from supple.scene.selection import InBox, distinct_numbers
 
@@ -100,7 +100,7 @@ def surface_region(region: Region, body: PlacedBody, label: str) -> NDArray[np.i
 
 
 @dataclass(frozen=True)
-class Rows(Form):
+class Rows(Validator):
     """Numbers of triangles of a surface, or of tets, or an `InBox` that holds all corners of each at the start.
 
     Attributes

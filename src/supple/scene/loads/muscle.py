@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import POSITIVE, BodyName, Form, Name, Number
+from supple.kinds.validators import POSITIVE, BodyName, Name, Number, Validator
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TETS, OnBody, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
@@ -22,7 +22,7 @@ ACTIVATION = OverTimeOf(bounds=Number(least=0.0, most=1.0))
 
 
 @dataclass(frozen=True)
-class ForceLength(Form):
+class ForceLength(Validator):
     """(stretches, values): increasing numbers above zero, and numbers of zero or more."""
 
     def checked(self, value: Any, what: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

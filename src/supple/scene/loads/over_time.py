@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import ANY_NUMBER, NUMBERS, Form, ListOf, Number
 from supple.kinds.kind import Kind, declared
+from supple.kinds.validators import ANY_NUMBER, NUMBERS, ListOf, Number, Validator
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ OverTime = ArrayLike | Curve | Callable[[float], ArrayLike]
 
 
 @dataclass(frozen=True)
-class OverTimeOf(Form):
+class OverTimeOf(Validator):
     """A number within bounds, or a vector of shape (3,): a constant, a `Curve`, or a function of time.
 
     Functions are checked when they are called.
@@ -121,9 +121,9 @@ def value_at(value: OverTime, time: float, what: str, shape: tuple[int, ...]) ->
 
 def script_of(thing: Kind, key: str) -> Callable[[float], NDArray[np.float64]]:
     """A field of a kind that is declared with `OverTimeOf`, as a function of time [s] that checks its values."""
-    form, value, what = declared(type(thing))[key].form, getattr(thing, key), f"{thing.label}: {key}"
-    assert isinstance(form, OverTimeOf)
-    return lambda time: form.at(value, time, what)
+    validator, value, what = declared(type(thing))[key].validator, getattr(thing, key), f"{thing.label}: {key}"
+    assert isinstance(validator, OverTimeOf)
+    return lambda time: validator.at(value, time, what)
 
 
 def _checked(value: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:

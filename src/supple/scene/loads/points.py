@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import check_name, finite_vector
-from supple.kinds.forms import Form
+from supple.kinds.validators import Validator
 from supple.mesh.skin import Embedding
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import body_of
@@ -21,7 +21,7 @@ Point = tuple[str | None, Any]
 
 
 @dataclass(frozen=True)
-class PointForm(Form):
+class PointValidator(Validator):
     """(body, vertex), (body, (x, y, z)) or (None, (x, y, z)), checked as far as possible without the body."""
 
     def checked(self, value: Any, what: str) -> Point:
@@ -44,7 +44,7 @@ class PointForm(Form):
 
 
 @dataclass(frozen=True)
-class PointList(Form):
+class PointList(Validator):
     """Two points or more."""
 
     def checked(self, value: Any, what: str) -> tuple[Point, ...]:
@@ -54,7 +54,7 @@ class PointList(Form):
             given = []
         if len(given) < 2:
             raise SceneError(f"{what} is {value!r}; give two or more")
-        return tuple(PointForm().checked(point, f"{what}[{i}]") for i, point in enumerate(given))
+        return tuple(PointValidator().checked(point, f"{what}[{i}]") for i, point in enumerate(given))
 
     def bodies(self, value: tuple[Point, ...]) -> tuple[str, ...]:
         return tuple(name for name, _ in value if name is not None)

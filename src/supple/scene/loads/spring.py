@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, Name
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Load
 from supple.scene.loads.over_time import OverTime, OverTimeOf
-from supple.scene.loads.points import Point, PointForm, point_corners
+from supple.scene.loads.points import Point, PointValidator, point_corners
 
 LENGTH = OverTimeOf(bounds=NON_NEGATIVE)
 
@@ -39,8 +39,8 @@ class Spring(Load):
 
     kind: ClassVar[str] = "spring"
 
-    first: Annotated[Point, PointForm()]
-    second: Annotated[Point, PointForm()]
+    first: Annotated[Point, PointValidator()]
+    second: Annotated[Point, PointValidator()]
     stiffness: Annotated[float, POSITIVE]
     rest_length: Annotated[OverTime | None, LENGTH] = None
     name: Annotated[str | None, Name()] = None

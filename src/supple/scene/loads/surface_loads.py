@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from supple.errors import SceneError
-from supple.kinds.forms import NON_NEGATIVE, BodyName, Name
+from supple.kinds.validators import NON_NEGATIVE, BodyName, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TRIANGLES, OnSurface, Region, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf

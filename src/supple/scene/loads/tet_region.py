@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array, unit_vectors
-from supple.kinds.forms import Form
+from supple.kinds.validators import Validator
 from supple.scene.body import PlacedBody
 from supple.scene.selection import InBox
 
@@ -41,7 +41,7 @@ def tets_in(tets: TetRegion, body: PlacedBody, label: str) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True)
-class Directions(Form):
+class Directions(Validator):
     """(3,) or (m, 3) vectors of any length above zero, stored as unit vectors; a scene file has one."""
 
     def checked(self, value: Any, what: str) -> NDArray[np.float64]:

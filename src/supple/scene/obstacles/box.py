@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.kinds.forms import Extents, Flag, Vector
+from supple.kinds.validators import Boolean, Extents, Vector
 from supple.mesh import shapes
 from supple.scene.obstacles.half_space import plane_contact
 from supple.scene.obstacles.obstacle import Obstacle, distances_from_corner
@@ -29,7 +29,7 @@ class Box(Obstacle):
     center: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
     size: Annotated[ArrayLike, Extents()] = (1.0, 1.0, 1.0)
     rotation: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
-    inside: Annotated[bool, Flag()] = False
+    inside: Annotated[bool, Boolean()] = False
 
     kind: ClassVar[str] = "box"
 

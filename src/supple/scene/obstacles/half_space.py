@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.kinds.forms import Direction, Vector
+from supple.kinds.validators import Direction, Vector
 from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.shape import Shape, frame_of

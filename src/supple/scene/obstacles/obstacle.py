@@ -14,10 +14,10 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.kinds.forms import NON_NEGATIVE, Name
 from supple.kinds.kind import Kind
+from supple.kinds.validators import NON_NEGATIVE, Name
 from supple.mesh.surface import SurfaceMesh
-from supple.scene.motion import Motion, MotionForm, rigid_pose
+from supple.scene.motion import Motion, MotionValidator, rigid_pose
 from supple.scene.obstacles.shape import Shape
 
 
@@ -37,7 +37,7 @@ class Obstacle(Kind, ABC):
     """
 
     friction: Annotated[float, NON_NEGATIVE] = 0.0
-    motion: Annotated[Motion, MotionForm()] = None
+    motion: Annotated[Motion, MotionValidator()] = None
     name: Annotated[str | None, Name()] = None
 
     title: ClassVar[str] = "obstacle"

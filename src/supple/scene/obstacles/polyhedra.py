@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, Flag, Vector
+from supple.kinds.validators import POSITIVE, Boolean, Vector
 from supple.mesh.primitives.surfaces import sphere_surface
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
 from supple.scene.obstacles.shape import frame_of
@@ -29,7 +29,7 @@ class SegmentObstacle(Obstacle):
     start: Annotated[ArrayLike, Vector()] = (0.0, -0.5, 0.0)
     end: Annotated[ArrayLike, Vector()] = (0.0, 0.5, 0.0)
     radius: Annotated[float, POSITIVE] = 0.5
-    inside: Annotated[bool, Flag()] = False
+    inside: Annotated[bool, Boolean()] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.kinds.forms import POSITIVE, Flag, Vector
+from supple.kinds.validators import POSITIVE, Boolean, Vector
 from supple.numerics.mat3 import dot
 from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
@@ -37,7 +37,7 @@ class Sphere(Obstacle):
 
     center: Annotated[ArrayLike, Vector()] = (0.0, 0.0, 0.0)
     radius: Annotated[float, POSITIVE] = 1.0
-    inside: Annotated[bool, Flag()] = False
+    inside: Annotated[bool, Boolean()] = False
 
     kind: ClassVar[str] = "sphere"
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, Direction, Vector
+from supple.kinds.validators import POSITIVE, Direction, Vector
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
 from supple.scene.obstacles.shape import frame_of
 

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.kinds.forms import Instance
+from supple.kinds.validators import Instance
 from supple.mesh.surface import SurfaceMesh
 from supple.numerics.geometry.triangle_tree import TriangleTree, closest_places
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions

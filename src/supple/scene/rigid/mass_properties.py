@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import Form
+from supple.kinds.validators import Validator
 from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
@@ -37,7 +37,7 @@ _ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True)
-class Inertia(Form):
+class Inertia(Validator):
     """An inertia tensor (3, 3), or its diagonal (3,)."""
 
     def checked(self, value: Any, what: str) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.forms import POSITIVE, Instance, Vector
+from supple.kinds.validators import POSITIVE, Instance, Vector
 from supple.materials.elastic import StVenantKirchhoff
 from supple.materials.material import Material
 from supple.mesh.skin import Skin

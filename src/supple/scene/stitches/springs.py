@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE
 from supple.scene.stitches.elements import Pairs, Springs
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitch import PerPair, Stitch

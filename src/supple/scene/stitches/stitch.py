@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import NON_NEGATIVE, POSITIVE, BodyName, Choice, Form, Name, Number
 from supple.kinds.kind import Kind
+from supple.kinds.validators import NON_NEGATIVE, POSITIVE, BodyName, Choice, Name, Number, Validator
 from supple.numerics.geometry.triangle_tree import TriangleTree, pair_distances
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side
 
 
 @dataclass(frozen=True)
-class PairList(Form):
+class PairList(Validator):
     """(n, 2) different pairs of whole numbers."""
 
     def checked(self, value: Any, what: str) -> NDArray[np.int64]:
@@ -37,7 +37,7 @@ class PairList(Form):
 
 
 @dataclass(frozen=True)
-class PerPair(Form):
+class PerPair(Validator):
     """A number within bounds, or a list of them, one for each pair."""
 
     bounds: Number

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
-from supple.kinds.forms import POSITIVE
+from supple.kinds.validators import POSITIVE
 from supple.materials.material import lame_from_engineering
 from supple.scene.stitches.elements import Pairs, StitchTets
 from supple.scene.stitches.side import Side

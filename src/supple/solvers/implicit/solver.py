@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from supple.errors import SolverError
-from supple.kinds.forms import COUNT, POSITIVE, SHARE, Choice, Number, OneOf
+from supple.kinds.validators import COUNT, POSITIVE, SHARE, Choice, Number, OneOf
 from supple.materials.laws.internal import checked
 from supple.model.actuator_readings import actuator_fields, start_of
 from supple.model.energy_balance import add_works, no_works, works_of_actuators

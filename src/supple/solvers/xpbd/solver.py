@@ -13,7 +13,7 @@ import numpy as np
 from numba.core import config
 
 from supple.errors import SolverError
-from supple.kinds.forms import COUNT, POSITIVE, SHARE, Choice, Flag, OneOf, Or
+from supple.kinds.validators import COUNT, POSITIVE, SHARE, Boolean, Choice, OneOf, Union
 from supple.model.actuator_readings import actuator_fields, start_of
 from supple.model.energy_balance import no_works
 from supple.model.joints.at_state import refuse_moved_welds
@@ -114,8 +114,8 @@ class XPBD(Solver):
 
     kind: ClassVar[str] = "xpbd"
 
-    substeps: Annotated[int | Literal["auto"], Or(COUNT, "auto")] = "auto"
-    momentum_restore: Annotated[bool, Flag()] = True
+    substeps: Annotated[int | Literal["auto"], Union(COUNT, "auto")] = "auto"
+    momentum_restore: Annotated[bool, Boolean()] = True
     contact: Annotated[XPBDContact | None, OneOf((XPBDContact,), "XPBDContact(...), or None to turn it off")] = field(
         default_factory=XPBDContact
     )

@@ -92,8 +92,8 @@ def _extent(low: np.ndarray, high: np.ndarray) -> str:
 
 def _surface_rows(surface: SurfaceMesh, file: Path) -> list[tuple[str, str]]:
     from supple.mesh.meshing.child_process import DEFAULT_TETS
+    from supple.mesh.meshing.option_names import named_for, option
     from supple.mesh.meshing.sizes import needed_by_walls
-    from supple.mesh.meshing.spelling import option, spelled_for
     from supple.mesh.meshing.units import millimetres_hint
 
     report = surface.check()
@@ -101,7 +101,7 @@ def _surface_rows(surface: SurfaceMesh, file: Path) -> list[tuple[str, str]]:
     tets = f"about {DEFAULT_TETS:,} where no size is given"
     if needed > DEFAULT_TETS:
         tets = f"about {needed:,} or more: walls are {thickness:.2g} m thick on average"
-    with spelled_for("shell"):
+    with named_for("shell"):
         hint = millimetres_hint(file, surface.vertices)
         repair = "" if report.ok else f"\nmesh it with {option('repair', True)}"
     return [

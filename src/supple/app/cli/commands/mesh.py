@@ -78,7 +78,7 @@ def mesh(
     from supple.mesh.io.mesh_files import TET_EXTENSIONS
     from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path
     from supple.mesh.meshing.child_process import DEFAULT_TETS
-    from supple.mesh.meshing.spelling import spelled_for
+    from supple.mesh.meshing.option_names import named_for
     from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetgen_files import write_tetgen
@@ -99,7 +99,7 @@ def mesh(
         refuse_to_replace(surface, target)
     if tets is edge is max_volume is None and not keep_surface:
         tets = DEFAULT_TETS
-    with spelled_for("shell"), reading(yes, "meshing"):
+    with named_for("shell"), reading(yes, "meshing"):
         loaded = _scaled(SurfaceMesh.load(surface), scale, surface)
         try:
             filled, report = tetrahedralize_reported(

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import Field, create_model, model_validator
 
 from supple.app.scene_file.model import Model
-from supple.kinds.forms import Form
 from supple.kinds.kind import Kind, declared, first_paragraph
+from supple.kinds.validators import Validator
 from supple.scene.located import at
 
 
@@ -56,7 +56,7 @@ def values_of(model: Any, fields: Any, meshes: Meshes) -> dict[str, Any]:
     """The values of declared fields of a part of a scene file; errors get the key that is wrong."""
     values = {}
     for name, one in fields.items():
-        keys = list(keys_of(one.form, name))
+        keys = list(keys_of(one.validator, name))
         key = next((key for key in keys if getattr(model, key) is not None), keys[0])
         with at(key):
             value = getattr(model, key)
@@ -69,15 +69,15 @@ def _listed(others: Sequence[str], last: str) -> str:
 
 
 @singledispatch
-def spelled(form: Form) -> Any:
-    """The type of the value of a key; see `supple.app.scene_file.entries.spelling`."""
-    raise TypeError(f"scene files do not know how to write a {type(form).__name__}; register it beside the others")
+def schema_type(validator: Validator) -> Any:
+    """The type of the value of a key; see `supple.app.scene_file.entries.schema_types`."""
+    raise TypeError(f"scene files do not know how to write a {type(validator).__name__}; register it beside the others")
 
 
 @singledispatch
-def keys_of(form: Form, name: str) -> dict[str, tuple[Any, str]]:
+def keys_of(validator: Validator, name: str) -> dict[str, tuple[Any, str]]:
     """The keys that a field of this name has, with their types, and descriptions where the field's does not fit."""
-    return {name: (spelled(form), "")}
+    return {name: (schema_type(validator), "")}
 
 
 def typed_keys(kind: Callable[..., Any], names: Collection[str], *, null: bool = False) -> dict[str, tuple[Any, Any]]:
@@ -86,16 +86,16 @@ def typed_keys(kind: Callable[..., Any], names: Collection[str], *, null: bool =
     for name, one in declared(kind).items():
         if name not in names:
             continue
-        own = keys_of(one.form, name)
+        own = keys_of(one.validator, name)
         text = one.description.replace("None", "null")
-        for key, (spelled, words) in own.items():
+        for key, (written, words) in own.items():
             description = words or text
             if one.default is MISSING and len(own) == 1 and not null:
-                keys[key] = (spelled, Field(description=description))
+                keys[key] = (written, Field(description=description))
                 continue
             default = None if len(own) > 1 or null else _default(one.default)
             optional = default is None or one.optional
-            keys[key] = (spelled | None if optional else spelled, Field(default=default, description=description))
+            keys[key] = (written | None if optional else written, Field(default=default, description=description))
     return keys
 
 
@@ -109,7 +109,7 @@ def model_of(kind: Any, tagged: bool) -> type[KindModel]:
     if not isinstance(kind, type):
         name = "".join(word.capitalize() for word in kind.__name__.split("_")) + "ShapeModel"
     model = create_model(name, __base__=KindModel, __doc__=first_paragraph(kind), __module__=__name__, **keys)
-    several = (tuple(keys_of(one.form, name)) for name, one in declared(kind).items())
+    several = (tuple(keys_of(one.validator, name)) for name, one in declared(kind).items())
     model.made, model.choices = staticmethod(kind), tuple(own for own in several if len(own) > 1)
     return model
 

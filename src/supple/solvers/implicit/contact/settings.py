@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.kinds.forms import COUNT, POSITIVE, Or
 from supple.kinds.kind import Kind
+from supple.kinds.validators import COUNT, POSITIVE, Union
 from supple.model.system import BodyRange, System
 from supple.scene.rigid.rigid_body import RigidBody
 
@@ -43,7 +43,7 @@ class IPCContact(Kind):
     error = SolverError
 
     dhat: Annotated[float | None, POSITIVE] = None
-    stiffness: Annotated[float | str, Or(POSITIVE, "adaptive")] = "adaptive"
+    stiffness: Annotated[float | str, Union(POSITIVE, "adaptive")] = "adaptive"
     friction_velocity: Annotated[float | None, POSITIVE] = None
     friction_iterations: Annotated[int | None, COUNT] = None
 

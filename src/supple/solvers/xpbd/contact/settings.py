@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.kinds.forms import POSITIVE, Flag
 from supple.kinds.kind import Kind
+from supple.kinds.validators import POSITIVE, Boolean
 from supple.model.system import System
 from supple.scene.contact_pairs import pair_table
 
@@ -37,8 +37,8 @@ class XPBDContact(Kind):
     error = SolverError
 
     thickness: Annotated[float | None, POSITIVE] = None
-    body_collision: Annotated[bool, Flag()] = True
-    self_collision: Annotated[bool, Flag()] = True
+    body_collision: Annotated[bool, Boolean()] = True
+    self_collision: Annotated[bool, Boolean()] = True
 
 
 def colliding_pairs(system: System, settings: XPBDContact | None, joined: bool = False) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""How a scene file writes each form of a value: its keys and their types. Importing this module registers them."""
+"""How a scene file writes what validators check: keys and their types. Importing this module registers them."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from typing import Annotated, Any, Literal, Union
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from supple.app.scene_file.entries.kinds import entry_of, keys_of, model_of, spelled
+from supple.app.scene_file.entries.kinds import entry_of, keys_of, model_of, schema_type
 from supple.app.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, surface_model
 from supple.app.scene_file.model import Count, Extents, Index, Model, Name, NonNegative, Number, Positive, Vector
-from supple.kinds import forms
+from supple.kinds import validators
 from supple.materials.own.energy_material import FormulaText, NamedNumbers
 from supple.mesh.primitives.shape import SHAPES
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.contact_pairs import NameList
-from supple.scene.forces import ForceForm
+from supple.scene.forces import ForceValidator
 from supple.scene.inputs import MotorInput
 from supple.scene.loads.load import Rows
 from supple.scene.loads.muscle import ForceLength
 from supple.scene.loads.over_time import Curve, OverTimeOf
-from supple.scene.loads.points import Point, PointForm, PointList
+from supple.scene.loads.points import Point, PointList, PointValidator
 from supple.scene.loads.tet_region import Directions
-from supple.scene.motion import Keyframes, MotionForm
+from supple.scene.motion import Keyframes, MotionValidator
 from supple.scene.rigid.mass_properties import Inertia
 from supple.scene.selection import InBox, Vertices
 from supple.scene.stitches.stitch import PairList, PerPair
@@ -81,21 +81,21 @@ Names = Annotated[
 ]
 
 
-def _plain(form: type[forms.Form], written: Any) -> None:
-    spelled.register(form, lambda _: written)
+def _plain(validator: type[validators.Validator], written: Any) -> None:
+    schema_type.register(validator, lambda _: written)
 
 
-_plain(forms.Flag, bool)
-_plain(forms.Name, Name)
-_plain(forms.Vector, Vector)
-_plain(forms.Direction, Vector)
-_plain(forms.Extents, Extents)
-_plain(forms.Limits, Annotated[list[Number], Field(min_length=2, max_length=2)])
+_plain(validators.Boolean, bool)
+_plain(validators.Name, Name)
+_plain(validators.Vector, Vector)
+_plain(validators.Direction, Vector)
+_plain(validators.Extents, Extents)
+_plain(validators.Limits, Annotated[list[Number], Field(min_length=2, max_length=2)])
 _plain(Directions, Vector)
-_plain(ForceForm, Vector)
+_plain(ForceValidator, Vector)
 _plain(ForceLength, ForceLengthModel)
 _plain(NameList, Names)
-_plain(PointForm, PointModel)
+_plain(PointValidator, PointModel)
 _plain(PointList, Annotated[list[PointModel], Field(min_length=2)])
 _plain(PairList, Annotated[list[Annotated[list[Index], Field(min_length=2, max_length=2)]], Field(min_length=1)])
 _plain(Inertia, Annotated[list[Vector], Field(min_length=3, max_length=3)])
@@ -103,75 +103,77 @@ _plain(FormulaText, Annotated[str, Field(max_length=4000)])
 _plain(NamedNumbers, dict[Name, Number])
 
 
-@spelled.register
-def _(form: forms.Number) -> Any:
-    return Annotated[float, Field(gt=form.above, ge=form.least, lt=form.below, le=form.most, allow_inf_nan=False)]
+@schema_type.register
+def _(number: validators.Number) -> Any:
+    return Annotated[
+        float, Field(gt=number.above, ge=number.least, lt=number.below, le=number.most, allow_inf_nan=False)
+    ]
 
 
-@spelled.register
-def _(form: forms.Whole) -> Any:
-    return Annotated[int, Field(ge=form.least, le=form.most if form.most is not None else 2**31 - 1)]
+@schema_type.register
+def _(validator: validators.Integer) -> Any:
+    return Annotated[int, Field(ge=validator.least, le=validator.most if validator.most is not None else 2**31 - 1)]
 
 
-@spelled.register
-def _(form: forms.Choice) -> Any:
-    return Literal[form.words]
+@schema_type.register
+def _(validator: validators.Choice) -> Any:
+    return Literal[validator.words]
 
 
-@spelled.register
-def _(form: forms.Counts) -> Any:
-    return Annotated[list[Count], Field(min_length=form.count, max_length=form.count)]
+@schema_type.register
+def _(validator: validators.Counts) -> Any:
+    return Annotated[list[Count], Field(min_length=validator.count, max_length=validator.count)]
 
 
-@spelled.register
-def _(form: forms.ListOf) -> Any:
+@schema_type.register
+def _(validator: validators.ListOf) -> Any:
     kinds = {"numbers": Number, "vectors": Vector}
     kinds["pairs"] = Annotated[list[Positive], Field(min_length=2, max_length=2)]
-    lists = tuple(list[kinds[thing]] for thing in form.things)
-    return Annotated[Union[lists], Field(min_length=1, max_length=form.most)]  # noqa: UP007
+    lists = tuple(list[kinds[thing]] for thing in validator.things)
+    return Annotated[Union[lists], Field(min_length=1, max_length=validator.most)]  # noqa: UP007
 
 
-@spelled.register
-def _(form: forms.OneOf) -> Any:
-    return entry_of(form.classes)
+@schema_type.register
+def _(validator: validators.OneOf) -> Any:
+    return entry_of(validator.classes)
 
 
-@spelled.register
-def _(form: forms.Or) -> Any:
-    return spelled(form.form) | Literal[form.word]
+@schema_type.register
+def _(validator: validators.Union) -> Any:
+    return schema_type(validator.validator) | Literal[validator.word]
 
 
-@spelled.register
-def _(form: OverTimeOf) -> Any:
-    constant = Vector if form.shape else spelled(form.bounds)
-    return constant | model_of(Curve, False) | InputModel if form.inputs else constant | model_of(Curve, False)
+@schema_type.register
+def _(validator: OverTimeOf) -> Any:
+    constant = Vector if validator.shape else schema_type(validator.bounds)
+    return constant | model_of(Curve, False) | InputModel if validator.inputs else constant | model_of(Curve, False)
 
 
-@spelled.register
-def _(form: MotionForm) -> Any:
+@schema_type.register
+def _(validator: MotionValidator) -> Any:
     return model_of(Keyframes, False)
 
 
-@spelled.register
-def _(form: forms.NumberPerTet) -> Any:
-    return spelled(form.bounds)
+@schema_type.register
+def _(validator: validators.NumberPerTet) -> Any:
+    return schema_type(validator.bounds)
 
 
-@spelled.register
-def _(form: PerPair) -> Any:
-    number = spelled(form.bounds)
+@schema_type.register
+def _(validator: PerPair) -> Any:
+    number = schema_type(validator.bounds)
     return number | Annotated[list[number], Field(min_length=1)]
 
 
 @keys_of.register
-def _(form: forms.Instance, name: str) -> dict[str, tuple[Any, str]]:
-    if TetMesh not in form.classes:
+def _(validator: validators.Instance, name: str) -> dict[str, tuple[Any, str]]:
+    if TetMesh not in validator.classes:
         return {name: (surface_model(), "")}
     keys: dict[str, tuple[Any, str]] = {
         "mesh": (MeshFileModel, "of tetrahedra, or a surface to fill with them"),
         "shape": (entry_of(SHAPES.values()), "instead of `mesh`: a ready-made shape"),
     }
-    if SurfaceMesh in form.classes:
+    if SurfaceMesh in validator.classes:
         text = "instead of `mesh`, of a rigid body: closed surfaces that are its shape together, and may overlap"
         keys["surfaces"] = Annotated[list[surface_model()], Field(min_length=1, max_length=1000)], text
     return keys
@@ -181,7 +183,7 @@ _ROWS = Annotated[list[Index], Field(min_length=1)]
 
 
 @keys_of.register
-def _(form: Vertices, name: str) -> dict[str, tuple[Any, str]]:
+def _(validator: Vertices, name: str) -> dict[str, tuple[Any, str]]:
     return {
         name: (_ROWS, "vertex numbers, from 0"),
         "box": (model_of(InBox, False), "instead of `vertices`: all vertices inside"),
@@ -190,8 +192,8 @@ def _(form: Vertices, name: str) -> dict[str, tuple[Any, str]]:
 
 
 @keys_of.register
-def _(form: Rows, name: str) -> dict[str, tuple[Any, str]]:
-    if not form.boxes:
-        return {form.things: (_ROWS, "")}
-    box = model_of(InBox, False), f"{form.things} with all corners inside; without it, all"
-    return {"box": box, form.things: (_ROWS, "instead of `box`: their numbers, from 0")}
+def _(validator: Rows, name: str) -> dict[str, tuple[Any, str]]:
+    if not validator.boxes:
+        return {validator.things: (_ROWS, "")}
+    box = model_of(InBox, False), f"{validator.things} with all corners inside; without it, all"
+    return {"box": box, validator.things: (_ROWS, "instead of `box`: their numbers, from 0")}

@@ -1,4 +1,4 @@
-"""How messages spell the options of a meshing: as Python, as a scene file or as the shell does."""
+"""How messages name the options of a meshing: as Python, as a scene file or as the shell does."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WRITER: ContextVar[Writer] = ContextVar("writer", default="python")
 
 
 @contextmanager
-def spelled_for(writer: Writer) -> Iterator[None]:
+def named_for(writer: Writer) -> Iterator[None]:
     """Messages inside are for the writer of a Python program, of a scene file (YAML) or of a command in the shell."""
     token = _WRITER.set(writer)
     try:

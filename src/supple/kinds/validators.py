@@ -1,5 +1,5 @@
-"""Forms of values: how the fields of a kind are checked. What a scene file writes for each form is in
-`supple.app.scene_file.spelling`.
+"""Validators of values: how the fields of a kind are checked. What a scene file writes for each validator is in
+`supple.app.scene_file.entries.schema_types`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from supple.errors import SceneError
 from supple.kinds.checks import check_name, finite_vector, float_array, number, unit_vector
 
 
-class Form(ABC):
+class Validator(ABC):
     """How one value is checked and stored."""
 
     @abstractmethod
@@ -34,7 +34,7 @@ class Form(ABC):
 
 
 @dataclass(frozen=True)
-class Number(Form):
+class Number(Validator):
     """A finite number within bounds; those of `above` and `below` are excluded."""
 
     above: float | None = None
@@ -89,7 +89,7 @@ SHARE = Number(above=0.0, below=1.0)
 
 
 @dataclass(frozen=True)
-class NumberPerTet(Form):
+class NumberPerTet(Validator):
     """A number within bounds, or one for each tet of a body; it is stored as it is given."""
 
     bounds: Number
@@ -111,7 +111,7 @@ class NumberPerTet(Form):
 
 
 @dataclass(frozen=True)
-class Whole(Form):
+class Integer(Validator):
     """A whole number of at least `least`, and at most `most`."""
 
     least: int = 0
@@ -126,11 +126,11 @@ class Whole(Form):
         return int(value)
 
 
-COUNT = Whole(1, 100_000)
+COUNT = Integer(1, 100_000)
 
 
 @dataclass(frozen=True)
-class Counts(Form):
+class Counts(Validator):
     """A number of whole numbers of one or more."""
 
     count: int
@@ -147,7 +147,7 @@ class Counts(Form):
 
 
 @dataclass(frozen=True)
-class Flag(Form):
+class Boolean(Validator):
     """True or False."""
 
     def checked(self, value: Any, what: str) -> bool:
@@ -157,7 +157,7 @@ class Flag(Form):
 
 
 @dataclass(frozen=True)
-class Choice(Form):
+class Choice(Validator):
     """One of several words, or in Python an object of the class `instead`."""
 
     words: tuple[str, ...]
@@ -173,23 +173,23 @@ class Choice(Form):
 
 
 @dataclass(frozen=True)
-class Or(Form):
-    """A value of a form, or one word."""
+class Union(Validator):
+    """A value of a validator, or one word."""
 
-    form: Form
+    validator: Validator
     word: str
 
     def checked(self, value: Any, what: str) -> Any:
         if isinstance(value, str) and value == self.word:
             return value
         try:
-            return self.form.checked(value, what)
+            return self.validator.checked(value, what)
         except SceneError as error:
             raise SceneError(f"{error}, or {self.word!r}") from None
 
 
 @dataclass(frozen=True)
-class Name(Form):
+class Name(Validator):
     """A name; see `check_name`. Kinds check their names first, because messages contain them."""
 
     def checked(self, value: Any, what: str) -> str:
@@ -206,7 +206,7 @@ class BodyName(Name):
 
 
 @dataclass(frozen=True)
-class Vector(Form):
+class Vector(Validator):
     """Three finite numbers (3,)."""
 
     def checked(self, value: Any, what: str) -> NDArray[np.float64]:
@@ -214,7 +214,7 @@ class Vector(Form):
 
 
 @dataclass(frozen=True)
-class Direction(Form):
+class Direction(Validator):
     """A vector (3,) of any length above zero, stored as a unit vector."""
 
     def checked(self, value: Any, what: str) -> NDArray[np.float64]:
@@ -222,7 +222,7 @@ class Direction(Form):
 
 
 @dataclass(frozen=True)
-class Extents(Form):
+class Extents(Validator):
     """Three numbers (3,) above zero."""
 
     def checked(self, value: Any, what: str) -> NDArray[np.float64]:
@@ -233,7 +233,7 @@ class Extents(Form):
 
 
 @dataclass(frozen=True)
-class Limits(Form):
+class Limits(Validator):
     """Two numbers (low, high), the first below the second; an end may be infinite."""
 
     remedy: str = "exchange them"
@@ -249,7 +249,7 @@ class Limits(Form):
 
 
 @dataclass(frozen=True)
-class ListOf(Form):
+class ListOf(Validator):
     """A list of numbers, of vectors, or of pairs of positive numbers; the kind checks shapes and values.
 
     Attributes
@@ -271,7 +271,7 @@ NUMBERS, VECTORS = ListOf(), ListOf(("vectors",))
 
 
 @dataclass(frozen=True)
-class Instance(Form):
+class Instance(Validator):
     """An object of one of several classes, for each of which scene files have keys of their own; give : the remedy."""
 
     classes: tuple[type, ...]
@@ -284,7 +284,7 @@ class Instance(Form):
 
 
 @dataclass(frozen=True)
-class OneOf(Form):
+class OneOf(Validator):
     """An object of one of several classes; a scene file names them by their `kind`, or one alone without.
 
     Attributes

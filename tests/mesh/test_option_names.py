@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from supple.errors import MeshingError
-from supple.mesh.meshing.spelling import option, spelled_for
+from supple.mesh.meshing.option_names import named_for, option
 from supple.mesh.meshing.tetrahedralize import tetrahedralize
 from supple.mesh.primitives.surfaces import sphere_surface
 from supple.mesh.surface import SurfaceMesh
@@ -20,7 +20,7 @@ from supple.mesh.surface import SurfaceMesh
     ],
 )
 def test_options(writer, expected):
-    with spelled_for(writer):
+    with named_for(writer):
         given = {"repair": True, "tets": 500, "mesher": "stuffing", "max_volume": 1e-4, "time_limit": None}
         assert [option(name, value) for name, value in given.items()] == expected
     assert option("repair", True) == "repair=True"
@@ -29,5 +29,5 @@ def test_options(writer, expected):
 @pytest.mark.parametrize(("writer", "words"), [("yaml", "repair: true"), ("shell", "--repair"), ("python", "repair=T")])
 def test_an_open_surface_is_an_error_in_the_words_of_the_user(writer, words):
     ball = sphere_surface(radius=0.5, edge_length=0.2)
-    with spelled_for(writer), pytest.raises(MeshingError, match=words):
+    with named_for(writer), pytest.raises(MeshingError, match=words):
         tetrahedralize(SurfaceMesh(ball.vertices, ball.triangles[3:]), mesher="tetgen")
