@@ -19,7 +19,6 @@ EXAMPLES = TESTS.parent / "examples"
 IMPORT_NAMES = {
     "fast-simplification": "fast_simplification",
     "imageio-ffmpeg": "imageio_ffmpeg",
-    "lazy-loader": "lazy_loader",
     "pillow": "PIL",
     "pycollada": "collada",
     "pyyaml": "yaml",
@@ -28,7 +27,7 @@ IMPORT_NAMES = {
 BY_TRIMESH = {"lxml", "networkx"}  # imported by it where it reads 3MF
 # Used as those that need them do, in the versions that these allow: not listed again.
 BROUGHT = {"PIL": "matplotlib", "llvmlite": "numba", "rich": "cyclopts", "websockets": "viser"}
-MOST = 17  # packages that a plain install asks for
+MOST = 16  # packages that a plain install asks for
 # Development tools that are run, or loaded by pytest; no test imports them.
 TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-cov", "pytest-xdist", "ruff"}
 OWN = {"supple", "tests", "benchmarks"}

@@ -21,6 +21,7 @@ from supple.app.scene_file.yaml_files import read_yaml
 from supple.kinds.validators import ANY_NUMBER, POSITIVE, BodyName, Name, NumberPerTet, Vector
 from supple.materials.by_law import ByLaw
 from supple.materials.per_tet import Law
+from supple.materials.registry import MATERIALS
 from supple.mesh.primitives.shape import SHAPES, shape
 from supple.model.joints.functions import FORMS, Form, Values
 from supple.model.loads.applied import AppliedLoad, Setting, UniformLoad
@@ -34,7 +35,6 @@ from supple.results.readings.sensor_readings import reading_of
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.scene.joints.joint import Conditions, Function, Joint
 from supple.scene.loads.load import OnBody, body_of
-from supple.scene.materials import MATERIALS
 from supple.scene.registry import PARTS, register
 from supple.scene.sensors import Sensor
 

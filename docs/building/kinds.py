@@ -9,9 +9,9 @@ from typing import Any
 from supple.app.scene_file.document import scene_file_model as scene_file_model  # registers how values are written
 from supple.app.scene_file.entries.kinds import keys_of
 from supple.kinds.kind import Kind, declared, first_paragraph
+from supple.materials.registry import MATERIALS
 from supple.mesh.primitives.shape import SHAPES
 from supple.scene.joints.motors import MOTORS
-from supple.scene.materials import MATERIALS
 from supple.scene.registry import PARTS
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.solvers.registry import SOLVERS

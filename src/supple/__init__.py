@@ -4,19 +4,13 @@ Everything public is here: `import supple as sp`. The names are listed in `__ini
 when the name is first used, so that the import of `supple` is quick.
 """
 
-import copyreg
-import sys
-from collections.abc import Callable
-from importlib import import_module
-from types import ModuleType
 from typing import Any
 
-import lazy_loader
-
 from .runtime.displayed import supply
+from .runtime.public_names import public_names
 
 __version__ = "0.1.0"
-_listed, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_listed, __all__ = public_names(__name__)
 __all__ += ["__version__"]
 _OBSTACLES = ("Box", "Capsule", "Cylinder", "Sphere", "TriangleObstacle")
 supply(
@@ -27,15 +21,6 @@ supply(
     plot="supple.results.plots:plot",
     progress="supple.results.progress:ProgressBar",
 )
-
-
-def _by_name(module: ModuleType) -> tuple[Callable[[str], ModuleType], tuple[str]]:
-    return import_module, (module.__name__,)
-
-
-# A function that says `sp.Scene` refers to this module, which is of a class of lazy_loader's. It is sent to other
-# processes by its name, as all other modules are.
-copyreg.pickle(type(sys.modules[__name__]), _by_name)  # pyright: ignore[reportArgumentType]
 
 
 def __getattr__(name: str) -> Any:

@@ -33,7 +33,6 @@ from supple.app.scene_file.loader import load_run
 from supple.app.studies.run_case import read_result
 from supple.mesh import shapes
 from supple.mesh.io.mesh_files import SURFACE_WRITERS
-from supple.mesh.tetgen_files import write_tetgen
 from supple.results.checkpoint.file import read_checkpoint
 
 EXAMPLES = int(os.environ.get("SUPPLE_FUZZ_EXAMPLES", "40"))
@@ -253,7 +252,7 @@ READERS = {
     },
     **{
         f"TetGen's {kind}": Reader(
-            lambda folder: write_tetgen(BODY, folder / "t.1.node"),
+            lambda folder: BODY.save(folder / "t.1.node"),
             f"t.1{kind}",
             lambda path: sp.TetMesh.load(path.with_suffix(".node")),
         )

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from supple.errors import SceneError
+from supple.materials.elastic import ELASTIC_MATERIALS
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.material import lame_from_engineering
-from supple.materials.registry import ELASTIC_MATERIALS
 from supple.materials.tet_energies import element_energies, element_gradients, element_hessians
 from supple.numerics.svd3 import rotation_variant_svd
 

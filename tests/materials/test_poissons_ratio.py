@@ -5,7 +5,7 @@ import pytest
 
 import supple as sp
 from supple.errors import SceneError
-from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.elastic import ELASTIC_MATERIALS
 
 YOUNGS, AUXETIC = 1e5, -0.3
 

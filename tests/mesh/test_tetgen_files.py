@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from supple.errors import MeshError
-from supple.mesh.io.tetgen_family import read_tetgen_family
-from supple.mesh.tetgen_files import read_tetgen, write_tetgen
+from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path, read_tetgen_family, write_tetgen_family
 from supple.mesh.tetmesh import TetMesh
 
 # Two tets that share the face 1 2 3 (counted from 0).
@@ -24,6 +23,14 @@ NODE = "5 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n"
 ELE = "2 4 0\n1 1 2 3 4\n2 2 3 4 5\n"
 EDGE = "2 1\n1 1 2 1\n2 2 3 1\n"
 FACE = "2 1\n1 1 3 2 1\n2 2 3 4 0\n"
+
+
+def read_tetgen(path: Path) -> TetMesh:
+    return TetMesh.load(path if is_tetgen_path(path) else family_paths(path)[".ele"])
+
+
+def write_tetgen(mesh: TetMesh, path: Path, base_index: int = 1) -> dict[str, Path]:
+    return write_tetgen_family(path, mesh.vertices, mesh.tets, mesh.edges, mesh.surface.triangles, base_index)
 
 
 def write_family(folder: Path, **texts: str | bytes) -> Path:

@@ -16,8 +16,8 @@ from supple.kinds.described import Described
 from supple.kinds.kind import Kind
 from supple.kinds.validators import POSITIVE
 from supple.materials.per_tet import NOT_ELASTIC
+from supple.materials.registry import MATERIALS
 from supple.model.system import initial_state
-from supple.scene.materials import MATERIALS
 from supple.scene.registry import PARTS
 from supple.simulate import first_frame
 

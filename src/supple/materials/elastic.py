@@ -90,3 +90,7 @@ class StableNeoHookean(Elastic):
     def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         mu, lam = lame_from_engineering(self.youngs, self.poisson)
         return mu, lam + mu
+
+
+# Row k is the class whose energy has the kind k (see `kinds.py`).
+ELASTIC_MATERIALS: tuple[type[Elastic], ...] = (StableNeoHookean, NeoHookean, FixedCorotated, ARAP, StVenantKirchhoff)

@@ -1,6 +1,6 @@
 """The energies of all elastic materials, and the number by which kernels know each.
 
-A new material is one file in `stretch_energies/` and one line here, its class and one line in `registry.py`.
+A new material is one file in `stretch_energies/` and one line here, and its class in `elastic.py`.
 """
 
 from __future__ import annotations

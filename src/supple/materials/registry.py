@@ -1,27 +1,10 @@
-"""The classes of all elastic materials: row k is the class whose energy has the kind k (see `kinds.py`)."""
+"""All materials that a scene file can name. A new kind is one file and one line here, or `MATERIALS.append`."""
 
 from __future__ import annotations
 
-from supple.materials.elastic import ARAP, FixedCorotated, NeoHookean, StableNeoHookean, StVenantKirchhoff
-from supple.materials.holzapfel_gasser_ogden import HolzapfelGasserOgden
-from supple.materials.material import Elastic, Hyperelastic
-from supple.materials.own.energy_material import EnergyMaterial
-from supple.materials.rubber import MooneyRivlin, Ogden, Yeoh
+from supple.materials.elastic import EdgesAndVolume
+from supple.materials.j2_plastic import J2Plastic
+from supple.materials.material import Material
+from supple.materials.viscoelastic import UNRELAXED, Viscoelastic
 
-ELASTIC_MATERIALS: tuple[type[Elastic], ...] = (
-    StableNeoHookean,
-    NeoHookean,
-    FixedCorotated,
-    ARAP,
-    StVenantKirchhoff,
-)
-
-# Those that neither relax nor flow.
-UNRELAXED: tuple[type[Hyperelastic], ...] = (
-    *ELASTIC_MATERIALS,
-    MooneyRivlin,
-    Yeoh,
-    Ogden,
-    HolzapfelGasserOgden,
-    EnergyMaterial,
-)
+MATERIALS: list[type[Material]] = [EdgesAndVolume, *UNRELAXED, J2Plastic, Viscoelastic]

@@ -11,13 +11,26 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.kinds.validators import ListOf, OneOf
+from supple.materials.elastic import ELASTIC_MATERIALS
+from supple.materials.holzapfel_gasser_ogden import HolzapfelGasserOgden
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.j2_plastic import J2Plastic
 from supple.materials.laws.hencky import MAXWELL
 from supple.materials.laws.maxwell import MAXWELL_FLOW
 from supple.materials.material import Hyperelastic
+from supple.materials.own.energy_material import EnergyMaterial
 from supple.materials.per_tet import LawTets, TetMaterial
-from supple.materials.registry import UNRELAXED
+from supple.materials.rubber import MooneyRivlin, Ogden, Yeoh
+
+# Those that neither relax nor flow.
+UNRELAXED: tuple[type[Hyperelastic], ...] = (
+    *ELASTIC_MATERIALS,
+    MooneyRivlin,
+    Yeoh,
+    Ogden,
+    HolzapfelGasserOgden,
+    EnergyMaterial,
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

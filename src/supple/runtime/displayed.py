@@ -13,6 +13,8 @@ from typing import Any
 
 # By what they do, functions of upper layers that methods of lower ones call: "module:name".
 _FROM_ABOVE: dict[str, str] = {}
+# Called as kernels are loaded and compiled with "loaded", "compiling" or "compiled", their name and their signature.
+WATCHERS: list[Callable[[str, str, Any], None]] = []
 
 
 def supply(**homes: str) -> None:

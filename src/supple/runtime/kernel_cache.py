@@ -32,9 +32,8 @@ from numba.np.numpy_support import numpy_version
 from numpy.typing import NDArray
 
 from supple.runtime import inner_function, kernel_folder
-from supple.runtime.displayed import supplied
+from supple.runtime.displayed import WATCHERS, supplied
 from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly, inlined_size
-from supple.runtime.kernel_watchers import WATCHERS
 from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
 from supple.runtime.reached_code import code_of_module, reached_code

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from supple.runtime.kernel_watchers import WATCHERS
+from supple.runtime.displayed import WATCHERS
 
 
 class KernelCount:

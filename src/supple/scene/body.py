@@ -14,13 +14,13 @@ from supple.kinds.checks import float_array
 from supple.kinds.kind import Kind
 from supple.kinds.validators import NON_NEGATIVE, Choice, Instance, Name, OneOf, Vector
 from supple.materials.material import Material
+from supple.materials.registry import MATERIALS
 from supple.mesh.closed_surfaces import require_closed
 from supple.mesh.quadratic import node_volumes
 from supple.mesh.skin import Skin
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
-from supple.scene.materials import MATERIALS
 from supple.scene.rotation import rotation_matrix
 
 LOOKS = ("rubber", "gummy", "foam", "steel")

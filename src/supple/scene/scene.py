@@ -37,8 +37,8 @@ from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rigid.stiffness import with_stiffness
 from supple.scene.selection import InBox
 from supple.scene.sensors import Sensor, SurfaceSensor
-from supple.scene.stitches.stitch import Stitch
-from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
+from supple.scene.stitches.stitch import Stitch, check_names
+from supple.scene.stitches.stitching import Stitching, stitch_together
 
 Named = TypeVar("Named", Obstacle, Joint, Weld)
 

@@ -14,7 +14,7 @@ import supple as sp
 from supple.app.scene_file.document import json_schema, scene_file_model
 from supple.app.scene_file.loader import load_scene
 from supple.app.scene_file.yaml_files import read_yaml
-from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.elastic import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
 from supple.scene.registry import PARTS
 from supple.solvers.auto import Auto

@@ -8,8 +8,8 @@ from tests.derivatives import dense_couplings, differences, gradient_of
 
 import supple as sp
 from supple.errors import SceneError, SolverError
+from supple.materials.elastic import ELASTIC_MATERIALS
 from supple.materials.material import Material
-from supple.materials.registry import ELASTIC_MATERIALS
 from supple.model.system import build_system
 from supple.runtime.threads import numba_threads
 from supple.solvers.implicit.details import ImplicitDetails

@@ -153,7 +153,7 @@ def test_static_is_an_error_for_free_bodies():
 
 
 def test_every_material_carries_its_weight():
-    from supple.materials.registry import ELASTIC_MATERIALS
+    from supple.materials.elastic import ELASTIC_MATERIALS
 
     mesh = sp.shapes.box((0.1, 0.2, 0.1), (2, 4, 2))
     foot = np.flatnonzero(mesh.vertices[:, 1] == mesh.vertices[:, 1].min())

@@ -12,10 +12,10 @@ from supple.app.scene_file.entries.body import BodyEntry, body_model
 from supple.app.scene_file.entries.kinds import KindModel, entry_of, model_of
 from supple.app.scene_file.entries.mesh_sources import surface_model
 from supple.app.scene_file.model import Model, Name, Number, Vector, number_or_fraction
+from supple.materials.registry import MATERIALS
 from supple.mesh.primitives.shape import SHAPES, SURFACES
 from supple.results.readings.fields import FIELDS
 from supple.scene.joints.motors import MOTORS
-from supple.scene.materials import MATERIALS
 from supple.scene.registry import PARTS
 from supple.simulate import DT_RANGE
 from supple.solvers.auto import Auto

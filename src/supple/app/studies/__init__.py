@@ -1,8 +1,8 @@
-"""`supple.studies`: what a sweep varies, how its cases are chosen, and the table and plots of what they measured."""
+"""`supple.studies`: what a sweep varies, how its cases are chosen, and the table of what they measured."""
 
-import lazy_loader
+from supple.runtime.public_names import public_names
 
-__getattr__, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __all__ = public_names(__name__)
 
 
 def __dir__() -> list[str]:

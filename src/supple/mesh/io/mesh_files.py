@@ -15,7 +15,7 @@ from supple.errors import MeshError
 from supple.mesh.checked_arrays import vertex_array
 from supple.mesh.io import obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.abaqus.assembly import read as read_inp
-from supple.mesh.io.abaqus.writer import written as written_inp
+from supple.mesh.io.abaqus.blocks import written as written_inp
 from supple.mesh.io.cells import TETRA, CellSoup, FormatError, MeshFile, checked, dimensions
 from supple.mesh.io.libraries.meshio import read_medit, read_msh, write_msh
 from supple.mesh.io.libraries.trimesh import read_3mf, read_dae, read_glb, read_gltf

@@ -15,7 +15,7 @@ from supple.mesh.primitives.isosurface_stuffing import MEAN_EDGE, stuff
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.triangle_tree import TriangleTree
-from supple.numerics.geometry.winding_numbers import winding_numbers
+from supple.numerics.geometry.winding_number import winding_numbers
 
 logger = logging.getLogger(__name__)
 

@@ -19,12 +19,12 @@ from supple.errors import SuppleError
 from supple.kinds.codec import Arrays, check, decoded, encoded, kinds_by_name
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.own.formula import Formula
+from supple.materials.registry import MATERIALS
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.model.state import Status
 from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.details import RecordedDetails, RecordedField
-from supple.scene.materials import MATERIALS
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rows import rows_of
 from supple.scene.scene import Scene

@@ -1,8 +1,8 @@
 """`supple.obstacles`: rigid things that bodies collide with. (`supple.shapes` has meshes of bodies.)"""
 
-import lazy_loader
+from supple.runtime.public_names import public_names
 
-__getattr__, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __all__ = public_names(__name__)
 
 
 def __dir__() -> list[str]:

@@ -14,8 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import SceneError
-from supple.kinds.suggestion import suggestion
 from supple.mesh.topology import graph_components
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
@@ -263,7 +261,7 @@ def no_stitching(body_vertices: int) -> Stitching:
 def stitch_together(
     bodies: Sequence[PlacedBody], obstacles: Sequence[Obstacle], stitches: Sequence[Stitch]
 ) -> Stitching:
-    """Find the pairs of all stitches, and number them. All names must exist, see `check_names`.
+    """Find the pairs of all stitches, and number them. All names must exist, see `check_names` of `stitch.py`.
 
     Raises
     ------
@@ -347,20 +345,3 @@ def _anchors(obstacles: Sequence[Obstacle], placed: Sequence[tuple[int, int]]) -
     for k, (owner, vertex) in enumerate(places):
         points[k] = obstacles[owner].surface.vertices[vertex]  # pyright: ignore[reportAttributeAccessIssue]
     return Anchors(tuple(obstacles), places[:, 0], places[:, 1], points)
-
-
-def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Sequence[str]) -> None:
-    """Raise where a stitch names an unknown body or obstacle.
-
-    Raises
-    ------
-    SceneError : names the known ones.
-    """
-    for number, stitch in enumerate(stitches):
-        for name, what, known in (
-            (stitch.first, "body", bodies),
-            (stitch.second, "body or obstacle", [*bodies, *obstacles]),
-        ):
-            if name not in known:
-                with at("stitches", number):
-                    raise SceneError(f"{stitch.label}: {what} {name!r} does not exist; {suggestion(name, known)}")

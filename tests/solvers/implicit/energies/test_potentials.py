@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from tests.derivatives import assert_derivatives, gradient_of, hessian_product
 
 import supple as sp
-from supple.materials.elastic import NeoHookean
-from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.elastic import ELASTIC_MATERIALS, NeoHookean
 from supple.model.system import build_system
 from supple.solvers.implicit.energies.damping import Damping, StrainRate, viscosity_of
 from supple.solvers.implicit.energies.elasticity import elasticity_of

@@ -76,12 +76,11 @@ def mesh(
     """
     from supple.app.cli.console import reading
     from supple.mesh.io.mesh_files import TET_EXTENSIONS
-    from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path
+    from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path, write_tetgen_family
     from supple.mesh.meshing.child_process import DEFAULT_TETS
     from supple.mesh.meshing.option_names import named_for
     from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
     from supple.mesh.surface import SurfaceMesh
-    from supple.mesh.tetgen_files import write_tetgen
     from supple.runtime.replacing import refuse_to_replace
 
     output = Path(surface.with_suffix(".vtu").name) if output is None else output
@@ -118,7 +117,7 @@ def mesh(
         except MeshingError as error:
             raise MeshingError(f"{surface}: {error}") from None
     if is_tetgen_path(output):
-        write_tetgen(filled, output, base_index)
+        write_tetgen_family(output, filled.vertices, filled.tets, filled.edges, filled.surface.triangles, base_index)
     else:
         filled.save(output)
     _summarize(filled, report, targets)

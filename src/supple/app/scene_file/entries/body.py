@@ -18,9 +18,9 @@ from supple.app.scene_file.entries.regions import Region, with_regions
 from supple.app.scene_file.model import Extents, Model, Name
 from supple.kinds.kind import declared
 from supple.materials.material import Hyperelastic
+from supple.materials.registry import MATERIALS
 from supple.scene.body import Body, PlacedBody
 from supple.scene.located import at
-from supple.scene.materials import MATERIALS
 from supple.scene.rigid.rigid_body import RigidBody
 
 # What both kinds of bodies have, and what each has of its own beside the mesh or shape.

@@ -1,4 +1,4 @@
-"""The syntax of Abaqus's input files: keywords with options and data lines, and files that they include.
+"""The syntax of Abaqus's input files: keywords with options and data lines, and files that they include; their writer.
 
 Source: Abaqus Analysis User's Guide, "Input syntax rules".
 """
@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from supple.mesh.io.cells import FormatError
 from supple.mesh.io.text import decoded, file_beside, integer, numbers
@@ -145,3 +148,13 @@ class _Lines:
             yield from self.of(text, name)
         except RecursionError:
             raise FormatError(f"{name} includes itself", place) from None
+
+
+def written(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> bytes:
+    """A tet mesh as one part with its nodes and elements, and the set ALL of the latter."""
+    name = "C3D4" if tets.shape[1] == 4 else "C3D10"
+    out = ["*HEADING", "written by supple", "*NODE"]
+    out += [f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(vertices.tolist(), start=1)]
+    out.append(f"*ELEMENT, TYPE={name}, ELSET=ALL")
+    out += [f"{k}, " + ", ".join(str(i + 1) for i in row) for k, row in enumerate(tets.tolist(), start=1)]
+    return ("\n".join(out) + "\n").encode()

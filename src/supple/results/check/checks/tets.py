@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.elastic import StableNeoHookean
-from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.elastic import ELASTIC_MATERIALS, StableNeoHookean
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.orientation import volume_signs
