@@ -24,11 +24,10 @@ from supple.materials.per_tet import Law
 from supple.materials.registry import MATERIALS
 from supple.mesh.primitives.shape import SHAPES, shape
 from supple.model.joints.functions import FORMS, Form, Values
-from supple.model.loads.applied import AppliedLoad, Setting, UniformLoad
+from supple.model.loads.applied import AppliedLoad, DeadLoad, Setting
 from supple.model.loads.build import applied
 from supple.results.check.checks import joints as checked_joints
-from supple.results.check.load_forces import LoadPattern
-from supple.results.check.recorded import patterns_of
+from supple.results.check.loads import forces_of
 from supple.results.export.exporter import FORMATS, Format
 from supple.results.readings.reading import READINGS, Reading
 from supple.results.readings.sensor_readings import reading_of
@@ -138,12 +137,13 @@ def thrust_on_vertices(load: Thrust, setting: Setting) -> list[AppliedLoad]:
     body = setting.body(load.body)
     vertices = (np.arange(len(body.mesh.vertices)) + setting.begins[load.body]).astype(np.int32)
     shares = setting.masses[vertices] / setting.masses[vertices].sum()
-    return [UniformLoad.of(vertices, shares, lambda time: np.asarray(load.force), "thrusts")]
+    return [DeadLoad.shared(vertices, shares, lambda time: np.asarray(load.force), "thrusts")]
 
 
-def thrust_of_a_recording(load: Thrust, scene, starts, masses):
-    rows = starts[load.body][0] + np.arange(len(scene.body(load.body).mesh.vertices))
-    yield "thrusts", LoadPattern("vector", "thrusts", rows, masses[rows] / masses[rows].sum())
+def thrust_of_a_recording(load: Thrust, of):
+    rows, shares = of.rows[load.body].vertices, np.zeros_like(of.masses)
+    shares[rows] = of.masses[rows] / of.masses[rows].sum()
+    return "thrusts", lambda time, x, v: shares[:, None] * load.force
 
 
 # --- a joint: its class, its function, and what the verifier computes -----------------------------------------------
@@ -257,7 +257,7 @@ def registered():
     for kind in (RoundedCube, Thrust, Tether, Altimeter):
         register(kind)
     applied.register(Thrust, thrust_on_vertices)
-    patterns_of.register(Thrust, thrust_of_a_recording)
+    forces_of.register(Thrust, thrust_of_a_recording)
     FORMS["distance"] = Form(1, of=distance)
     checked_joints.FORMS["distance"] = lambda vectors, R: float(np.linalg.norm(vectors[0]))
     reading_of.register(Altimeter, height)

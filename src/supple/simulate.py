@@ -23,7 +23,7 @@ from supple.model.breaking import after_breaks, are_of
 from supple.model.crushed import too_soft
 from supple.model.state import Problems, State, Status, StepReport
 from supple.model.system import System, build_system, initial_state
-from supple.results.frame import Frame, completed_report, start_frame, with_applied_values
+from supple.results.frame import Frame, completed_report, start_frame
 from supple.runtime.displayed import supplied
 from supple.runtime.memory import require_memory
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
@@ -148,7 +148,7 @@ def _prepared(scene: Scene, start: StartFrame | State, solver: Solver) -> tuple[
         logger.warning("%s", text)
     workspace = solver.prepare(first.system)
     solver.check(first.system, first.state, workspace)
-    details = with_applied_values(solver.initial_details(first.system, workspace), first.system, first.time)
+    details = solver.initial_details(first.system, workspace)
     return replace(first, report=replace(first.report, details=details)), workspace
 
 

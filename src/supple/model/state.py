@@ -186,9 +186,6 @@ class SolverDetails:
         those that hold one piece with rigid edges or volumes together: their shares are not known
     work : on the bodies over the step, by what does it [J]; see `Report.work`
     energy_residual : what the forces of the step leave open [J]; see `Report.energy_residual`
-    active : stretch of each growth and activation of each muscle at the end, by kind and number: "growth.0" [-]
-    load_vectors, load_values : at the end, by the name of the work and number: "tractions.0" [N/m^2], "body_forces.1"
-        [N/kg], (3,); "pressures.2" [Pa], and of springs, "springs.3", the rest length [m]
     """
 
     contacts: int = 0
@@ -206,9 +203,6 @@ class SolverDetails:
     reaction_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
     work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     energy_residual: float = field(default=0.0, kw_only=True)
-    active: Mapping[str, float] = field(default_factory=dict, kw_only=True)
-    load_vectors: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
-    load_values: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):

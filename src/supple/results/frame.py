@@ -118,7 +118,7 @@ def completed_report(
             step = replace(step, status=Status.CRUSHED, message=message)
     values = vars(measured) | vars(step)
     del values["contacts"], values["stitch_forces"]  # the first are made when they are asked for: `Frame.contacts`
-    details = with_applied_values(step.details, system, state.time)
+    details = step.details
     if energy_before is not None and details.work:
         works = completed_works(details.work, details.energy_residual, measured.energy - energy_before)
         details = replace(details, work=works)
@@ -130,19 +130,3 @@ def start_frame(system: System, state: State, index: int, solver: Solver | None)
     """A frame without a step that led to it."""
     report = completed_report(system, state, StepReport(Status.CONVERGED, 0), 0.0)
     return Frame(index, state, system, report, solver=solver)
-
-
-def with_applied_values(details: SolverDetails, system: System, time: float) -> SolverDetails:
-    """The details with the values of growths, muscles and loads at `time` [s]."""
-    active = {f"{each.kind}.{k}": each.value for k, each in enumerate(system.laws_at(time).active)}
-    vectors: dict[str, NDArray] = {}
-    values: dict[str, float] = {}
-    for k, load in enumerate(system.loads):
-        value = load.value(time)
-        if value is None:
-            continue
-        if value.ndim:
-            vectors[f"{load.work}.{k}"] = value
-        else:
-            values[f"{load.work}.{k}"] = float(value)
-    return replace(details, active=active, load_vectors=vectors, load_values=values)

@@ -51,6 +51,11 @@ class BodyRows:
         """The surface that its vertices carry, or None."""
         return self.body.attached_skin
 
+    @property
+    def touching_skin(self) -> Skin | None:
+        """The skin, where that is what touches other things."""
+        return self.skin if self.body.touches_with_skin else None
+
 
 def rows_of(bodies: Sequence[PlacedBody]) -> tuple[BodyRows, ...]:
     """Those of all bodies of a scene."""

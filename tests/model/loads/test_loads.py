@@ -258,7 +258,7 @@ def test_bad_loads_are_one_line(make, message):
 
 def test_functions_are_checked_when_they_are_called():
     for load, message in (
-        (sp.Pressure("bar", lambda t: np.nan), r"pressure\(0\) is nan; it must be finite"),
+        (sp.Pressure("bar", lambda t: np.nan), r"pressure\(0.01\) is nan; it must be finite"),
         (sp.BodyForce(lambda x, t: x[:2]), r"force\(x, 0.01\) has shape \(2, 3\); give \(3,\) or"),
         (sp.Spring(AT, ("bar", 0), 1.0, rest_length=lambda t: -t), r"rest_length\(0.01\) is -0.01; it must be zero"),
     ):

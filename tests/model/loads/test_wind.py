@@ -9,7 +9,6 @@ import supple as sp
 from supple.app.cli.app import main
 from supple.model.state import State
 from supple.model.system import build_system
-from supple.results.check.recorded import RecordedTrajectory
 from supple.solvers.implicit.energies.loads.pressure import drags_at
 
 STIFF = sp.StableNeoHookean(youngs=2e5, poisson=0.0, density=40.0, damping=0.01)
@@ -127,7 +126,7 @@ def test_file_info_recording_and_check_know_wind(tmp_path, capsys, solver):
     recording = tmp_path / "out" / "recording.vtkhdf"
     with sp.read_recording(recording) as read:
         assert read[-1].report.work["wind"] > 0.0
-        assert [load.kind for load in RecordedTrajectory(read).loads.values()] == ["drag"]
+        assert [type(load) for load in read.scene.loads] == [sp.Wind]
     report = sp.check_recording(recording)
     assert report.ok, report.failures
     assert "wind" in report["works"].message

@@ -1,16 +1,16 @@
 """Works of pins, loads and contact that the check computes anew."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.recordings import set_in_scene
 
 import supple as sp
 from supple.results.check.checks.works import Works
-from supple.results.check.load_forces import LoadPattern, load_forces
 from supple.results.check.recorded import RecordedTrajectory
 from supple.results.check.settings import CheckSettings
-from supple.results.check.snapshot import Scene
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.4, damping=0.02)
 
@@ -102,10 +102,10 @@ def test_the_work_of_pins_is_of_second_order(tmp_path):
         solver = sp.Implicit(integrator="static")
         path = recorded(tmp_path / f"{steps}.vtkhdf", scene, solver, 1.0 / steps, steps)
         with sp.read_recording(path) as recording:
-            check = Works(Scene(RecordedTrajectory(recording)), CheckSettings())
-            frames = [check.scene.snapshot(k) for k in range(len(recording))]
+            check = Works(RecordedTrajectory(recording), CheckSettings())
+            frames = [check.of.snapshot(k) for k in range(len(recording))]
             for frame in frames:
-                check.see(frame)
+                check.add(frame)
             work = sum(found[0][0] for found in check.frames)
             stored = [frame.elastic_energy or 0.0 for frame in frames]
             errors.append(abs(work / (stored[-1] - stored[0]) - 1.0))
@@ -205,27 +205,34 @@ def test_a_changed_work_of_what_drives_a_body(driven, corrupted, name):
     assert f"work of {name}" in report["works"].message
 
 
-def test_works_of_loads_converge_to_the_changes_of_their_potentials():
+def test_works_of_loads_converge_to_the_changes_of_their_potentials(tmp_path):
     """-p V of a closed surface, the energy of a spring, and a dead force, along a straight way in 2 and 4 parts."""
     mesh = sp.shapes.box((0.3, 0.1, 0.1), (2, 1, 1))
     ends = mesh.vertices, mesh.vertices + 0.02 * np.random.default_rng(3).normal(size=mesh.vertices.shape)
-    vertices, weights = np.array([0, 5, 9], dtype=np.int32), np.array([0.7, 0.3, -1.0])
-    spring = LoadPattern("spring", "springs", vertices, weights, np.array([0.1, 0.0, 0.05]), 30.0)
-    pressure = LoadPattern("pressure", "pressures", mesh.surface.triangles)
-    dead = LoadPattern("vector", "tractions", vertices, weights)
-    loads = {"a": spring, "b": pressure, "c": dead}
-    values = {"a": 0.05, "b": 4e3, "c": np.array([1.0, 2.0, -3.0])}
-    lengths = [np.linalg.norm(weights @ x[vertices] + spring.offset) for x in ends]
+    loads = [
+        sp.Spring(("bar", 4), (None, (-0.3, 0.1, 0.05)), stiffness=30.0, rest_length=0.05),
+        sp.Pressure("bar", 4e3),
+        sp.Traction("bar", (10.0, 20.0, -30.0)),
+    ]
+    path = recorded(
+        tmp_path / "r.vtkhdf", sp.Scene([sp.Body("bar", mesh, RUBBER)], loads=loads), sp.Implicit(), 0.01, 1
+    )
+    lengths = [np.linalg.norm(x[4] - [-0.3, 0.1, 0.05]) for x in ends]
     volumes = [sp.TetMesh(x, mesh.tets).volumes.sum() for x in ends]
+    corners = mesh.vertices[mesh.surface.triangles]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2.0
+    moved = (ends[1] - ends[0])[mesh.surface.triangles].mean(axis=1)
     exact = {
         "springs": -15.0 * ((lengths[1] - 0.05) ** 2 - (lengths[0] - 0.05) ** 2),
         "pressures": -4e3 * (volumes[1] - volumes[0]),
-        "tractions": weights @ (ends[1] - ends[0])[vertices] @ values["c"],
+        "tractions": areas @ moved @ [10.0, 20.0, -30.0],
     }
+    with sp.read_recording(path) as recording:
+        start = RecordedTrajectory(recording).snapshot(0)
     errors = []
     for parts in (2, 4):
         places = [ends[0] + t * (ends[1] - ends[0]) for t in np.linspace(0, 1, parts + 1)]
-        forces = [load_forces(loads, values, x, np.zeros_like(x)) for x in places]
+        forces = [replace(start, positions=x).load_forces for x in places]
         moved = (ends[1] - ends[0]) / parts
         works = {name: sum(0.5 * ((a[name] + b[name]) * moved).sum() for a, b in pairwise(forces)) for name in exact}
         errors.append({name: works[name] - exact[name] for name in exact})
@@ -240,7 +247,9 @@ def test_a_force_of_places_is_not_computed(tmp_path):
     scene = sp.Scene([bar], loads=[sp.BodyForce(lambda x, t: -x), sp.BodyForce((0, 0, 1))])
     path = recorded(tmp_path / "r.vtkhdf", scene, sp.Implicit(contact=None), 1 / 60, 3)
     with sp.read_recording(path) as recording:
-        assert RecordedTrajectory(recording).other_loads == {"body_forces"}
+        first, second = RecordedTrajectory(recording).loads
+        assert first == ("body_forces", "a force per mass that depends on the place is not recorded")
+        assert second[0] == "body_forces"
     assert checked(path)["works"].message.startswith("pins: nothing is pinned; contact: ")
 
 
@@ -258,12 +267,40 @@ def test_a_doubled_pressure_or_tension(driven, corrupted, field, name):
 
 def test_a_doubled_small_pressure_on_a_surface(loaded, corrupted):
     def double(file, n):
-        file["supple/frames/details/load_values"][:, 0] *= 2.0
+        set_in_scene(file, "scene/loads/1/pressure/values", np.array([0.0, 4e3]))
 
-    with sp.read_recording(loaded) as recording:
-        (names,) = (field.keys for field in recording.details.fields if field.name == "load_values")
-        assert names is not None
-        assert names[0].startswith("pressures")
     report = checked(corrupted(loaded, double))
     assert "works" in [result.name for result in report.failures]
     assert "work of pressures" in report["works"].message
+
+
+def test_a_doubled_function_of_time(loaded, corrupted):
+    """The traction is the second function of the scene; a recording has its values in each frame."""
+
+    def double(file, n):
+        file["supple/frames/functions/1"][:] *= 2.0
+
+    report = checked(corrupted(loaded, double))
+    assert [result.name for result in report.failures] == ["works"]
+
+
+def test_forces_that_differ_from_vertex_to_vertex_and_springs_of_the_length_at_the_start(tmp_path, corrupted):
+    bar = sp.Body("bar", sp.shapes.box((0.3, 0.1, 0.1), (2, 1, 1)), RUBBER)
+    turn = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0], [0, -1, 1]])
+    force = sp.Force("bar", [0, 3, 5, 7], lambda t: (1.0 + t) * turn)
+    spring = sp.Spring(("bar", 2), (None, (-0.4, 0, 0)), stiffness=50.0)
+    scene, solver = sp.Scene([bar], forces=[force], loads=[spring], gravity=(0, 0, 0)), sp.Implicit(contact=None)
+    path, later = tmp_path / "r.vtkhdf", tmp_path / "later.vtkhdf"
+    start = {"bar": bar.mesh.vertices * [1.05, 1, 1]}
+    options = {"initial_positions": start, "sinks": [sp.Recorder(path, solver=solver)]}
+    *_, half = sp.simulate(scene, solver, dt=1 / 120, steps=6, **options)
+    report = checked(path)
+    assert report.ok, str(report)
+    assert report["works"].message.startswith("those of forces and springs agree")
+    for name in ("forces", "springs"):
+        report = checked(with_more_work(path, corrupted, name))
+        assert f"work of {name}" in report["works"].message
+    list(sp.simulate(scene, solver, dt=1 / 120, steps=6, start=half, sinks=[sp.Recorder(later, solver=solver)]))
+    report = checked(later)
+    assert report.ok, str(report)
+    assert "without springs: a length at the start is not in a recording that begins later" in report["works"].message

@@ -11,15 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from supple.results.check.geometry.containment import is_inside
-from supple.results.check.geometry.orientation import (
-    area_sign,
-    plane_sides,
-    rational_area_sign,
-    rational_plane_side,
-    rational_volume_sign,
-    volume_sign,
-    volume_signs,
-)
+from supple.results.check.geometry.orientation import area_sign, plane_sides, volume_sign, volume_signs
 from supple.results.check.geometry.triangle_pairs import triangles_meet
 
 # Few values on a coarse grid: most points are coplanar, collinear or equal; then moved by a bit or two, or not at all.
@@ -41,20 +33,23 @@ def points(draw, count):
 @settings(max_examples=200, deadline=None)
 @given(points(4))
 def test_the_side_of_a_plane_is_exact(x):
-    assert volume_sign(x, 0, 1, 2, 3) == rational_volume_sign(*x)
+    assert volume_sign(x, 0, 1, 2, 3) == exact_volume_sign(*x)
 
 
 @settings(max_examples=200, deadline=None)
 @given(points(3))
 def test_the_side_of_a_line_is_exact(x):
     for i, j in ((0, 1), (1, 2), (2, 0)):
-        assert area_sign(x, 0, 1, 2, i, j) == rational_area_sign(*x, i, j)
+        a, b, c = map(exact, x)
+        (p, q), (r, s) = ((end[i] - a[i], end[j] - a[j]) for end in (b, c))
+        assert area_sign(x, 0, 1, 2, i, j) == sign(p * s - q * r)
 
 
 @settings(max_examples=200, deadline=None)
 @given(points(3))
 def test_the_side_of_a_half_space_is_exact(x):
-    assert plane_sides(x, np.array([0]), x[1], x[2])[0] == rational_plane_side(*x)
+    p, point, normal = map(exact, x)
+    assert plane_sides(x, np.array([0]), x[1], x[2])[0] == sign(dot(minus(p, point), normal))
 
 
 def test_floating_point_alone_is_wrong_on_such_points():
@@ -65,7 +60,7 @@ def test_floating_point_alone_is_wrong_on_such_points():
     D = x[tets[:, 1:]] - x[tets[:, :1]]
     naive = np.sign(np.einsum("ij,ij->i", D[:, 0], np.cross(D[:, 1], D[:, 2])))
     exact = volume_signs(x, tets)
-    truth = [rational_volume_sign(*x[tet]) for tet in tets]
+    truth = [exact_volume_sign(*x[tet]) for tet in tets]
     np.testing.assert_array_equal(exact, truth)
     assert np.count_nonzero(naive != truth) > 5
 
@@ -84,6 +79,15 @@ def dot(p, q):
 
 def cross(p, q):
     return (p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0])
+
+
+def sign(value):
+    return (value > 0) - (value < 0)
+
+
+def exact_volume_sign(a, b, c, d):
+    a, b, c, d = map(exact, (a, b, c, d))
+    return sign(dot(minus(b, a), cross(minus(c, a), minus(d, a))))
 
 
 def clipped(polygon, origin, normal):

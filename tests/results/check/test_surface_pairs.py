@@ -7,8 +7,8 @@ import pytest
 
 import supple as sp
 from supple.results.check.checks.contact import smallest_on_triangles
-from supple.results.check.geometry.box_tree import build_tree, triangle_boxes
-from supple.results.check.geometry.surface_pairs import closest_pair, meeting_pairs
+from supple.results.check.geometry.box_tree import tree_of
+from supple.results.check.geometry.surface_pairs import Triangles, closest_pair, touching_pairs
 from supple.results.check.geometry.triangle_distance import point_triangle, triangles_apart
 from supple.results.check.geometry.triangle_pairs import triangles_meet
 
@@ -24,12 +24,10 @@ def soup(seed, count=120, size=0.25):
 
 
 def searched(x, triangles, owners, allowed, ignored=()):
-    low, high = triangle_boxes(x, triangles)
-    tree = (low, high, *build_tree(low, high))
-    out = np.zeros((10_000, 2), dtype=np.int64)
-    keys = np.array(sorted(ignored), dtype=np.int64)
-    count = meeting_pairs(x, triangles, owners, allowed, keys, *tree, out)
-    nearest = closest_pair(x, triangles, owners, allowed, keys, *tree, np.inf)
+    tree, out = tree_of(x, triangles), np.zeros((10_000, 2), dtype=np.int64)
+    surface = Triangles(triangles, owners, allowed, np.array(sorted(ignored), dtype=np.int64))
+    count = touching_pairs(surface, x, x, tree, tree, False, out)
+    nearest = closest_pair(surface, x, tree, np.inf)
     return {tuple(sorted(pair)) for pair in out[:count].tolist()}, nearest
 
 

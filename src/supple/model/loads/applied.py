@@ -51,10 +51,6 @@ class AppliedLoad(ABC):
     is_internal: ClassVar[bool] = False
     work: str
 
-    def value(self, time: float) -> NDArray[np.float64] | None:
-        """The vector or number that the forces follow from at `time` [s]; None where they follow from more."""
-        return None
-
     @abstractmethod
     def renumbered(self, new: NDArray[np.int32]) -> Self:
         """The same load where vertex i has the number new[i]."""
@@ -76,6 +72,17 @@ class DeadLoad(AppliedLoad):
     per_vertex: Callable[[float], NDArray[np.float64]]
     work: str
 
+    @classmethod
+    def shared(
+        cls,
+        vertices: NDArray[np.int32],
+        weights: NDArray[np.float64],
+        vector: Callable[[float], NDArray[np.float64]],
+        work: str,
+    ) -> DeadLoad:
+        """One vector times the weight of each vertex; `vector` : time -> (3,)."""
+        return cls(vertices, lambda time: weights[:, None] * vector(time), work)
+
     def renumbered(self, new: NDArray[np.int32]) -> DeadLoad:
         return replace(self, vertices=new[self.vertices])
 
@@ -87,26 +94,6 @@ class DeadLoad(AppliedLoad):
 
 
 @dataclass(frozen=True, eq=False)
-class UniformLoad(DeadLoad):
-    """One vector times the weight of each vertex; `vector` : time -> (3,)."""
-
-    vector: Callable[[float], NDArray[np.float64]]
-
-    @classmethod
-    def of(
-        cls,
-        vertices: NDArray[np.int32],
-        weights: NDArray[np.float64],
-        vector: Callable[[float], NDArray[np.float64]],
-        work: str,
-    ) -> UniformLoad:
-        return cls(vertices, lambda time: weights[:, None] * vector(time), work, vector)
-
-    def value(self, time: float) -> NDArray[np.float64]:
-        return self.vector(time)
-
-
-@dataclass(frozen=True, eq=False)
 class MassLoad(AppliedLoad):
     """Forces per mass on `vertices` (k,) with `masses` (k,) [kg]."""
 
@@ -115,9 +102,6 @@ class MassLoad(AppliedLoad):
     masses: NDArray[np.float64]
 
     work = "body_forces"
-
-    def value(self, time: float) -> NDArray[np.float64] | None:
-        return self.load.at(np.zeros((1, 3)), time)[0] if self.load.is_uniform else None
 
     def renumbered(self, new: NDArray[np.int32]) -> MassLoad:
         return replace(self, vertices=new[self.vertices])
@@ -136,7 +120,8 @@ class DragLoad(AppliedLoad):
     """
 
     @abstractmethod
-    def value(self, time: float) -> NDArray[np.float64]: ...
+    def value(self, time: float) -> NDArray[np.float64]:
+        """w (3,) [m/s]"""
 
     @abstractmethod
     def coefficients(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
-from supple.model.loads.applied import AppliedLoad, DeadLoad, MassLoad, Setting, UniformLoad
+from supple.model.loads.applied import AppliedLoad, DeadLoad, MassLoad, Setting
 from supple.model.loads.growth import GrownTets
 from supple.model.loads.muscles import FibreTension
 from supple.model.loads.pressure import FollowerPressure, area_vectors, wind_drag
@@ -51,7 +51,7 @@ def _(load: Traction, setting: Setting) -> list[AppliedLoad]:
     vertices, weights = _vertices_of(body, setting.begins[load.body], touched)
     on_points = shares[touched]
     own = on_points if weights is None else weights.T @ on_points
-    return [UniformLoad.of(vertices, own, script_of(load, "traction"), "tractions")]
+    return [DeadLoad.shared(vertices, own, script_of(load, "traction"), "tractions")]
 
 
 @applied.register
@@ -95,7 +95,7 @@ def applied_force(force: Force, body: PlacedBody, begin: int, rows: NDArray[np.i
     if force.is_total:
         shares = np.full(count, 1.0 / count)
         own = shares if weights is None else weights.T @ shares
-        return UniformLoad.of(vertices, own, force.total, "forces")
+        return DeadLoad.shared(vertices, own, force.total, "forces")
 
     def forces(time: float) -> NDArray[np.float64]:
         given = force.per_vertex(time, count)

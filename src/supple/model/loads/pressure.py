@@ -32,9 +32,6 @@ class FollowerPressure(AppliedLoad):
 
     work = "pressures"
 
-    def value(self, time: float) -> NDArray[np.float64]:
-        return np.asarray(self.pressure(time))
-
     def renumbered(self, new: NDArray[np.int32]) -> FollowerPressure:
         return replace(self, triangles=new[self.triangles])
 

@@ -30,9 +30,6 @@ class PointSpring(AppliedLoad):
 
     work = "springs"
 
-    def value(self, time: float) -> NDArray[np.float64]:
-        return np.asarray(self.rest_length(time))
-
     @property
     def is_anchored(self) -> bool:
         """Whether an end is fixed in the world: the coefficients then do not add up to zero."""

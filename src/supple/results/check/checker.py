@@ -26,7 +26,6 @@ from supple.results.check.report import CheckReport, CheckResult, Verdict
 from supple.results.check.series import Given, SeriesTrajectory
 from supple.results.check.settings import CheckSettings
 from supple.results.check.shown import place_of
-from supple.results.check.snapshot import Scene
 from supple.results.check.trajectory import Trajectory
 from supple.results.recording.reader import Recording, opened
 
@@ -116,30 +115,29 @@ def check_series(
 
 def _checked(source: Trajectory, wanted: CheckSettings, progress: Callable[[int, int], None] | None) -> CheckReport:
     with np.errstate(all="ignore"):
-        scene = Scene(source)
         sound = all(np.isfinite(getattr(source, name)).all() for name in CONSTANTS)
         chosen = [_check_of(name, source.knows) for name in wanted.chosen]
         checks: dict[str, FrameCheck] = {}
         for check in chosen:
             if not check.needs - source.knows and (sound or check.sees_all):
-                checks[check.name] = check(scene, wanted)
+                checks[check.name] = check(source, wanted)
         numbers = sorted({*range(0, len(source), wanted.every), len(source) - 1})
         seen = 0
         for done, number in enumerate(numbers):
-            at = scene.snapshot(number)
+            at = source.snapshot(number)
             seen += at.finite
             for check in checks.values():
                 usable = at.finite and (at.moves or "times" not in check.needs)
                 if check.why_not is None and (usable or check.sees_all):
-                    check.see(at)
+                    check.add(at)
             if progress is not None:
                 progress(done + 1, len(numbers))
         results = tuple(_result(check, checks.get(check.name), seen, source.knows) for check in chosen)
         if "times" not in source.knows:
             results = tuple(replace(result, time=None) for result in results)
         failures = [result for result in results if result.verdict is Verdict.FAIL]
-        place, unfinished = place_of(scene, failures), source.unfinished
-        return CheckReport(source.path, len(source), len(numbers), results, source.notes, place, unfinished)
+        counts = len(source), len(numbers)
+        return CheckReport(source.path, *counts, results, source.notes, place_of(source, failures), source.unfinished)
 
 
 def _check_of(name: str, knows: frozenset[str]) -> type[FrameCheck]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.results.check.stored_energies import stiffness_scale, stitch_scale
-from supple.results.check.trajectory import Trajectory
+from supple.results.check.energies import stiffness_scale
+from supple.results.check.known import Known
 
 # Of L: what bodies move in a step, fall or are strained by, so that it does not count.
 _UNSEEN = 1e-6
@@ -23,38 +23,24 @@ _SUMS = 1e-12
 class Floors:
     """The floors of a recording or series.
 
-    Parameters
+    Attributes
     ----------
-    size : longest extent of the largest body at rest [m]; reach : largest coordinate [m]
+    roundoff : of a position, times the number of substeps [m]
+    speed : velocities that are not seen [m/s]
+    momentum : round-off of the sum of all momenta [kg m/s]; that of angular momentum is the size times this
+    sums : round-off of the energies of all tets and heights [J]
+    energy : of motion, falls and strains that are not seen [J]
     """
 
-    def __init__(self, recording: Trajectory, size: float, reach: float) -> None:
-        self._dt, self._size, self._reach, self._mass = recording.dt, size, reach, float(recording.masses.sum())
-        self._weight = self._mass * float(np.linalg.norm(recording.gravity))
-        self._stiffness = 1e3 * (stiffness_scale(recording) + stitch_scale(recording))
-
-    @property
-    def roundoff(self) -> float:
-        """Of a position, times the number of substeps [m]."""
-        return _ROUNDOFF * self._reach
-
-    @property
-    def speed(self) -> float:
-        """Velocities that are not seen [m/s]."""
-        return (_UNSEEN * self._size + self.roundoff) / self._dt
-
-    @property
-    def momentum(self) -> float:
-        """Round-off of the sum of all momenta [kg m/s]; that of angular momentum is `size` times this."""
-        return self._mass * self.roundoff / self._dt
-
-    @property
-    def energy(self) -> float:
-        """Of motion, falls and strains that are not seen [J]."""
-        moved = 0.5 * self._mass * self.speed**2 + self._weight * (_UNSEEN * self._size + self.roundoff)
-        return moved + self._stiffness * _UNSEEN**2 + self.sums
-
-    @property
-    def sums(self) -> float:
-        """Round-off of the energies of all tets and heights [J]."""
-        return _SUMS * (self._stiffness + self._weight * self._reach)
+    def __init__(self, of: Known) -> None:
+        # The largest coordinate at rest and in the first frame [m].
+        places = of.rest_positions, of.snapshot(0).positions
+        reach = max(float(np.abs(x[np.isfinite(x).all(axis=1)]).max(initial=0.0)) for x in places)
+        mass, stiffness, moved = float(of.masses.sum()), 1e3 * stiffness_scale(of), _UNSEEN * of.size
+        weight = mass * float(np.linalg.norm(of.gravity))
+        self.roundoff = _ROUNDOFF * reach
+        self.speed = (moved + self.roundoff) / of.dt
+        self.momentum = mass * self.roundoff / of.dt
+        self.sums = _SUMS * (stiffness + weight * reach)
+        fallen = weight * (moved + self.roundoff)
+        self.energy = 0.5 * mass * self.speed**2 + fallen + stiffness * _UNSEEN**2 + self.sums

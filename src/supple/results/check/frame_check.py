@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 from supple.results.check.report import CheckResult, Verdict
 from supple.results.check.settings import CheckSettings
-from supple.results.check.snapshot import Scene, Snapshot
+from supple.results.check.trajectory import Snapshot, Trajectory
 from supple.results.recording.frame import RecordedFrame
 
 # What a check may need, and what its result says where the files do not contain it and nobody gives it.
@@ -112,6 +112,9 @@ class FrameCheck:
     needs_frames : whether its result needs at least one frame; needs : keys of `UNKNOWN`
     unit : of its number; lowest : whether small numbers are the bad ones
     good, bad : texts of its result; `{worst}` in them stands for the worst number
+    nothing : why it cannot be made where it has seen no number; "" where that is good
+    in_order : what it judges, where it needs every frame
+    of : the frames and what is known beside them; first, last : the frames that it saw first, and before this one
     why_not : why it cannot be made; it then sees no further frames
     """
 
@@ -121,31 +124,41 @@ class FrameCheck:
     needs: ClassVar[frozenset[str]] = frozenset()
     unit: ClassVar[str] = ""
     lowest: ClassVar[bool] = False
+    nothing: ClassVar[str] = ""
+    in_order: ClassVar[str] = ""
     good: str
     bad: ClassVar[str]
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        self.scene, self.settings = scene, settings
+    def __init__(self, of: Trajectory, settings: CheckSettings) -> None:
+        self.of, self.settings = of, settings
         self.tally = Tally(self.name, self.unit, lowest=self.lowest)
+        self.first: Snapshot | None = None
+        self.last: Snapshot | None = None
         self.why_not: str | None = None
+        if self.in_order and settings.every > 1:
+            self.why_not = f"{self.in_order} from one frame to the next only"
         self.begin()
 
     def begin(self) -> None:
         """Check what no frame changes, and prepare for the frames."""
 
-    def see(self, at: Snapshot) -> None:
+    def add(self, at: Snapshot) -> None:
         """Check a frame; frames come in order."""
+        self.first = self.first or at
+        self.see(at)
+        self.last = at
+
+    def see(self, at: Snapshot) -> None:
+        """Check a frame, after `last`."""
 
     def at(self, number: int) -> At:
         """Number and time of a frame."""
-        return At(int(number), float(self.scene.recording.times[number]))
-
-    def passed(self) -> CheckResult:
-        """The result where nothing failed and nothing was measured."""
-        return CheckResult(self.name, Verdict.PASS, self.good)
+        return At(int(number), float(self.of.times[number]))
 
     def result(self) -> CheckResult:
         """The result of all frames."""
+        if self.why_not is None and self.nothing and self.tally.worst is None:
+            self.why_not = self.nothing
         if self.why_not is not None:
             return skipped(self.name, self.why_not)
         return self.tally.result(self.good, self.bad)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -17,7 +18,7 @@ from supple.materials.material import POISSON, NotRecorded
 from supple.materials.per_tet import TetMaterial
 from supple.mesh.io.series.series import OtherCells, Series
 from supple.results.check.series_parts import parts_of
-from supple.results.check.trajectory import Part, Trajectory, TrajectoryFrame
+from supple.results.check.trajectory import Snapshot, Trajectory
 
 # As scene files call them.
 LAWS: dict[str, type[Elastic]] = {
@@ -58,68 +59,64 @@ class Given(Kind):
     law: Annotated[str, Choice(tuple(LAWS))] = "stable_neo_hookean"
 
 
+@dataclass(frozen=True, eq=False)
+class SeriesPart:
+    """A body without a skin; see `Part`."""
+
+    name: str
+    vertices: slice
+    tets: slice
+    boundary: NDArray[np.int32]
+    rigid: bool = False
+    skin: None = None
+    touching_skin: None = None
+
+    def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return x[self.vertices]
+
+
 class SeriesTrajectory(Trajectory):
     """The frames of another program."""
 
     def __init__(self, series: Series, given: Given) -> None:
-        self._series = series
-        count, path = len(series), Path(series.path)
-        first = self._first(path)
-        last = self._last(count)
-        parts = parts_of(series.cells, first, last)
+        self.path, self._series, count = Path(series.path), series, len(series)
+        first = self._first()
+        parts = parts_of(series.cells, first, self._last(count))
         self._points, self._twins = parts.points, parts.twins
-        rest = np.ascontiguousarray(first[parts.points])
+        self.rest_positions = rest = np.ascontiguousarray(first[parts.points])
         self._apart = _APART * float(np.ptp(rest, axis=0).max())
-        tets = parts.tets.astype(np.int32)
-        corners = rest[tets]
-        edges = corners[:, 1:] - corners[:, :1]
-        volumes = np.einsum("ij,ij->i", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6.0
-        shares = np.repeat(np.abs(volumes) * (given.density or 0.0) / 4.0, 4)
-        masses = np.bincount(tets.ravel(), shares, len(rest)).astype(np.float64)
+        self.tets = parts.tets.astype(np.int32)
+        shares = np.repeat(np.abs(self.rest_volumes) * (given.density or 0.0) / 4.0, 4)
+        self.masses = np.bincount(self.tets.ravel(), shares, len(rest)).astype(np.float64)
         if series.masses is not None:
-            masses = np.ascontiguousarray(series.masses[parts.points])
+            self.masses = np.ascontiguousarray(series.masses[parts.points])
         starts = np.vstack([np.zeros((1, 3), dtype=np.int64), parts.ends])
-        bodies = tuple(
-            Part(
-                name,
-                slice(int(a[0]), int(b[0])),
-                slice(int(a[1]), int(b[1])),
-                (parts.triangles[a[2] : b[2]] - a[0]).astype(np.int32),
-            )
-            for name, a, b in zip(parts.names, starts[:-1], starts[1:], strict=True)
-        )
-        step, solid = _step(series.times, given.dt), len(tets) == np.count_nonzero(volumes > 0.0) > 0
+        rows = [[slice(*map(int, ends)) for ends in zip(a, b, strict=True)] for a, b in pairwise(starts)]
+        self.bodies = [
+            SeriesPart(name, vertices, tets, (parts.triangles[triangles] - vertices.start).astype(np.int32))
+            for name, (vertices, tets, triangles) in zip(parts.names, rows, strict=True)
+        ]
+        step, solid = _step(series.times, given.dt), (self.rest_volumes > 0.0).all() and len(self.tets) > 0
         known = {
             "files": True,
-            "tets": len(tets) > 0,
+            "tets": len(self.tets) > 0,
             "times": step is not None and count > 2,
             "masses": series.masses is not None or (given.density is not None and solid),
             "material": given.youngs is not None and given.poisson is not None,
             "gravity": given.gravity is not None,
             "free": given.free,
         }
-        super().__init__(
-            path=path,
-            knows=frozenset(name for name, is_known in known.items() if is_known),
-            times=self._times(count, step),
-            dt=step or 1.0,
-            gravity=np.zeros(3) if given.gravity is None else np.asarray(given.gravity),
-            bodies=bodies,
-            rest_positions=rest,
-            masses=masses,
-            tets=tets,
-            rest_volumes=volumes,
-            material=_material(given, len(tets)),
-            compliances=(None,) * len(bodies),
-            file_numbers={"vertex": parts.points, "tet": parts.tet_numbers, "triangle": parts.triangle_numbers},
-            numbers=series.numbers,
-            notes=(*series.notes, *parts.notes),
-        )
+        self.knows = frozenset(name for name, is_known in known.items() if is_known)
+        self.times, self.dt = self._times(count, step), step or 1.0
+        self.gravity = np.zeros(3) if given.gravity is None else np.asarray(given.gravity)
+        self.material, self.springs = _material(given, len(self.tets)), (None,) * len(self.bodies)
+        self.file_numbers = {"vertex": parts.points, "tet": parts.tet_numbers, "triangle": parts.triangle_numbers}
+        self.numbers, self.notes = series.numbers, (*series.notes, *parts.notes)
         self._kept: dict[int, tuple[NDArray[np.float64], str | None]] = {}
 
-    def frame(self, number: int) -> TrajectoryFrame:
+    def snapshot(self, number: int) -> Snapshot:
         positions, other = self._frame(number)
-        return TrajectoryFrame(number, float(self.times[number]), positions, self._velocities(number), other=other)
+        return Snapshot(self, number, float(self.times[number]), positions, self._velocities(number), other=other)
 
     def _frame(self, number: int) -> tuple[NDArray[np.float64], str | None]:
         """Positions (n, 3) in the order of the parts, and why they cannot be compared; the last few are kept."""
@@ -153,7 +150,7 @@ class SeriesTrajectory(Trajectory):
             other = f"points {one} and {two} had the same place and separate by {apart.max():.3g}"
         return np.ascontiguousarray(x[self._points]), other
 
-    def _first(self, path: Path) -> NDArray[np.float64]:
+    def _first(self) -> NDArray[np.float64]:
         """The positions of the first frame with finite numbers: the reference of shapes."""
         for number in range(min(len(self._series), 1000)):
             try:
@@ -162,7 +159,7 @@ class SeriesTrajectory(Trajectory):
                 continue
             if np.isfinite(x).all():
                 return x
-        raise MeshError(f"{path}: no frame has finite positions only")
+        raise MeshError(f"{self.path}: no frame has finite positions only")
 
     def _last(self, count: int) -> NDArray[np.float64] | None:
         try:

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.check.checks.tunnelling import passing_between
 from supple.results.check.report import CheckResult
-from supple.results.check.snapshot import Scene
+from supple.results.check.trajectory import Trajectory
 from supple.results.view.look import body_color
 from supple.runtime.figures import paper_figure
 
@@ -48,27 +47,27 @@ class Place:
     up: int
 
 
-def place_of(scene: Scene, failures: Sequence[CheckResult]) -> Place | None:
+def place_of(of: Trajectory, failures: Sequence[CheckResult]) -> Place | None:
     """The worst frame of the most informative failure; None where no failure belongs to a frame that can be drawn."""
     rank = {name: k for k, name in enumerate(_ORDER)}
     for result in sorted(failures, key=lambda result: rank.get(result.name, len(rank))):
         if result.frame is None:
             continue
-        at = scene.snapshot(result.frame)
+        at = of.snapshot(result.frame)
         if not at.finite:
             continue
-        surfaces = scene.surfaces
+        surfaces = of.surfaces
         marked = np.zeros((0, 3), dtype=np.int64)
         if result.name == "inversion":
-            marked = scene.recording.tets[at.signs <= 0].astype(np.int64)[:, _TET_FACETS].reshape(-1, 3)
+            marked = of.tets[at.signs <= 0].astype(np.int64)[:, _TET_FACETS].reshape(-1, 3)
         elif result.name in ("intersection", "distance"):
             marked = surfaces.triangles[np.unique(at.meeting[1])]
         elif result.name == "tunnelling" and result.frame > 0:
-            before = scene.snapshot(result.frame - 1)
+            before = of.snapshot(result.frame - 1)
             if before.finite:
-                marked = surfaces.triangles[np.unique(passing_between(before, at.points)[1])]
-        gravity = np.abs(scene.recording.gravity)
-        up = int(np.argmax(gravity)) if gravity.any() else 2 if "files" in scene.recording.knows else 1
+                marked = surfaces.triangles[np.unique(surfaces.pairs(before.tree, before.points, at.points)[1])]
+        gravity = np.abs(of.gravity)
+        up = int(np.argmax(gravity)) if gravity.any() else 2 if "files" in of.knows else 1
         text = f"{result.name} in frame {result.frame}: {result.message}"
         return Place(text, result.frame, at.points[:-2], surfaces.triangles, surfaces.owners, marked, up)
     return None

@@ -29,7 +29,7 @@ from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rows import rows_of
 from supple.scene.scene import Scene
 
-FORMAT_VERSION = 7
+FORMAT_VERSION = 8
 _GROUP, _HEADER = "supple", "supple/header"
 _INLINE = 16  # entries of arrays that are in the tree: vectors and matrices
 # What is no part of a scene, such as solvers and studies.

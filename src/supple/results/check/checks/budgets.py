@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.report import CheckResult
 from supple.results.check.settings import CheckSettings
-from supple.results.check.snapshot import Scene, Snapshot
-from supple.results.check.trajectory import Trajectory
+from supple.results.check.trajectory import Snapshot, Trajectory
 
+Floats = NDArray[np.float64]
 # Of energies and works, which are recorded and computed here in double precision.
-_CLOSED = 1e-9
+CLOSED = 1e-9
 # Momenta by differences of positions that may be in single precision.
 _OF_DIFFERENCES = 1e-3
 # Works that take energy where nothing moves obstacles.
@@ -28,23 +30,18 @@ class Momentum(FrameCheck):
     bad = "changes by {worst} of itself without a force"
 
     def begin(self) -> None:
-        self.why_not = self.scene.recording.acting
-        self._start: tuple[float, NDArray[np.float64]] | None = None
+        self.why_not = self.of.acting
         self._scale = 0.0
 
     def see(self, at: Snapshot) -> None:
-        recording = self.scene.recording
-        m, v, g = recording.masses, at.velocities, recording.gravity
-        P = m @ v
-        if self._start is None:
-            self._start = at.time, P
-        t, total = at.time - self._start[0], float(m.sum())
+        m, v, g, first = self.of.masses, at.velocities, self.of.gravity, self.first or at
+        t, total = at.time - first.time, float(m.sum())
         pushed = total * float(np.linalg.norm(g)) * t
         self._scale = max(self._scale, float(m @ np.linalg.norm(v, axis=1)) + pushed)
-        change = max(float(np.linalg.norm(P - self._start[1] - total * g * t)) - self.scene.floors.momentum, 0.0)
-        change /= self._scale + total * self.scene.floors.speed
+        change = float(np.linalg.norm(m @ v - m @ first.velocities - total * g * t))
+        change = max(change - self.of.floors.momentum, 0.0) / (self._scale + total * self.of.floors.speed)
         most = self.settings.max_momentum_change
-        if "files" in recording.knows and most == CheckSettings.max_momentum_change:
+        if "files" in self.of.knows and most == CheckSettings.max_momentum_change:
             most = _OF_DIFFERENCES
         self.tally.see(at, change, not change <= most)
 
@@ -63,39 +60,72 @@ class Spin(FrameCheck):
     bad = "angular momentum changes by {worst} of what turns, without a torque"
 
     def begin(self) -> None:
-        recording = self.scene.recording
-        self.why_not = recording.acting
-        self._implicit = (recording.records.solver or "").startswith("Implicit")
-        self.good = "constant within {worst}" + (", beyond the error of the integrator" if self._implicit else "")
-        if self.why_not is None and self._implicit and self.settings.every > 1:
+        self.why_not = self.of.acting
+        self.good = "constant within {worst}" + (", beyond the error of the integrator" if self.of.implicit else "")
+        if self.why_not is None and self.of.implicit and self.settings.every > 1:
             self.why_not = "the error of an implicit integrator is known from one frame to the next only"
-        self._last: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._before: tuple[Floats, Floats] | None = None
         self._drift, self._scale = 0.0, 0.0
 
     def see(self, at: Snapshot) -> None:
-        recording = self.scene.recording
-        m, x = recording.masses, at.positions
+        m, x, floors, size = self.of.masses, at.positions, self.of.floors, self.of.size
         total = float(m.sum())
         r, v = x - m @ x / total, at.velocities - m @ at.velocities / total
         L = m @ np.cross(r, v)
         moving = float(m @ (np.linalg.norm(r, axis=1) * np.linalg.norm(v, axis=1)))
-        floors, size = self.scene.floors, self.scene.size
         self._scale = max(self._scale, moving + total * size * floors.speed)
-        if self._last is not None:
-            old_L, old_v = self._last
+        if self._before is not None:
+            old_L, old_v = self._before
             speeds = np.linalg.norm(at.velocities, axis=1)
             change = float(np.linalg.norm(L - old_L)) - size * floors.momentum - floors.roundoff * float(m @ speeds)
-            if self._implicit:
+            if self.of.implicit:
                 speeds = np.linalg.norm(v, axis=1) + np.linalg.norm(old_v, axis=1)
-                change -= recording.dt * float(m @ (np.linalg.norm(v - old_v, axis=1) * speeds))
+                change -= self.of.dt * float(m @ (np.linalg.norm(v - old_v, axis=1) * speeds))
             # Changes beyond the allowed ones add up over the steps.
             self._drift += max(0.0, change)
             share = self._drift / self._scale
             self.tally.see(at, share, not share <= self.settings.max_momentum_change)
-        self._last = L, v
+        self._before = L, v
 
 
-class Energy(FrameCheck):
+class EnergyCheck(FrameCheck):
+    """The base class of checks that judge the energies of all frames together."""
+
+    _numbers: list[int]
+    _energies: list[tuple[float, float]]
+
+    def begin(self) -> None:
+        self._numbers, self._energies = [], []
+
+    def see(self, at: Snapshot) -> None:
+        self._numbers.append(at.number)
+        elastic = at.elastic_energy
+        if elastic is None:
+            elastic = float(self.of.records.series("elastic_energy")[at.number])
+        fallen = at.positions - (self.first or at).positions
+        height = -float((self.of.masses @ fallen) @ self.of.gravity)
+        self._energies.append((at.kinetic_energy + elastic + at.stitch_energy, height))
+
+    def result(self) -> CheckResult:
+        if self.why_not is None and self._numbers:
+            stored, height = np.array(self._energies).T
+            scale = float(stored.max() + np.ptp(height)) + self.of.floors.energy
+            self.judge(np.array(self._numbers), stored + height, scale)
+        return super().result()
+
+    @abstractmethod
+    def judge(self, rows: NDArray[np.int64], energy: Floats, scale: float) -> None:
+        """Judge the energy (k,) of the frames in `rows`: the kinetic, elastic and stitch energy, and the potential one
+        since the first [J]; scale : the energy in motion, never below what is not seen [J]."""
+
+    def see_all(self, rows: NDArray[np.int64], values: Floats, most: float, where: str = "") -> None:
+        """Add a number of each of these frames, which fails where it is not within a bound."""
+        for number, value in zip(rows, values, strict=True):
+            failed = not value <= most
+            self.tally.see(self.at(number), float(value), failed, where if failed else "")
+
+
+class Energy(EnergyCheck):
     """The sum of kinetic, elastic, stitch and potential energy does not grow by more than the recorded works.
 
     Of a recording without works, not judged where anything but gravity does work.
@@ -107,48 +137,38 @@ class Energy(FrameCheck):
     bad = "grows by {worst}"
 
     def begin(self) -> None:
-        recording = self.scene.recording
-        self._works = recorded_works(recording)
+        super().begin()
+        self._works = recorded_works(self.of)
         if self._works is None:
-            self.why_not = recording.driving
-        self._first: Snapshot | None = None
-        self._rows: list[tuple[int, float, float]] = []
+            self.why_not = self.of.driving
 
     def see(self, at: Snapshot) -> None:
-        self._first = self._first or at
-        held = self.scene.recording.pinned_vertices
-        if self._works is None and not np.array_equal(at.positions[held], self._first.positions[held]):
+        held, first = self.of.pinned_vertices, self.first or at
+        if self._works is None and not np.array_equal(at.positions[held], first.positions[held]):
             self.why_not = "pinned vertices move, which does work"
-        elif self._works is None and not np.array_equal(at.poses, self._first.poses):
+        elif self._works is None and not np.array_equal(at.poses, first.poses):
             self.why_not = "obstacles move, which does work"
         else:
-            self._rows.append((at.number, *moved_and_height(at, self._first)))
+            super().see(at)
 
-    def result(self) -> CheckResult:
-        if self.why_not is not None:
-            return super().result()
-        recording = self.scene.recording
-        numbers, stored, height = np.array(self._rows).T
-        rows, works = numbers.astype(int), self._works or {}
+    def judge(self, rows: NDArray[np.int64], energy: Floats, scale: float) -> None:
+        works = self._works or {}
         work, driving = (
-            np.cumsum(sum(each, np.zeros(len(recording))))[rows]
+            np.cumsum(sum(each, np.zeros(len(self.of))))[rows]
             for each in (works.values(), (one for name, one in works.items() if name not in _PASSIVE))
         )
-        scale = energy_scale(self.scene, stored, height) + float(np.abs(work).max())
+        scale += float(np.abs(work).max())
         # A step whose energy falls gains nothing. Where a body turns far in one step while contact stops it, what the
         # forces at its end take exceeds what is lost.
-        energy = stored + height
         gained, risen = np.diff(energy - work), np.diff(energy - driving)
         gained = np.where(gained > 0.0, np.minimum(gained, np.maximum(risen, 0.0)), gained)
         gains = np.append(0.0, np.cumsum(gained)) / scale
-        if "files" in recording.knows:  # differences between frames show fast vibrations one time and not another
+        if "files" in self.of.knows:  # differences between frames show fast vibrations one time and not another
             gains = np.maximum(energy - energy[0], 0.0) / scale
-        for (number, _, _), gain in zip(self._rows, gains, strict=True):
-            self.tally.see(self.at(number), float(gain), not gain <= self.settings.max_energy_gain)
-        return super().result()
+        self.see_all(rows, gains, self.settings.max_energy_gain)
 
 
-class Balance(FrameCheck):
+class Balance(EnergyCheck):
     """The energy of the positions and velocities changes by the sum of the recorded works, frame by frame."""
 
     name = "balance"
@@ -157,77 +177,43 @@ class Balance(FrameCheck):
     bad = "works miss the change of energy by {worst}"
 
     def begin(self) -> None:
-        recording = self.scene.recording
-        self._works = recorded_works(recording, numerical=True)
-        if self._works is None:
+        super().begin()
+        self._works = recorded_works(self.of, numerical=True) or {}
+        if not self._works:
             self.why_not = "the recording does not contain works"
-        self._first: Snapshot | None = None
-        self._rows: list[tuple[int, float, float]] = []
         self._breaking: list[float] = []
 
     def see(self, at: Snapshot) -> None:
-        self._first = self._first or at
-        self._rows.append((at.number, *moved_and_height(at, self._first)))
+        super().see(at)
         self._breaking.append(at.energy_of_latest)
 
-    def result(self) -> CheckResult:
-        if self.why_not is not None or self._works is None:
-            return super().result()
-        recording = self.scene.recording
-        numbers, stored, height = np.array(self._rows).T
-        rows = numbers.astype(int)
-        residual = recording.records.frame_values("details/energy_residual")
+    def judge(self, rows: NDArray[np.int64], energy: Floats, scale: float) -> None:
+        residual = self.of.records.frame_values("details/energy_residual")
         each = np.array([*self._works.values(), residual])
         sums, sizes = np.cumsum(each.sum(axis=0))[rows], np.cumsum(np.abs(each).sum(axis=0))[rows]
-        scale = energy_scale(self.scene, stored, height) + sizes
-        miss = np.abs(stored + height - stored[0] - height[0] - (sums - sums[0]))
-        open_ = np.maximum(miss - self.scene.floors.sums, 0.0) / scale
-        left = np.abs(np.cumsum(residual)[rows]) / scale
-        for number, miss, rest in zip(rows, open_, left, strict=True):
-            at = self.at(number)
-            self.tally.see(at, float(miss), not miss <= _CLOSED)
-            if not rest <= self.settings.max_energy_gain:
-                self.tally.see(at, float(rest), True, "forces that are not balanced")
+        scales = scale + sizes
+        miss = np.abs(energy - energy[0] - (sums - sums[0]))
+        self.see_all(rows, np.maximum(miss - self.of.floors.sums, 0.0) / scales, CLOSED)
+        left = np.abs(np.cumsum(residual)[rows]) / scales
+        beyond = ~(left <= self.settings.max_energy_gain)
+        self.see_all(rows[beyond], left[beyond], self.settings.max_energy_gain, "forces that are not balanced")
         if "breaking" in self._works:
-            apart = np.abs(self._works["breaking"][rows] + self._breaking) / scale
-            worst = int(np.argmax(apart))
-            failed = not apart[worst] <= _CLOSED
-            self.tally.see(self.at(rows[worst]), float(apart[worst]), failed, "work of breaking")
+            apart = np.abs(self._works["breaking"][rows] + self._breaking) / scales
+            self._see_worst(rows, apart, "breaking")
         for kind, names in (("cavities", "cavity_work"), ("cables", "cable_work")):
             if kind in self._works:
-                apart = np.abs(recording.records.frame_values(f"details/{names}").sum(axis=1) - self._works[kind])
-                worst = int(np.argmax(apart))
-                share = float(apart[worst] / scale.max())
-                self.tally.see(self.at(worst), share, not share <= _CLOSED, f"work of {kind}")
-        return super().result()
+                apart = np.abs(self.of.records.frame_values(f"details/{names}").sum(axis=1) - self._works[kind])
+                self._see_worst(np.arange(len(self.of)), apart / scales.max(), kind)
+
+    def _see_worst(self, rows: NDArray[np.int64], values: Floats, work: str) -> None:
+        worst = [int(np.argmax(values))]
+        self.see_all(rows[worst], values[worst], CLOSED, f"work of {work}")
 
 
-def recorded_works(recording: Trajectory, numerical: bool = False) -> dict[str, NDArray[np.float64]] | None:
+def recorded_works(of: Trajectory, numerical: bool = False) -> dict[str, Floats] | None:
     """By name, (frames,) [J], without what is numerical; None where the recording has none."""
-    if "recording" not in recording.knows:
-        return None
-    for field in recording.records.details.fields:
+    for field in of.records.details.fields if "recording" in of.knows else ():
         if field.name == "work" and field.keys:
-            values = recording.records.frame_values("details/work").T
-            named = dict(zip(field.keys, values, strict=True))
+            named = dict(zip(field.keys, of.records.frame_values("details/work").T, strict=True))
             return {name: work for name, work in named.items() if numerical or name != "numerical"}
     return None
-
-
-def moved_and_height(at: Snapshot, first: Snapshot) -> tuple[float, float]:
-    """The kinetic, elastic and stitch energy of a frame, and the potential one since the first [J]."""
-    recording = at.scene.recording
-    m, v = recording.masses, at.velocities
-    elastic = at.elastic_energy
-    if elastic is None:
-        elastic = float(recording.records.series("elastic_energy")[at.number])
-    stitches = at.stitch_energy
-    if stitches is None:
-        stitches = float(recording.records.series("stitch_energy")[at.number])
-    moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic + stitches
-    return moved, -float((m @ (at.positions - first.positions)) @ recording.gravity)
-
-
-def energy_scale(scene: Scene, stored: NDArray[np.float64], height: NDArray[np.float64]) -> float:
-    """The energy in motion [J], never below what is not seen."""
-    return float(stored.max() + np.ptp(height)) + scene.floors.energy

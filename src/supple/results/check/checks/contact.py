@@ -14,8 +14,8 @@ from supple.results.check.geometry.orientation import plane_sides
 from supple.results.check.geometry.surface_pairs import closest_pair
 from supple.results.check.geometry.triangle_distance import triangles_apart
 from supple.results.check.report import CheckResult
-from supple.results.check.snapshot import Scene, Snapshot
 from supple.results.check.surfaces import moved, moved_back
+from supple.results.check.trajectory import Snapshot
 from supple.scene.obstacles.obstacle import Obstacle
 
 # A moved obstacle, and every distance from a ball or a wall, is rounded a few times.
@@ -123,26 +123,20 @@ class Intersection(FrameCheck):
 
     def see(self, at: Snapshot) -> None:
         count, pairs = at.meeting
-        name = self.scene.surfaces.name_triangle
-        where = f"{name(int(pairs[0, 0]))} and {name(int(pairs[0, 1]))}" if count else ""
-        self.tally.see(at, count, count > 0, where)
+        self.tally.see(at, count, count > 0, self.of.surfaces.name_pair(pairs) if count else "")
 
 
-def clearances(scene: Scene, at: Snapshot) -> Iterator[tuple[str, Clearance]]:
+def clearances(at: Snapshot) -> Iterator[tuple[str, Clearance]]:
     """The clearance of each body from each obstacle that is a formula: where, and how far."""
-    surfaces = scene.surfaces
-    for j, obstacle in enumerate(scene.recording.obstacles):
-        if obstacle.checked_by_triangles:
-            continue
+    surfaces = at.of.surfaces
+    for j, obstacle in enumerate(at.of.obstacles):
         for i in range(surfaces.bodies):
-            if not surfaces.allowed[i, surfaces.bodies + j]:
-                continue
             rows = np.flatnonzero(surfaces.owners == i)
-            triangles = surfaces.triangles[rows]
-            if len(triangles) == 0:
+            if obstacle.checked_by_triangles or not surfaces.allowed[i, surfaces.bodies + j] or not len(rows):
                 continue
+            triangles = surfaces.triangles[rows]
             found = clearance(obstacle, at.poses[j], at.points, np.unique(triangles), triangles)
-            part = scene.name("vertex", found.row) if found.by_vertex else surfaces.name_triangle(int(rows[found.row]))
+            part = at.of.name("vertex", found.row) if found.by_vertex else surfaces.name_triangle(int(rows[found.row]))
             yield f"{part} and {obstacle.name}", found
 
 
@@ -157,11 +151,11 @@ class Obstacles(FrameCheck):
     bad = "a body is in an obstacle, at {worst}"
 
     def begin(self) -> None:
-        if all(obstacle.checked_by_triangles for obstacle in self.scene.recording.obstacles):
+        if all(obstacle.checked_by_triangles for obstacle in self.of.obstacles):
             self.why_not = "the scene has no half-space, round solid or room"
 
     def see(self, at: Snapshot) -> None:
-        found = list(clearances(self.scene, at))
+        found = list(clearances(at))
         if found:
             where, worst = min(found, key=lambda item: (not item[1].entered, item[1].smallest))
             self.tally.see(at, worst.smallest, worst.entered, where)
@@ -180,7 +174,7 @@ class Containment(FrameCheck):
         self.tally.see(at, len(found), bool(found), found[0] if found else "")
 
     def _contained(self, at: Snapshot) -> Iterator[str]:
-        surfaces, x = self.scene.surfaces, at.points
+        surfaces, x = self.of.surfaces, at.points
         owners = surfaces.owners
         crossing = {frozenset(pair) for pair in owners[at.meeting[1]].tolist()}
         corners = [x[surfaces.triangles[piece.triangles].ravel()] for piece in surfaces.pieces]
@@ -200,8 +194,8 @@ class Containment(FrameCheck):
                     yield f"{surfaces.names[piece.owner]} in {surfaces.names[solid.owner]}"
 
     def _solids_in_bodies(self, at: Snapshot) -> Iterator[str]:
-        surfaces = self.scene.surfaces
-        for j, obstacle in enumerate(self.scene.recording.obstacles):
+        surfaces = self.of.surfaces
+        for j, obstacle in enumerate(self.of.obstacles):
             if obstacle.checked_by_triangles or obstacle.is_room or obstacle.plane is not None:
                 continue
             # Of a convex solid, the mean of points about it is inside.
@@ -220,38 +214,33 @@ class Distance(FrameCheck):
     lowest = True
     good: str = "smallest {worst}"
     bad = "surfaces touch or meet: {worst}"
+    nothing = "two surfaces are needed"
 
     def begin(self) -> None:
-        self._last: tuple[int, int] | None = None
+        self._closest: tuple[int, int] | None = None
         self._of_frames: list[float] = []
 
     def see(self, at: Snapshot) -> None:
-        surfaces = self.scene.surfaces
-        name = surfaces.name_triangle
+        surfaces = self.of.surfaces
         count, pairs = at.meeting
         if count:
-            a, b = int(pairs[0, 0]), int(pairs[0, 1])
-            self.tally.see(at, 0.0, True, f"{name(a)} and {name(b)} meet")
+            self.tally.see(at, 0.0, True, f"{surfaces.name_pair(pairs)} meet")
             return
         best = np.inf
-        if self._last is not None:
+        if self._closest is not None:
             # The closest pair of the last frame is still close: boxes that are farther apart are not searched.
-            first, second = (surfaces.triangles[row] for row in self._last)
+            first, second = (surfaces.triangles[row] for row in self._closest)
             best = float(triangles_apart(at.points, first, second)) * (1.0 + 1e-12) + 1e-300
-        squared, a, b = closest_pair(
-            at.points, surfaces.triangles, surfaces.owners, surfaces.allowed, surfaces.ignored, *at.tree, best
-        )
+        squared, a, b = closest_pair(surfaces.looked_at(), at.points, at.tree, best)
         if a >= 0:
-            self._last = a, b
+            self._closest = a, b
             self._of_frames.append(float(np.sqrt(squared)))
-            self.tally.see(at, float(np.sqrt(squared)), squared <= 0.0, lambda: f"{name(a)} and {name(b)}")
-        for where, found in clearances(self.scene, at):
+            self.tally.see(at, self._of_frames[-1], squared <= 0.0, surfaces.name_pair(np.array([[a, b]])))
+        for where, found in clearances(at):
             self.tally.see(at, found.smallest, found.smallest <= 0.0, where)
 
     def result(self) -> CheckResult:
-        if self.tally.worst is None:
-            self.why_not = "two surfaces are needed"
-        if "files" in self.scene.recording.knows and self._of_frames:
+        if "files" in self.of.knows and self._of_frames:
             tenth, half = np.quantile(self._of_frames, [0.1, 0.5])
             self.good = f"{Distance.good}; {tenth:.3g} m in a tenth of the frames, {half:.3g} m in half of them"
         return super().result()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from supple.results.check.frame_check import FrameCheck
-from supple.results.check.snapshot import Scene, Snapshot
+from supple.results.check.trajectory import Snapshot, Trajectory
 from supple.scene.joints.joint import Function
 from supple.scene.joints.placed import PlacedJoint
 
@@ -31,32 +31,23 @@ class Joints(FrameCheck):
     bad = "a joint is off by {worst} of the size of what it joins"
 
     def begin(self) -> None:
-        recording = self.scene.recording
-        if not recording.joints:
+        if not self.of.joints:
             self.why_not = "the scene has no joint"
-        forms = {one.form for joint in recording.joints for one in joint.conditions.functions}
+        forms = {one.form for joint in self.of.joints for one in joint.conditions.functions}
         if forms - FORMS.keys():
             self.why_not = f"what a joint holds is not known here: {', '.join(sorted(forms - FORMS.keys()))}"
-        of_solver = _IMPLICIT if (recording.records.solver or "").startswith("Implicit") else _OTHERS
         given = self.settings.max_joint_error
-        self._most = of_solver if given is None else given
-        self._last: dict[str, tuple[float, float]] = {}
-        self._frames = [_Frame.of(self.scene, joint) for joint in recording.joints]
-        kept = {field.name: field.keys or () for field in recording.records.details.fields}
-        self._recorded = {
-            name: {key: values[:, k] for k, key in enumerate(kept[name])}
-            for name in ("joint_coordinates", "motor_forces")
-            if kept.get(name) and (values := recording.records.frame_values(f"details/{name}")) is not None
-        }
+        self._most = given if given is not None else _IMPLICIT if self.of.implicit else _OTHERS
+        self._before: dict[str, tuple[float, float]] = {}
+        self._frames = [_Frame.of(self.of, joint) for joint in self.of.joints]
 
     def see(self, at: Snapshot) -> None:
-        recording = self.scene.recording
-        for joint, (effort, rate), frame in zip(recording.joints, recording.joint_limits, self._frames, strict=True):
-            recorded = self._of_report("joint_coordinates", joint.name, at.number)
+        for joint, (effort, rate), frame in zip(self.of.joints, self.of.joint_limits, self._frames, strict=True):
+            recorded = at.details.joint_coordinates.get(joint.name)
             error, coordinate, strain = frame.error(at, recorded)
             where = joint.name
-            before, last = self._last.get(joint.name, (at.time, coordinate))
-            self._last[joint.name] = at.time, coordinate
+            before, last = self._before.get(joint.name, (at.time, coordinate))
+            self._before[joint.name] = at.time, coordinate
             if np.isfinite(rate):
                 too_far = (abs(coordinate - last) - rate * (at.time - before)) / frame.unit
                 error, where = (too_far, f"{joint.name}, its rate") if too_far > error else (error, where)
@@ -64,15 +55,9 @@ class Joints(FrameCheck):
             # Where a body is not quite rigid, an angle depends on the material that it is taken from.
             if differs > max(error, self._most, strain):
                 error, where = differs, f"{joint.name}, its recorded coordinate"
-            found = self._of_report("motor_forces", joint.name, at.number)
-            beyond = found is not None and not abs(found) <= effort * (1.0 + 1e-9)
+            beyond = not abs(at.details.motor_forces.get(joint.name, 0.0)) <= effort * (1.0 + 1e-9)
             where = f"{joint.name}, its motor exceeds its largest effort" if beyond else where
             self.tally.see(at, error, beyond or not error <= self._most, where)
-
-    def _of_report(self, series: str, name: str, number: int) -> float | None:
-        """What the solver reported of a joint in a frame, where it did."""
-        values = self._recorded.get(series, {}).get(name)
-        return None if values is None or np.isnan(values[number]) else float(values[number])
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +70,7 @@ class _Frame:
     size : diameter of gyration of the smaller body [m]; unit : of the coordinate, `size` or one radian
     """
 
-    scene: Scene
+    trajectory: Trajectory
     joint: PlacedJoint
     points: NDArray[np.float64]
     axes: NDArray[np.float64]
@@ -93,18 +78,18 @@ class _Frame:
     unit: float
 
     @classmethod
-    def of(cls, scene: Scene, joint: PlacedJoint) -> _Frame:
+    def of(cls, trajectory: Trajectory, joint: PlacedJoint) -> _Frame:
         R, t = joint.placed[:, :, :3], joint.placed[:, :, 3]
-        bodies, sizes = scene.recording.bodies, []
+        bodies, sizes = trajectory.bodies, []
         for side in joint.sides:
             if side is not None and side < len(bodies):
-                control = scene.recording.rest_positions[bodies[side].vertices]
+                control = trajectory.rest_positions[bodies[side].vertices]
                 sizes.append(2.0 * np.linalg.norm(control - control.mean(axis=0)) / np.sqrt(len(control)))
         size = float(min(sizes))
         points = np.einsum("sji,sj->si", R, joint.point - t)
         measure = joint.conditions.coordinate
         unit = size if measure is not None and measure.is_length else 1.0
-        return cls(scene, joint, points, (joint.axes @ R).astype(np.float64), size, unit)
+        return cls(trajectory, joint, points, (joint.axes @ R).astype(np.float64), size, unit)
 
     def error(self, at: Snapshot, near: float | None) -> tuple[float, float, float]:
         """The error, the coordinate, and the larger |F^T F - 1| of the two sides.
@@ -130,14 +115,14 @@ class _Frame:
 
     def _side(self, at: Snapshot, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The linear part (3, 3) of the motion of a side from its own coordinates, and where the joint's point is."""
-        side, bodies = self.joint.sides[k], self.scene.recording.bodies
+        side, bodies = self.joint.sides[k], self.trajectory.bodies
         if side is None:
             return np.eye(3), self.points[k]
         if side >= len(bodies):
             pose = at.poses[side - len(bodies)]
             return pose[:, :3], pose[:, :3] @ self.points[k] + pose[:, 3]
         rows = bodies[side].vertices
-        rest = self.scene.recording.rest_positions[rows]
+        rest = self.trajectory.rest_positions[rows]
         affine = np.linalg.solve(np.column_stack([rest, np.ones(4)]), at.positions[rows]).astype(np.float64)
         return affine[:3].T, self.points[k] @ affine[:3] + affine[3]
 
@@ -174,22 +159,19 @@ class Welds(FrameCheck):
     bad = "a welded vertex is off by {worst} of the rigid body's size"
 
     def begin(self) -> None:
-        if not self.scene.recording.welds:
+        if not self.of.welds:
             self.why_not = "the scene has no weld"
-        self._first: Snapshot | None = None
 
     def see(self, at: Snapshot) -> None:
-        self._first = self._first or at
-        recording = self.scene.recording
-        for weld in recording.welds:
-            control = recording.bodies[weld.rigid].vertices
+        first = self.first or at
+        for weld in self.of.welds:
+            control = self.of.bodies[weld.rigid].vertices
             # About centers: far from the origin, a fit with a translation loses digits.
-            centers = [of.positions[control].mean(axis=0) for of in (self._first, at)]
-            before, now = self._first.positions - centers[0], at.positions - centers[1]
+            before, now = (of.positions - of.positions[control].mean(axis=0) for of in (first, at))
             motion = np.linalg.lstsq(before[control], now[control], rcond=None)[0]
             there = before[weld.vertices] @ motion
             size = float(np.linalg.norm(np.ptp(before[control], axis=0)))
             off = np.linalg.norm(now[weld.vertices] - there, axis=1) / size
             worst = int(off.argmax())
             failed = not off[worst] <= self.settings.max_weld_error
-            self.tally.see(at, float(off[worst]), failed, self.scene.name("vertex", int(weld.vertices[worst])))
+            self.tally.see(at, float(off[worst]), failed, self.of.name("vertex", int(weld.vertices[worst])))

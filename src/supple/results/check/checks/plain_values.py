@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.state import Status
 from supple.results.check.frame_check import FrameCheck
-from supple.results.check.snapshot import Snapshot
+from supple.results.check.trajectory import Snapshot
 from supple.results.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
 
 # Arrays that all frames share.
@@ -34,30 +35,29 @@ class Finite(FrameCheck):
     bad = "not finite: {worst}"
 
     def begin(self) -> None:
-        recording = self.scene.recording
         for what in CONSTANTS:
-            count = _bad_count(getattr(recording, what))
+            count = _bad_count(getattr(self.of, what))
             if count:
                 self.tally.see(None, count, True, what.replace("_", " "))
-        names = [name for name in (*REPORT_NUMBERS, *REPORT_VECTORS) if name not in _MAY_BE_UNKNOWN]
-        reports = "recording" in recording.knows
-        self._series = {name: recording.records.series(name) for name in names} if reports else {}
 
     def see(self, at: Snapshot) -> None:
         found = [(count, where) for count, where in self._bad(at) if count] if at.other is None else []
         self.tally.see(at, sum(count for count, _ in found), bool(found), found[0][1] if found else "")
 
     def _bad(self, at: Snapshot) -> Iterator[tuple[int, str]]:
-        moved = [("velocity", at.velocities)] if self._series else []
-        for what, values in (("position", at.positions), *moved):
-            count = _bad_count(values)
-            row = int(np.argmin(np.isfinite(values).all(axis=1)))
-            yield count, f"{what} of {self.scene.name('vertex', row)}" if count else ""
-        count = _bad_count(at.det_F)
-        yield count, f"det F of {self.scene.name('tet', int(np.argmin(np.isfinite(at.det_F))))}" if count else ""
+        yield self._bad_rows(at.positions, "position", "vertex")
         yield _bad_count(at.poses), "pose of an obstacle"
-        for name, series in self._series.items():
-            yield _bad_count(series[at.number]), f"recorded {name}"
+        if at.recorded is not None:
+            yield self._bad_rows(at.velocities, "velocity", "vertex")
+            yield self._bad_rows(at.recorded.det_F[:, None], "det F", "tet")
+            for name in (*REPORT_NUMBERS, *REPORT_VECTORS):
+                if name not in _MAY_BE_UNKNOWN:
+                    yield _bad_count(self.of.records.series(name)[at.number]), f"recorded {name}"
+
+    def _bad_rows(self, values: NDArray[np.float64], what: str, kind: Literal["vertex", "tet"]) -> tuple[int, str]:
+        count = _bad_count(values)
+        row = int(np.argmin(np.isfinite(values).all(axis=1)))
+        return count, f"{what} of {self.of.name(kind, row)}" if count else ""
 
 
 def _bad_count(values: NDArray[np.float64]) -> int:
@@ -74,47 +74,41 @@ class Sequence(FrameCheck):
     bad = "frames do not follow each other"
 
     def begin(self) -> None:
-        self._last: Snapshot | None = None
-        recording = self.scene.recording
-        # XPBD may push a body out of another one and stop it within the same frame.
-        self._implicit = (recording.records.solver or "").startswith("Implicit")
-        indices = np.array([frame.index for frame in recording.records])
-        for k in range(1, len(recording)):
-            at = recording.records[k]
-            step = at.time - float(recording.times[k - 1])
-            rounding = 4.0 * np.finfo(np.float64).eps * abs(at.time)
+        times, dt, records = self.of.times, self.of.dt, self.of.records
+        indices = records.frame_values("index").astype(np.int64)
+        for k in range(1, len(self.of)):
+            time, step = float(times[k]), float(times[k] - times[k - 1])
+            rounding = 4.0 * np.finfo(np.float64).eps * abs(time)
             # A step that failed ends where the solver got to, at the latest with its length; `Converged` names it.
-            failed = not recording.records.statuses[k].can_go_on
-            if failed and 0.0 <= step <= recording.dt * (1.0 + _SAME_TIME) + rounding:
-                step = recording.dt
+            failed = not records.statuses[k].can_go_on
+            if failed and 0.0 <= step <= dt * (1.0 + _SAME_TIME) + rounding:
+                step = dt
             if not step > 0.0:
-                self.tally.see(at, step, True, f"time {at.time:.9g} s does not come after the one before")
+                self.tally.see(self.at(k), step, True, f"time {time:.9g} s does not come after the one before")
             elif indices[k] - indices[k - 1] != 1:
-                self.tally.see(at, step, True, f"number {indices[k]} does not follow {indices[k - 1]}")
-            elif abs(step - recording.dt) > _SAME_TIME * recording.dt + rounding:
-                self.tally.see(at, step, True, f"a step of {step:.9g} s, not of {recording.dt:.9g} s")
+                self.tally.see(self.at(k), step, True, f"number {indices[k]} does not follow {indices[k - 1]}")
+            elif abs(step - dt) > _SAME_TIME * dt + rounding:
+                self.tally.see(self.at(k), step, True, f"a step of {step:.9g} s, not of {dt:.9g} s")
 
     def see(self, at: Snapshot) -> None:
-        before, self._last = self._last, at
-        recording = self.scene.recording
+        before, status = self.last, self.of.records.statuses[at.number]
         if before is None:
             return
         if not np.array_equal(before.positions, at.positions):
-            converged = recording.records.statuses[at.number] is Status.CONVERGED
-            if self._implicit and converged and at.number == before.number + 1:
+            # XPBD may push a body out of another one and stop it within the same frame.
+            if self.of.implicit and status is Status.CONVERGED and at.number == before.number + 1:
                 self._follow(before, at)
             return
         slowest = min(float(np.abs(frame.velocities).max(initial=0.0)) for frame in (before, at))
-        if slowest > self.scene.floors.speed and recording.records.statuses[at.number].can_go_on:
+        if slowest > self.of.floors.speed and status.can_go_on:
             self.tally.see(at, slowest, True, f"repeats frame {before.number} although it moves")
 
     def _follow(self, before: Snapshot, at: Snapshot) -> None:
         """Whether the displacements of bodies agree with their velocities before and after the step."""
-        recording = self.scene.recording
         step = at.time - before.time
-        fall = float(np.linalg.norm(recording.gravity)) * abs(step)
-        for body in recording.bodies:
-            rows, share = body.vertices, recording.masses[body.vertices]
+        fall = float(np.linalg.norm(self.of.gravity)) * abs(step)
+        for body in self.of.bodies:
+            rows, share = body.vertices, self.of.masses[body.vertices]
             share = share / share.sum()
             speeds = [float(np.sqrt(share @ (frame.velocities[rows] ** 2).sum(axis=1))) for frame in (before, at)]
             first, last = (share @ frame.velocities[rows] for frame in (before, at))
@@ -123,7 +117,7 @@ class Sequence(FrameCheck):
             change = last - first
             along = np.clip((mean - first) @ change / max(float(change @ change), 1e-300), 0.0, 1.0)
             off = float(np.linalg.norm(mean - first - along * change))
-            rounding = self.scene.floors.speed * recording.dt / abs(step)
+            rounding = self.of.floors.speed * self.of.dt / abs(step)
             if speeds[1] > 0.0 and off > _LARGEST_DEVIATION * (max(speeds) + fall) + rounding:
                 where = f"{body.name} is {off * abs(step):.3g} m from where its velocities lead"
                 self.tally.see(at, off, True, where)
@@ -139,7 +133,6 @@ class Converged(FrameCheck):
     bad = "a step did not converge"
 
     def begin(self) -> None:
-        recording = self.scene.recording
-        for frame, status in zip(recording.records, recording.records.statuses, strict=True):
+        for number, status in enumerate(self.of.records.statuses):
             if status is not Status.CONVERGED:
-                self.tally.see(frame, 1.0, True, str(status))
+                self.tally.see(self.at(number), 1.0, True, str(status))

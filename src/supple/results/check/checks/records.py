@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from supple.results.check.frame_check import FrameCheck
-from supple.results.check.snapshot import Snapshot, edge_vectors
+from supple.results.check.geometry.vectors import edge_vectors
+from supple.results.check.trajectory import Snapshot
 
 # Allowed difference, as a share of the natural size of each quantity; both sides are computed in double precision.
 _SAME = 1e-9
@@ -23,7 +24,7 @@ class Records(FrameCheck):
     bad = "differ by {worst} from what the positions give"
 
     def begin(self) -> None:
-        self._inverse_sizes = np.linalg.norm(self.scene.rest_inverse, axis=(1, 2))
+        self._inverse_sizes = np.linalg.norm(self.of.rest_inverse, axis=(1, 2))
 
     def see(self, at: Snapshot) -> None:
         # Another check finds numbers that are not finite.
@@ -33,36 +34,26 @@ class Records(FrameCheck):
         self.tally.see(at, value, failed, where if failed else "")
 
     def _differences(self, at: Snapshot) -> Iterator[tuple[float, str]]:
-        recording, k = self.scene.recording, at.number
-        m, x, v = recording.masses, at.positions, at.velocities
-        sizes = np.linalg.norm(edge_vectors(x, recording.tets), axis=(1, 2)) * self._inverse_sizes
+        of, m, x, v = self.of, self.of.masses, at.positions, at.velocities
+        sizes = np.linalg.norm(edge_vectors(x, of.tets), axis=(1, 2)) * self._inverse_sizes
         sizes = np.maximum(1.0, sizes) ** 3
-        apart = np.abs(at.det_F - at.J) / sizes
+        apart = np.abs(of.records[at.number].det_F - at.J) / sizes
         apart[~np.isfinite(apart)] = 0.0
         row = int(np.argmax(apart))
-        yield float(apart[row]), f"det F of {self.scene.name('tet', row)}"
-        recorded = recording.records.series("min_det_F")[k]
-        yield abs(recorded - at.least_J.min()) / sizes[int(np.argmin(at.least_J))], "smallest det F"
-        kinetic = 0.5 * float(m @ np.einsum("ij,ij->i", v, v))
-        recorded = recording.records.series("kinetic_energy")[k]
-        yield abs(recorded - kinetic) / (kinetic + _NOTHING), "kinetic energy"
-        potential = -float((m @ x) @ recording.gravity)
-        heights = float(m @ np.linalg.norm(x, axis=1)) * float(np.linalg.norm(recording.gravity))
-        recorded = recording.records.series("potential_energy")[k]
-        yield abs(recorded - potential) / (heights + _NOTHING), "potential energy"
-        for name, energy in (
-            ("elastic energy", at.elastic_energy),
-            ("stitch energy", at.stitch_energy),
-        ):
-            if energy is not None:
-                recorded = recording.records.series(name.replace(" ", "_"))[k]
-                yield abs(recorded - energy) / (abs(energy) + self.scene.floors.sums / _SAME), name
-        momentum = m @ v
-        recorded = recording.records.series("linear_momentum")[k]
-        speeds = np.linalg.norm(v, axis=1)
-        yield float(np.linalg.norm(recorded - momentum)) / (float(m @ speeds) + _NOTHING), "linear momentum"
-        r = x - m @ x / m.sum()
-        spin = m @ np.cross(r, v - momentum / m.sum())
-        recorded = recording.records.series("angular_momentum")[k]
+        yield float(apart[row]), f"det F of {of.name('tet', row)}"
+        g, speeds = float(np.linalg.norm(of.gravity)), np.linalg.norm(v, axis=1)
+        momentum, r = m @ v, x - m @ x / m.sum()
         turning = float(m @ (np.linalg.norm(r, axis=1) * speeds))
-        yield float(np.linalg.norm(recorded - spin)) / (turning + _NOTHING), "angular momentum"
+        measured = {
+            "min_det_F": (at.least_J.min(), sizes[int(np.argmin(at.least_J))]),
+            "kinetic_energy": (at.kinetic_energy, at.kinetic_energy + _NOTHING),
+            "potential_energy": (-float((m @ x) @ of.gravity), float(m @ np.linalg.norm(x, axis=1)) * g + _NOTHING),
+            "linear_momentum": (momentum, float(m @ speeds) + _NOTHING),
+            "angular_momentum": (m @ np.cross(r, v - momentum / m.sum()), turning + _NOTHING),
+        }
+        for name, energy in (("elastic_energy", at.elastic_energy), ("stitch_energy", at.stitch_energy)):
+            if energy is not None:
+                measured[name] = energy, abs(energy) + of.floors.sums / _SAME
+        for name, (value, size) in measured.items():
+            text = "smallest det F" if name == "min_det_F" else name.replace("_", " ")
+            yield float(np.linalg.norm(of.records.series(name)[at.number] - value)) / size, text

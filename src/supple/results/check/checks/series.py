@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.results.check.frame_check import FrameCheck
-from supple.results.check.report import CheckResult
-from supple.results.check.snapshot import Snapshot
+from supple.results.check.trajectory import Snapshot
 
 # A time step differs from the others by more than this share of them.
 _SAME_STEP = 0.01
@@ -31,10 +29,8 @@ class Cells(FrameCheck):
     bad = "a frame has other cells than the first"
 
     def see(self, at: Snapshot) -> None:
-        self.tally.see(at, 0.0, at.other is not None, at.other or "")
-
-    def result(self) -> CheckResult:
-        return super().result() if self.tally.failed_frames else self.passed()
+        if at.other is not None:
+            self.tally.see(at, 0.0, True, at.other)
 
 
 class Gaps(FrameCheck):
@@ -50,8 +46,7 @@ class Gaps(FrameCheck):
 
     def begin(self) -> None:
         self._frames: list[Snapshot] = []
-        recording = self.scene.recording
-        for what, values in (("file", recording.numbers), ("time", recording.times)):
+        for what, values in (("file", self.of.numbers), ("time", self.of.times)):
             if values is None or len(values) < 2:
                 continue
             steps = np.diff(values)
@@ -60,35 +55,24 @@ class Gaps(FrameCheck):
             if len(wrong) and self.settings.every == 1:
                 k = int(wrong[0])
                 a, b = values[k], values[k + 1]
-                self.tally.see(self.scene.snapshot(k + 1), 1.0, True, f"{what} {b:.9g} comes after {what} {a:.9g}")
+                self.tally.see(self.at(k + 1), 1.0, True, f"{what} {b:.9g} comes after {what} {a:.9g}")
 
     def see(self, at: Snapshot) -> None:
-        if self._frames and at.number != self._frames[-1].number + 1:
+        if self.last is not None and at.number != self.last.number + 1:
             self._frames = []
         self._frames = [*self._frames[-3:], at]
         if len(self._frames) < 4:
             return
-        one, two, three = (
-            later.positions - earlier.positions
-            for earlier, later in zip(self._frames[:-1], self._frames[1:], strict=True)
-        )
-        length = float(np.linalg.norm(two))
-        neighbours = one + three
-        size = self.scene.size * np.sqrt(len(two))
+        one, two, three = np.diff([frame.positions for frame in self._frames], axis=0)
+        length, neighbours = float(np.linalg.norm(two)), one + three
         mean = 0.5 * float(np.linalg.norm(neighbours))
-        if mean <= _MOVING * size:
+        if mean <= _MOVING * self.of.size * np.sqrt(len(two)) or float(np.linalg.norm(one - three)) > _ALIKE * mean:
             return
-        alike = float(np.linalg.norm(one - three)) <= _ALIKE * mean
-        if alike and float(np.linalg.norm(two - neighbours)) <= _TWICE * length:
-            where = (
-                f"between frames {at.number - 2} and {at.number - 1} everything moves twice as far as before and after"
-            )
-            self.tally.see(self._frames[2], 1.0, True, where)
-        if alike and length == 0.0:
+        if float(np.linalg.norm(two - neighbours)) <= _TWICE * length:
+            where = f"between frames {at.number - 2} and {at.number - 1}"
+            self.tally.see(self._frames[2], 1.0, True, f"{where} everything moves twice as far as before and after")
+        if length == 0.0:
             self.tally.see(self._frames[2], 1.0, True, f"repeats frame {at.number - 2} although everything moves")
-
-    def result(self) -> CheckResult:
-        return super().result() if self.tally.failed_frames else self.passed()
 
 
 class Scale(FrameCheck):
@@ -97,23 +81,16 @@ class Scale(FrameCheck):
     name = "scale"
     good = "largest factor {worst} by which every side changes from frame to frame"
     bad = "every side changes by a factor of {worst} or more: is the unit another one?"
-
-    def begin(self) -> None:
-        triangles = self.scene.surfaces.triangles
-        # A thousand sides are enough to find a change of the unit.
-        self._sides = triangles[:: max(1, len(triangles) // 1000), :2]
-        self._last: NDArray[np.float64] | None = None
+    nothing = "there is one frame only"
 
     def see(self, at: Snapshot) -> None:
-        lengths = np.linalg.norm(at.points[self._sides[:, 0]] - at.points[self._sides[:, 1]], axis=1)
-        if self._last is not None:
-            known = (self._last > 0.0) & (lengths > 0.0)
-            ratios = lengths[known] / self._last[known] if known.any() else np.ones(1)
-            factor = max(1.0, float(ratios.min()), 1.0 / float(ratios.max()))
-            self.tally.see(at, factor, not factor < _LARGEST_FACTOR)
-        self._last = lengths
-
-    def result(self) -> CheckResult:
-        if self.tally.worst is None:
-            self.why_not = "there is one frame only"
-        return super().result()
+        if self.last is None:
+            return
+        triangles = self.of.surfaces.triangles
+        # A thousand sides are enough to find a change of the unit.
+        sides = triangles[:: max(1, len(triangles) // 1000), :2]
+        before, lengths = (np.linalg.norm(np.diff(of.points[sides], axis=1)[:, 0], axis=1) for of in (self.last, at))
+        known = (before > 0.0) & (lengths > 0.0)
+        ratios = lengths[known] / before[known] if known.any() else np.ones(1)
+        factor = max(1.0, float(ratios.min()), 1.0 / float(ratios.max()))
+        self.tally.see(at, factor, not factor < _LARGEST_FACTOR)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.materials.elastic import ELASTIC_MATERIALS, StableNeoHookean
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.orientation import volume_signs
 from supple.results.check.report import CheckResult
-from supple.results.check.snapshot import Snapshot, edge_vectors
-from supple.results.check.stored_energies import growth_of
+from supple.results.check.trajectory import Snapshot
 
 NEARLY_INCOMPRESSIBLE = 0.45
 GENEROUS_VOLUME_CHANGE = 0.5
@@ -34,21 +32,16 @@ class RestShape(FrameCheck):
     bad = "not a rest shape: {worst}"
 
     def begin(self) -> None:
-        recording = self.scene.recording
-        D = edge_vectors(recording.rest_positions, recording.tets)
-        volumes = np.einsum("ij,ij->i", D[:, :, 0], np.cross(D[:, :, 1], D[:, :, 2])) / 6.0
-        flat = volume_signs(recording.rest_positions, recording.tets) <= 0
-        if recording.quadratic is not None:
-            rows = recording.quadratic[0]
-            volumes[rows] = quadratic_tets.volumes(self.scene.quadratic_at_rest)
-            flat[rows] |= ~quadratic_tets.are_positive(self.scene.quadratic_at_rest)
+        of, volumes = self.of, self.of.rest_volumes
+        flat = volume_signs(of.rest_positions, of.tets) <= 0
+        flat[of.quadratic[0]] |= ~quadratic_tets.are_positive(of.quadratic_at_rest)
         bad = np.flatnonzero(flat)
         row = int(bad[0]) if len(bad) else int(np.argmin(volumes))
-        self.tally.see(None, volumes[row], len(bad) > 0, self.scene.name("tet", row))
-        light = np.flatnonzero(~(recording.masses > 0.0))
+        self.tally.see(None, volumes[row], len(bad) > 0, of.name("tet", row))
+        light = np.flatnonzero(~(of.masses > 0.0))
         if len(light):
             row = int(light[0])
-            text = f"{self.scene.name('vertex', row)} has a mass of {recording.masses[row]:.6g} kg"
+            text = f"{of.name('vertex', row)} has a mass of {of.masses[row]:.6g} kg"
             self.tally.see(None, volumes.min(), True, text)
 
 
@@ -68,7 +61,7 @@ class Inversion(FrameCheck):
         bad = np.flatnonzero(at.signs <= 0)
         J = np.where(np.isfinite(at.least_J), at.least_J, np.inf)
         row = int(bad[np.argmin(J[bad])]) if len(bad) else int(np.argmin(J))
-        self.tally.see(at, float(J[row]), len(bad) > 0, lambda: self.scene.name("tet", row))
+        self.tally.see(at, float(J[row]), len(bad) > 0, lambda: self.of.name("tet", row))
         if J[row] < NEARLY_FLAT:
             self._crushed.append(at.number)
 
@@ -90,20 +83,17 @@ class Volume(FrameCheck):
     bad = "changes by {worst} of a body's volume"
 
     def begin(self) -> None:
-        recording, closed = self.scene.recording, self.scene.surfaces.closed
-        bodies = recording.bodies
-        self._limits = [self._limit(k) for k in range(len(bodies))]
-        self._rest: NDArray[np.float64] | None = None
-        if not any(closed[k] or body.tets.stop > body.tets.start for k, body in enumerate(bodies)):
+        self._limits = [self._limit(k) for k in range(len(self.of.bodies))]
+        with_tets = [body.tets.stop > body.tets.start for body in self.of.bodies]
+        if not any(with_tets) and not any(self.of.surfaces.closed[: len(with_tets)]):
             self.why_not = "no part is closed or has tets"
 
     def _limit(self, number: int) -> float:
         if self.settings.max_volume_change is not None:
             return self.settings.max_volume_change
-        recording = self.scene.recording
-        if "material" not in recording.knows:
+        if "material" not in self.of.knows:
             return SMALL_VOLUME_CHANGE
-        material, tets = recording.material, recording.bodies[number].tets
+        material, tets = self.of.material, self.of.bodies[number].tets
         kinds, mu = material.kind[tets], material.mu[tets]
         if not ((kinds >= 0) & (kinds < len(ELASTIC_MATERIALS))).all():
             return np.inf
@@ -114,15 +104,9 @@ class Volume(FrameCheck):
         return GENEROUS_VOLUME_CHANGE if (poisson >= NEARLY_INCOMPRESSIBLE - 1e-9).all() else np.inf
 
     def see(self, at: Snapshot) -> None:
-        recording = self.scene.recording
-        if self._rest is None:  # of tets those at rest, of surfaces those of the first frame
-            sums = [float(recording.rest_volumes[body.tets].sum()) for body in recording.bodies]
-            self._rest = np.where(np.array(sums) != 0.0, sums, at.volumes)
-        for k, body in enumerate(recording.bodies):
-            rest = self._rest[k]
-            if at.active:
-                rest = float(recording.rest_volumes[body.tets] @ growth_of(at.active, len(at.J))[1][body.tets])
-            change = abs(at.volumes[k] / rest - 1.0)
+        stress_free, first = self.of.rest_volumes * at.growth[1], self.first or at
+        for k, body in enumerate(self.of.bodies):  # of surfaces, the volume of the first frame is that at rest
+            change = abs(at.volumes[k] / (float(stress_free[body.tets].sum()) or first.volumes[k]) - 1.0)
             if not np.isnan(change):
                 self.tally.see(at, change, not change <= self._limits[k], body.name)
 
@@ -136,10 +120,10 @@ class Rigidity(FrameCheck):
     bad = "a rigid body is deformed by {worst}"
 
     def begin(self) -> None:
-        rigid = [body for body in self.scene.recording.bodies if body.rigid]
+        rigid = [body for body in self.of.bodies if body.rigid]
         if not rigid:
             self.why_not = "the scene has no rigid body"
-        self._rest = [(body, body.points(self.scene.recording.rest_positions)) for body in rigid]
+        self._rest = [(body, body.points(self.of.rest_positions)) for body in rigid]
 
     def see(self, at: Snapshot) -> None:
         for body, rest in self._rest:

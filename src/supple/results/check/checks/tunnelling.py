@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.check.frame_check import FrameCheck
-from supple.results.check.geometry.passing_pairs import passing_pairs
+from supple.results.check.geometry.vectors import area_vectors
 from supple.results.check.report import CheckResult
-from supple.results.check.snapshot import Snapshot
+from supple.results.check.trajectory import Snapshot
 
-_MOST_PAIRS = 1000
 # Straight pieces of a smooth path from frame to frame.
 _PIECES = 8
 # When a path has its kink, as shares of the time between the frames.
@@ -26,20 +25,6 @@ _GOES_ON, _FRONTAL = 0.8, 0.7
 _HALVINGS = 12
 
 Floats = NDArray[np.float64]
-
-
-def passing_between(
-    before: Snapshot, x1: Floats, x0: Floats | None = None, allowed: NDArray[np.bool_] | None = None
-) -> tuple[int, NDArray[np.int64]]:
-    """How many pairs of triangles pass from a frame's points, or x0 instead, to x1, and the first (k, 2) of them.
-
-    allowed : (p, p) of which owners, instead of all that must stay apart
-    """
-    surfaces = before.scene.surfaces
-    out = np.zeros((_MOST_PAIRS, 2), dtype=np.int64)
-    shared = surfaces.triangles, surfaces.owners, surfaces.allowed if allowed is None else allowed, surfaces.ignored
-    count = passing_pairs(before.points if x0 is None else x0, x1, *shared, *before.tree[2:4], out)
-    return count, out[: min(count, _MOST_PAIRS)]
 
 
 def paths(before: Floats | None, first: Floats, last: Floats, after: Floats | None) -> Iterator[list[Floats]]:
@@ -81,10 +66,10 @@ class Tunnelling(FrameCheck):
     unit = "pairs"
     good = "nothing passes through anything between frames"
     bad = "triangles pass through each other between frames: {worst}"
+    nothing = "there is one frame only"
+    in_order = "what happens between frames is known"
 
     def begin(self) -> None:
-        if self.settings.every > 1:
-            self.why_not = "what happens between frames is known from one frame to the next only"
         self._frames: list[Snapshot] = []
         self._waiting: tuple[int, NDArray[np.int64]] | None = None
         self._cut: int | None = None
@@ -96,7 +81,8 @@ class Tunnelling(FrameCheck):
         self._judge(at)
         self._frames = [*self._frames[-2:], at]
         if len(self._frames) > 1:
-            count, pairs = passing_between(self._frames[-2], at.points)
+            before = self._frames[-2]
+            count, pairs = self.of.surfaces.pairs(before.tree, before.points, at.points)
             if count:
                 self._waiting = count, pairs
             else:
@@ -108,38 +94,29 @@ class Tunnelling(FrameCheck):
             return
         (count, pairs), self._waiting = self._waiting, None
         a, b = self._frames[-2:]
-        before = self._frames[-3].points if len(self._frames) > 2 else None
-        after = None if following is None else following.points
-        name = self.scene.surfaces.name_triangle
-        pairs = self._passing_on_all(pairs, before, (a, b), after)
+        pairs = self._passing_on_all(pairs, following)
         if len(pairs):
-            where = f"{name(int(pairs[0, 0]))} and {name(int(pairs[0, 1]))}, after frame {a.number}"
-            self.tally.see(b, count, True, where)
+            self.tally.see(b, count, True, f"{self.of.surfaces.name_pair(pairs)}, after frame {a.number}")
         else:
             self.tally.see(b, 0.0, False)
             self._cut = b.number if self._cut is None else self._cut
 
-    def _passing_on_all(
-        self, pairs: NDArray[np.int64], before: Floats | None, frames: tuple[Snapshot, Snapshot], after: Floats | None
-    ) -> NDArray[np.int64]:
+    def _passing_on_all(self, pairs: NDArray[np.int64], following: Snapshot | None) -> NDArray[np.int64]:
         """The pairs of straight paths whose owners pass through each other on every other path as well."""
-        owners = self.scene.surfaces.owners
-        first, last = frames
-        for path in paths(before, first.points, last.points, after):
+        owners = self.of.surfaces.owners
+        *before, first, last = [frame.points for frame in self._frames]
+        tree, after = self._frames[-2].tree, None if following is None else following.points
+        for path in paths(before[-1] if before else None, first, last, after):
             met = set()
-            for x0, x1 in pairwise([first.points, *path, last.points]):
-                met |= set(map(tuple, np.sort(owners[passing_between(first, x1, x0)[1]], axis=1).tolist()))
-            kept = [tuple(pair) in met for pair in np.sort(owners[pairs], axis=1).tolist()]
-            pairs = pairs[kept]
+            for x0, x1 in pairwise([first, *path, last]):
+                met |= set(map(tuple, np.sort(owners[self.of.surfaces.pairs(tree, x0, x1)[1]], axis=1).tolist()))
+            pairs = pairs[[tuple(pair) in met for pair in np.sort(owners[pairs], axis=1).tolist()]]
             if len(pairs) == 0:
                 break
         return pairs
 
     def result(self) -> CheckResult:
-        if self.why_not is None:
-            self._judge(None)
-            if self.tally.worst is None:
-                self.why_not = "there is one frame only"
+        self._judge(None)
         if self._cut is not None:
             self.good = f"{self.good}; straight paths cross before frame {self._cut}, others do not"
         return super().result()
@@ -159,27 +136,22 @@ class GoingOn(FrameCheck):
     unit = "pairs"
     good = "nothing passes through anything between frames"
     bad = "things pass through each other between frames and go on: {worst}"
-
-    def begin(self) -> None:
-        if self.settings.every > 1:
-            self.why_not = "what happens between frames is known from one frame to the next only"
-        self._last: Snapshot | None = None
+    in_order = "what happens between frames is known"
 
     def see(self, at: Snapshot) -> None:
-        before, self._last = self._last, at
+        before = self.last
         if before is None or at.number != before.number + 1:
             return
         passed = [pair for pair in self._through(before, at) if self._goes_on(before, at, pair)]
-        names = self.scene.surfaces.names
+        names = self.of.surfaces.names
         where = f"{names[passed[0][0]]} and {names[passed[0][1]]}, after frame {before.number}" if passed else ""
         self.tally.see(at, float(len(passed)), bool(passed), where)
 
     def _through(self, before: Snapshot, at: Snapshot) -> list[tuple[int, int]]:
         """The owners that pass on the straight way, of those that are fast."""
-        surfaces = self.scene.surfaces
+        surfaces = self.of.surfaces
         p, triangles, owners = len(surfaces.names), surfaces.triangles, surfaces.owners
-        a, b, c = before.points[triangles].transpose(1, 0, 2)
-        areas = 0.5 * np.cross(b - a, c - a)
+        a, areas = before.points[triangles[:, 0]], area_vectors(before.points, triangles)
         moved = (at.points - before.points)[triangles].mean(axis=1)
         sizes = np.maximum(np.bincount(owners, minlength=p), 1)
         means = np.stack([np.bincount(owners, column, p) for column in moved.T], axis=1) / sizes[:, None]
@@ -193,17 +165,17 @@ class GoingOn(FrameCheck):
         np.fill_diagonal(fast, False)
         if not fast.any():
             return []
-        pairs = owners[passing_between(before, at.points, allowed=fast)[1]]
+        pairs = owners[surfaces.pairs(before.tree, before.points, at.points, fast)[1]]
         return [(int(one), int(other)) for one, other in np.unique(np.sort(pairs, axis=1), axis=0)]
 
     def _goes_on(self, before: Snapshot, at: Snapshot, pair: tuple[int, int]) -> bool:
-        surfaces, dt = self.scene.surfaces, at.time - before.time
+        surfaces, dt = self.of.surfaces, at.time - before.time
         only = np.zeros_like(surfaces.allowed)
         only[pair] = only[pair[::-1]] = True
         v0, v1 = (self._velocities(before, at, frame) for frame in (before, at))
 
         def met(share: float) -> NDArray[np.int64]:
-            return passing_between(before, before.points + share * dt * v0, allowed=only)[1]
+            return surfaces.pairs(before.tree, before.points, before.points + share * dt * v0, only)[1]
 
         low, high = 0.0, 1.0
         if not len(met(high)):
@@ -216,8 +188,7 @@ class GoingOn(FrameCheck):
         first = np.where((surfaces.owners[first[:, 0]] == pair[0])[:, None], first, first[:, ::-1])
         x = before.points + high * dt * v0
         for sign, rows in ((1.0, first[:, 1]), (-1.0, first[:, 0])):
-            a, b, c = x[surfaces.triangles[rows]].transpose(1, 0, 2)
-            normals = np.cross(b - a, c - a)
+            normals = area_vectors(x, surfaces.triangles[rows])
             n += sign * (normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]).sum(axis=0)
         n /= max(float(np.linalg.norm(n)), 1e-300)
         for v in (v0, v1):
@@ -228,6 +199,6 @@ class GoingOn(FrameCheck):
 
     def _velocities(self, before: Snapshot, at: Snapshot, frame: Snapshot) -> Floats:
         """(n, 3) of all points in one of two frames; those of obstacles are what takes them from one to the other."""
-        place, v = self.scene.surfaces.place, (at.points - before.points) / (at.time - before.time)
+        place, v = self.of.surfaces.place, (at.points - before.points) / (at.time - before.time)
         of_bodies = place(np.ones_like(frame.positions), np.zeros_like(frame.poses))[:, :1] == 1.0
         return np.where(of_bodies, place(frame.velocities, np.zeros_like(frame.poses)), v)

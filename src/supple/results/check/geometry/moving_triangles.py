@@ -11,7 +11,7 @@ Source: Farin, "Curves and Surfaces for CAGD" (Bernstein polynomials); the tests
 
 import numpy as np
 
-from supple.results.check.geometry.triangle_distance import point_triangle, segment_segment
+from supple.results.check.geometry.triangle_distance import cross, dot, minus, point_triangle, segment_segment
 from supple.results.check.geometry.triangle_pairs import triangles_meet
 from supple.runtime.kernel_cache import njit
 
@@ -20,56 +20,47 @@ _EPSILON, _NEAR = 2.0**-52, 1e-8
 
 
 @njit(forceinline=False)
-def _cross(u, v):
-    return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+def _row(x, a):
+    return (x[a, 0], x[a, 1], x[a, 2])
 
 
 @njit(forceinline=False)
-def _dot(u, v):
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+def _mixed(u, v, t):
+    s = 1.0 - t
+    return (s * u[0] + t * v[0], s * u[1] + t * v[1], s * u[2] + t * v[2])
 
 
 @njit(forceinline=False)
 def _between(x0, x1, a, b, t):
     """x_b - x_a at time t."""
-    s = 1.0 - t
-    return (
-        s * (x0[b, 0] - x0[a, 0]) + t * (x1[b, 0] - x1[a, 0]),
-        s * (x0[b, 1] - x0[a, 1]) + t * (x1[b, 1] - x1[a, 1]),
-        s * (x0[b, 2] - x0[a, 2]) + t * (x1[b, 2] - x1[a, 2]),
-    )
+    return _mixed(minus(_row(x0, b), _row(x0, a)), minus(_row(x1, b), _row(x1, a)), t)
 
 
 @njit(forceinline=False)
 def _normal(u0, v0, u1, v1):
     """Coefficients of u x v for u, v that are linear in time."""
-    m, n = _cross(u0, v1), _cross(u1, v0)
-    return _cross(u0, v0), (0.5 * (m[0] + n[0]), 0.5 * (m[1] + n[1]), 0.5 * (m[2] + n[2])), _cross(u1, v1)
+    return cross(u0, v0), _mixed(cross(u0, v1), cross(u1, v0), 0.5), cross(u1, v1)
 
 
 @njit(forceinline=False)
 def _range(m, n):
     """Smallest and largest coefficient of m . n, both of second degree."""
-    a = _dot(m[0], n[0])
-    b = 0.5 * (_dot(m[0], n[1]) + _dot(m[1], n[0]))
-    c = (_dot(m[0], n[2]) + 4.0 * _dot(m[1], n[1]) + _dot(m[2], n[0])) / 6.0
-    d = 0.5 * (_dot(m[1], n[2]) + _dot(m[2], n[1]))
-    e = _dot(m[2], n[2])
+    a = dot(m[0], n[0])
+    b = 0.5 * (dot(m[0], n[1]) + dot(m[1], n[0]))
+    c = (dot(m[0], n[2]) + 4.0 * dot(m[1], n[1]) + dot(m[2], n[0])) / 6.0
+    d = 0.5 * (dot(m[1], n[2]) + dot(m[2], n[1]))
+    e = dot(m[2], n[2])
     return min(a, b, c, d, e), max(a, b, c, d, e)
 
 
 @njit(forceinline=False)
-def _size(u0, u1):
-    return max(abs(u0[0]), abs(u0[1]), abs(u0[2]), abs(u1[0]), abs(u1[1]), abs(u1[2]))
+def _size(u, v):
+    return max(abs(u[0]), abs(u[1]), abs(u[2]), abs(v[0]), abs(v[1]), abs(v[2]))
 
 
 @njit(forceinline=False)
-def _minus(m, n):
-    return (
-        (m[0][0] - n[0][0], m[0][1] - n[0][1], m[0][2] - n[0][2]),
-        (m[1][0] - n[1][0], m[1][1] - n[1][1], m[1][2] - n[1][2]),
-        (m[2][0] - n[2][0], m[2][1] - n[2][1], m[2][2] - n[2][2]),
-    )
+def _less(m, n):
+    return minus(m[0], n[0]), minus(m[1], n[1]), minus(m[2], n[2])
 
 
 @njit(forceinline=False)
@@ -80,57 +71,43 @@ def _state(x0, x1, four, sides, begin, end, largest):
     four : the corner and the triangle's corners, or the ends of two sides; sides : which of the two
     """
     a, b, c, d = four
-    if sides:  # u and v along the sides, w between them
-        u0, u1 = _between(x0, x1, a, b, begin), _between(x0, x1, a, b, end)
-        v0, v1 = _between(x0, x1, c, d, begin), _between(x0, x1, c, d, end)
-        w0, w1 = _between(x0, x1, a, c, begin), _between(x0, x1, a, c, end)
-    else:  # u and v along the triangle b, c, d, w from it to the corner a
-        u0, u1 = _between(x0, x1, b, c, begin), _between(x0, x1, b, c, end)
-        v0, v1 = _between(x0, x1, b, d, begin), _between(x0, x1, b, d, end)
-        w0, w1 = _between(x0, x1, b, a, begin), _between(x0, x1, b, a, end)
+    # u and v along the sides, w between them; or u and v along the triangle b, c, d, w from it to the corner a.
+    p, q, r, s, other = (a, b, c, d, c) if sides else (b, c, b, d, a)
+    u0, u1 = _between(x0, x1, p, q, begin), _between(x0, x1, p, q, end)
+    v0, v1 = _between(x0, x1, r, s, begin), _between(x0, x1, r, s, end)
+    w0, w1 = _between(x0, x1, p, other, begin), _between(x0, x1, p, other, end)
     n = _normal(u0, v0, u1, v1)
     size = max(_size(u0, u1), _size(v0, v1), _size(w0, w1))
     error = 32.0 * _EPSILON * size * size * (size + largest)
-    first, last = _dot(n[0], w0), _dot(n[2], w1)
-    second = (2.0 * _dot(n[1], w0) + _dot(n[0], w1)) / 3.0
-    third = (_dot(n[2], w0) + 2.0 * _dot(n[1], w1)) / 3.0
+    first, last = dot(n[0], w0), dot(n[2], w1)
+    second = (2.0 * dot(n[1], w0) + dot(n[0], w1)) / 3.0
+    third = (dot(n[2], w0) + 2.0 * dot(n[1], w1)) / 3.0
     lowest, highest = min(first, second, third, last), max(first, second, third, last)
     if lowest > error or highest < -error or (lowest >= -error and highest <= error):  # or in one plane all the time
         return 0
-    # Shares along u and v of the place, times |n|^2.
-    along_u, along_v = _normal(w0, v0, w1, v1), _normal(u0, w0, u1, w1)
-    if sides:
-        along_v = _normal(w0, u0, w1, u1)
+    # Shares along u and v of the place, times |n|^2, and what is left of each, or of both.
+    along_u = _normal(w0, v0, w1, v1)
+    along_v = _normal(w0, u0, w1, u1) if sides else _normal(u0, w0, u1, w1)
+    rest_u = _less(n, along_u)
+    rest_v = _less(n, along_v) if sides else _less(rest_u, along_v)
     error_4 = 64.0 * _EPSILON * size * size * size * (size + largest)
-    p_low, p_high = _range(along_u, n)
-    q_low, q_high = _range(along_v, n)
-    if p_high < -error_4 or q_high < -error_4:
-        return 0
-    if sides:
-        r_low, r_high = _range(_minus(n, along_u), n)
-        s_low, s_high = _range(_minus(n, along_v), n)
-    else:
-        r_low, r_high = _range(_minus(_minus(n, along_u), along_v), n)
-        s_low, s_high = r_low, r_high
-    if r_high < -error_4 or s_high < -error_4:
-        return 0
+    inside = True
+    for share in (along_u, along_v, rest_u if sides else rest_v, rest_v):
+        low, high = _range(share, n)
+        if high < -error_4:
+            return 0
+        inside = inside and low > error_4
     over = (first > error and last < -error) or (first < -error and last > error)
-    if over and min(p_low, q_low, r_low, s_low) > error_4:
+    if over and inside:
         return 1
     return 3 if over else 2
 
 
 @njit(forceinline=False)
-def _at(x0, x1, a, t):
-    s = 1.0 - t
-    return (s * x0[a, 0] + t * x1[a, 0], s * x0[a, 1] + t * x1[a, 1], s * x0[a, 2] + t * x1[a, 2])
-
-
-@njit(forceinline=False)
 def _apart(x0, x1, four, sides, t):
     """Squared distance of the corner and the triangle, or of the two sides, at time t."""
-    a, b = _at(x0, x1, four[0], t), _at(x0, x1, four[1], t)
-    c, d = _at(x0, x1, four[2], t), _at(x0, x1, four[3], t)
+    a, b = _mixed(_row(x0, four[0]), _row(x1, four[0]), t), _mixed(_row(x0, four[1]), _row(x1, four[1]), t)
+    c, d = _mixed(_row(x0, four[2]), _row(x1, four[2]), t), _mixed(_row(x0, four[3]), _row(x1, four[3]), t)
     return segment_segment(a, b, c, d) if sides else point_triangle(a, b, c, d)
 
 
@@ -173,24 +150,25 @@ def _is_in(row, t):
 
 
 @njit(forceinline=False)
-def triangles_pass(x0, x1, s, t):
-    """Whether two triangles, three rows each, pass through each other between x0 and x1, where they do not meet."""
-    passing = False
+def _corners_or_sides_pass(x0, x1, s, t):
     for i in range(3):
         if not _is_in(s[i], t) and points_pass(x0, x1, (s[i], t[0], t[1], t[2]), False):
-            passing = True
-            break
+            return True
         if not _is_in(t[i], s) and points_pass(x0, x1, (t[i], s[0], s[1], s[2]), False):
-            passing = True
-            break
+            return True
         a, b = s[i], s[(i + 1) % 3]
         if _is_in(a, t) or _is_in(b, t):
             continue
         for j in range(3):
             c, d = t[j], t[(j + 1) % 3]
             if not _is_in(c, s) and not _is_in(d, s) and points_pass(x0, x1, (a, b, c, d), True):
-                passing = True
-                break
-        if passing:
-            break
-    return passing and not triangles_meet(x0, s, t) and not triangles_meet(x1, s, t)
+                return True
+    return False
+
+
+@njit(forceinline=False)
+def triangles_pass(x0, x1, s, t):
+    """Whether two triangles, three rows each, pass through each other between x0 and x1, where they do not meet."""
+    if not _corners_or_sides_pass(x0, x1, s, t):
+        return False
+    return not triangles_meet(x0, s, t) and not triangles_meet(x1, s, t)

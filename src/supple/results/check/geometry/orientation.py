@@ -3,7 +3,12 @@
 First in floating point, with a bound of the rounding error; where the sign is in doubt, without rounding. Points are
 rows of an array x (n, 3).
 
-Source: Shewchuk (1997), section 4: the filters' bounds are those of ORIENT3D and ORIENT2D, stage A.
+Numbers without rounding are nonoverlapping expansions: sums of floats that do not overlap, smallest first, in an array
+h[:n]; the sign is that of the last one. Exact as long as nothing under- or overflows, which `SMALLEST` and `LARGEST`
+make sure of; beyond them, rational numbers decide.
+
+Source: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates" (1997): sections
+2.2 to 2.5; section 4 for the filters' bounds, those of ORIENT3D and ORIENT2D, stage A.
 """
 
 from __future__ import annotations
@@ -13,7 +18,6 @@ from fractions import Fraction
 import numpy as np
 from numba import objmode
 
-from supple.results.check.geometry.exact_sums import add_product2, add_product3, in_range, sign_of, two_sum
 from supple.runtime.kernel_cache import njit
 
 _EPSILON = 2.0**-53
@@ -23,6 +27,80 @@ _BOUND_2 = (3.0 + 16.0 * _EPSILON) * _EPSILON
 _BOUND_DOT = 8.0 * _EPSILON
 # The bounds hold where nothing underflows; what is smaller than this is decided without rounding.
 _TINY = 1e-200
+_SPLITTER = 134217729.0  # 2^27 + 1
+# Coordinates within these, or zero, have differences, and threefold products of them, that float64 can hold exactly:
+# their last bits are above 2^-354, so those of the products above 2^-1062.
+SMALLEST, LARGEST = 2.0**-300, 2.0**300
+_PARTS = 32  # of a threefold product of differences
+
+
+@njit(forceinline=False)
+def _two_sum(a, b):
+    """a + b as the rounded sum and its error (theorem 7)."""
+    s = a + b
+    bb = s - a
+    return s, (a - (s - bb)) + (b - bb)
+
+
+@njit(forceinline=False)
+def _two_product(a, b):
+    """a b as the rounded product and its error (theorem 18)."""
+    p = a * b
+    c = _SPLITTER * a
+    ah = c - (c - a)
+    al = a - ah
+    c = _SPLITTER * b
+    bh = c - (c - b)
+    bl = b - bh
+    return p, al * bl - (((p - ah * bh) - al * bh) - ah * bl)
+
+
+@njit(forceinline=False)
+def _grow(h, n, b):
+    """Add b to the expansion h[:n] in place, without zeros; the new length (theorem 10)."""
+    q = b
+    k = 0
+    for i in range(n):
+        q, e = _two_sum(q, h[i])
+        if e != 0.0:
+            h[k] = e
+            k += 1
+    if q != 0.0:
+        h[k] = q
+        k += 1
+    return k
+
+
+@njit(nogil=False, forceinline=False)
+def exact_sign(p, q):
+    """-1, 0 or 1: the sign of the sum of the products of each row of p - q, for p, q (k, 3)."""
+    for k in range(len(p)):
+        for j in range(3):
+            for a in (abs(p[k, j]), abs(q[k, j])):
+                if a != 0.0 and not SMALLEST <= a <= LARGEST:
+                    with objmode(sign="int64"):
+                        sign = rational_sign(p, q)
+                    return sign
+    h, n = np.empty(_PARTS * len(p) + 1), 0
+    for k in range(len(p)):
+        first, second = _two_sum(p[k, 0], -q[k, 0]), _two_sum(p[k, 1], -q[k, 1])
+        for a in first:
+            for b in second:
+                for c in _two_product(a, b):
+                    for d in _two_sum(p[k, 2], -q[k, 2]):
+                        if c != 0.0 and d != 0.0:
+                            rounded, error = _two_product(c, d)
+                            n = _grow(h, _grow(h, n, error), rounded)
+    return 0 if n == 0 else 1 if h[n - 1] > 0.0 else -1
+
+
+def rational_sign(p: np.ndarray, q: np.ndarray) -> int:
+    """`exact_sign` in rational arithmetic: slow, and without a range."""
+    total = Fraction(0)
+    for row in zip(p.tolist(), q.tolist(), strict=True):
+        a, b, c = (Fraction(high) - Fraction(low) for high, low in zip(*row, strict=True))
+        total += a * b * c
+    return (total > 0) - (total < 0)
 
 
 @njit(cache=True, nogil=False)
@@ -46,27 +124,16 @@ def volume_sign(x, a, b, c, d):
         return 0
     if bz == 0.0 and cz == 0.0 and dz == 0.0:
         return 0
-    return _exact_volume_sign(x, a, b, c, d)
-
-
-@njit(nogil=False, forceinline=False)
-def _exact_volume_sign(x, a, b, c, d):
-    for k in range(3):
-        if not (in_range(x[a, k]) and in_range(x[b, k]) and in_range(x[c, k]) and in_range(x[d, k])):
-            with objmode(sign="int64"):
-                sign = rational_volume_sign(x[a], x[b], x[c], x[d])
-            return sign
-    bx, by, bz = two_sum(x[b, 0], -x[a, 0]), two_sum(x[b, 1], -x[a, 1]), two_sum(x[b, 2], -x[a, 2])
-    cx, cy, cz = two_sum(x[c, 0], -x[a, 0]), two_sum(x[c, 1], -x[a, 1]), two_sum(x[c, 2], -x[a, 2])
-    dx, dy, dz = two_sum(x[d, 0], -x[a, 0]), two_sum(x[d, 1], -x[a, 1]), two_sum(x[d, 2], -x[a, 2])
-    h = np.empty(200)
-    n = add_product3(h, 0, 1.0, cx, dy, bz)
-    n = add_product3(h, n, -1.0, dx, cy, bz)
-    n = add_product3(h, n, 1.0, dx, by, cz)
-    n = add_product3(h, n, -1.0, bx, dy, cz)
-    n = add_product3(h, n, 1.0, bx, cy, dz)
-    n = add_product3(h, n, -1.0, cx, by, dz)
-    return sign_of(h, n)
+    p, q, k = np.empty((6, 3)), np.empty((6, 3)), 0
+    for i, j in ((c, d), (d, b), (b, c)):
+        last = b + c + d - i - j
+        p[k, 0], q[k, 0] = x[i, 0], x[a, 0]
+        p[k, 1], q[k, 1] = x[j, 1], x[a, 1]
+        p[k + 1, 0], q[k + 1, 0] = x[a, 0], x[j, 0]  # the other order of both has the other sign
+        p[k + 1, 1], q[k + 1, 1] = x[i, 1], x[a, 1]
+        p[k : k + 2, 2], q[k : k + 2, 2] = x[last, 2], x[a, 2]
+        k += 2
+    return exact_sign(p, q)
 
 
 @njit(cache=True, nogil=False)
@@ -80,15 +147,8 @@ def area_sign(x, a, b, c, i, j):
         return 1
     if -det > size:
         return -1
-    for k in (i, j):
-        if not (in_range(x[a, k]) and in_range(x[b, k]) and in_range(x[c, k])):
-            with objmode(sign="int64"):
-                sign = rational_area_sign(x[a], x[b], x[c], i, j)
-            return sign
-    h = np.empty(20)
-    n = add_product2(h, 0, 1.0, two_sum(x[b, i], -x[a, i]), two_sum(x[c, j], -x[a, j]))
-    n = add_product2(h, n, -1.0, two_sum(x[b, j], -x[a, j]), two_sum(x[c, i], -x[a, i]))
-    return sign_of(h, n)
+    p = np.array([[x[b, i], x[c, j], 1.0], [x[a, j], x[c, i], 1.0]])
+    return exact_sign(p, np.array([[x[a, i], x[a, j], 0.0], [x[b, j], x[a, i], 0.0]]))
 
 
 @njit(nogil=False, forceinline=False)
@@ -104,16 +164,9 @@ def plane_side(x, a, point, normal):
         return 1
     if -dot > size:
         return -1
-    for k in range(3):
-        if not (in_range(x[a, k]) and in_range(point[k]) and in_range(normal[k])):
-            with objmode(sign="int64"):
-                sign = rational_plane_side(x[a], point, normal)
-            return sign
-    h = np.empty(20)
-    n = 0
-    for k in range(3):
-        n = add_product2(h, n, 1.0, two_sum(x[a, k], -point[k]), (normal[k], 0.0))
-    return sign_of(h, n)
+    p, q = np.ones((3, 3)), np.zeros((3, 3))
+    p[:, 0], p[:, 1], q[:, 0] = x[a], normal, point
+    return exact_sign(p, q)
 
 
 @njit(cache=True, nogil=False)
@@ -132,30 +185,3 @@ def plane_sides(x, rows, point, normal):
     for k in range(len(rows)):
         out[k] = plane_side(x, rows[k], point, normal)
     return out
-
-
-def _differences(a: np.ndarray, b: np.ndarray) -> list[Fraction]:
-    return [Fraction(float(p)) - Fraction(float(q)) for p, q in zip(a, b, strict=True)]
-
-
-def _sign(value: Fraction) -> int:
-    return (value > 0) - (value < 0)
-
-
-def rational_volume_sign(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> int:
-    """`volume_sign` of four points (3,) in rational arithmetic: slow, and without a range."""
-    u, v, w = _differences(b, a), _differences(c, a), _differences(d, a)
-    cross = (v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0])
-    return _sign(u[0] * cross[0] + u[1] * cross[1] + u[2] * cross[2])
-
-
-def rational_area_sign(a: np.ndarray, b: np.ndarray, c: np.ndarray, i: int, j: int) -> int:
-    """`area_sign` of three points (3,) in rational arithmetic."""
-    u, v = _differences(b, a), _differences(c, a)
-    return _sign(u[i] * v[j] - u[j] * v[i])
-
-
-def rational_plane_side(x: np.ndarray, point: np.ndarray, normal: np.ndarray) -> int:
-    """`plane_side` of a point (3,) in rational arithmetic."""
-    terms = (d * Fraction(float(n)) for d, n in zip(_differences(x, point), normal, strict=True))
-    return _sign(sum(terms, Fraction(0)))

@@ -6,68 +6,64 @@ from supple.runtime.kernel_cache import njit
 
 
 @njit(forceinline=False)
-def _dot(u, v):
+def dot(u, v):
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
 @njit(forceinline=False)
-def _minus(u, v):
+def minus(u, v):
     return (u[0] - v[0], u[1] - v[1], u[2] - v[2])
 
 
 @njit(forceinline=False)
-def _cross(u, v):
+def cross(u, v):
     return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
 
 
 @njit(forceinline=False)
 def _along(p, a, ab, t):
     d = (a[0] + t * ab[0] - p[0], a[1] + t * ab[1] - p[1], a[2] + t * ab[2] - p[2])
-    return _dot(d, d)
+    return dot(d, d)
 
 
 @njit(forceinline=False)
 def point_segment(p, a, b):
     """Squared distance of a point and a segment."""
-    ab, ap = _minus(b, a), _minus(p, a)
-    length = _dot(ab, ab)
-    t = 0.0 if length == 0.0 else min(1.0, max(0.0, _dot(ap, ab) / length))
+    ab, ap = minus(b, a), minus(p, a)
+    length = dot(ab, ab)
+    t = 0.0 if length == 0.0 else min(1.0, max(0.0, dot(ap, ab) / length))
     return _along(p, a, ab, t)
 
 
 @njit(forceinline=False)
 def point_triangle(p, a, b, c):
     """Squared distance of a point and a triangle."""
-    ab, ac, ap = _minus(b, a), _minus(c, a), _minus(p, a)
-    n = _cross(ab, ac)
-    size = _dot(n, n)
+    ab, ac, ap = minus(b, a), minus(c, a), minus(p, a)
+    n = cross(ab, ac)
+    size = dot(n, n)
     best = min(point_segment(p, a, b), point_segment(p, b, c), point_segment(p, c, a))
     if size > 0.0:
-        v, w = _dot(_cross(ap, ac), n) / size, _dot(_cross(ab, ap), n) / size
+        v, w = dot(cross(ap, ac), n) / size, dot(cross(ab, ap), n) / size
         if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
             # The way to the foot, however badly a sliver defines it, is never shorter than the distance.
-            d = (
-                v * ab[0] + w * ac[0] - ap[0],
-                v * ab[1] + w * ac[1] - ap[1],
-                v * ab[2] + w * ac[2] - ap[2],
-            )
-            best = min(best, _dot(d, d))
+            d = (v * ab[0] + w * ac[0] - ap[0], v * ab[1] + w * ac[1] - ap[1], v * ab[2] + w * ac[2] - ap[2])
+            best = min(best, dot(d, d))
     return best
 
 
 @njit(forceinline=False)
 def segment_segment(p, q, a, b):
     """Squared distance of two segments."""
-    u, v, r = _minus(q, p), _minus(b, a), _minus(a, p)
-    n = _cross(u, v)
-    size = _dot(n, n)
+    u, v, r = minus(q, p), minus(b, a), minus(a, p)
+    n = cross(u, v)
+    size = dot(n, n)
     best = min(point_segment(p, a, b), point_segment(q, a, b), point_segment(a, p, q), point_segment(b, p, q))
     if size > 0.0:
         # The feet of the common perpendicular, where both lie within the segments.
-        s, t = _dot(_cross(r, v), n) / size, _dot(_cross(r, u), n) / size
+        s, t = dot(cross(r, v), n) / size, dot(cross(r, u), n) / size
         if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
             d = (r[0] + t * v[0] - s * u[0], r[1] + t * v[1] - s * u[1], r[2] + t * v[2] - s * u[2])
-            best = min(best, _dot(d, d))
+            best = min(best, dot(d, d))
     return best
 
 

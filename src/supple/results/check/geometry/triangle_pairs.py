@@ -35,11 +35,10 @@ def _point_in_flat_triangle(x, p, a, b, c, i, j, sign):
 def _flat_segments_meet(x, p, q, a, b, i, j):
     """Whether two segments in a plane have a point in common, one that no end decides: collinear ones do not count,
     as an end of one lies in the other then."""
-    return (
-        area_sign(x, p, q, a, i, j) * area_sign(x, p, q, b, i, j) <= 0
-        and area_sign(x, a, b, p, i, j) * area_sign(x, a, b, q, i, j) <= 0
-        and not (area_sign(x, p, q, a, i, j) == 0 and area_sign(x, p, q, b, i, j) == 0)
-    )
+    at_a, at_b = area_sign(x, p, q, a, i, j), area_sign(x, p, q, b, i, j)
+    if at_a * at_b > 0 or (at_a == 0 and at_b == 0):
+        return False
+    return area_sign(x, a, b, p, i, j) * area_sign(x, a, b, q, i, j) <= 0
 
 
 @njit(forceinline=False)
@@ -68,64 +67,58 @@ def segment_meets_triangle(x, p, q, a, b, c):
 
 
 @njit(forceinline=False)
-def _one_side(x, a, b, c, p, q, r):
-    """Whether p, q, r are all strictly on one side of the plane of a, b, c."""
-    sign = volume_sign(x, a, b, c, p)
-    return sign != 0 and volume_sign(x, a, b, c, q) == sign and volume_sign(x, a, b, c, r) == sign
+def _one_side(x, s, t):
+    """Whether the corners of t are all strictly on one side of the plane of s."""
+    sign = volume_sign(x, s[0], s[1], s[2], t[0])
+    return sign != 0 and volume_sign(x, s[0], s[1], s[2], t[1]) == sign == volume_sign(x, s[0], s[1], s[2], t[2])
 
 
 @njit(forceinline=False)
-def _strangers_meet(x, a, b, c, p, q, r):
-    if _one_side(x, a, b, c, p, q, r) or _one_side(x, p, q, r, a, b, c):
+def _strangers_meet(x, s, t):
+    if _one_side(x, s, t) or _one_side(x, t, s):
         return False
-    return (
-        segment_meets_triangle(x, p, q, a, b, c)
-        or segment_meets_triangle(x, q, r, a, b, c)
-        or segment_meets_triangle(x, r, p, a, b, c)
-        or segment_meets_triangle(x, a, b, p, q, r)
-        or segment_meets_triangle(x, b, c, p, q, r)
-        or segment_meets_triangle(x, c, a, p, q, r)
-    )
+    for k in range(3):
+        if segment_meets_triangle(x, s[k], s[(k + 1) % 3], t[0], t[1], t[2]):
+            return True
+        if segment_meets_triangle(x, t[k], t[(k + 1) % 3], s[0], s[1], s[2]):
+            return True
+    return False
 
 
 @njit(forceinline=False)
-def _common_corner(s, t):
-    """Of two triangles with one common corner: that one, and the opposite sides (c, a, b, p, q)."""
+def _corner(s, t, common):
+    """Which corner of s is the first that is a corner of t, or that is not."""
+    for k in range(3):
+        if (s[k] == t[0] or s[k] == t[1] or s[k] == t[2]) == common:
+            return k
+    return 0
+
+
+@njit(forceinline=False)
+def shared_corners(s, t):
+    """How many corners two triangles have in common."""
+    shared = 0
     for i in range(3):
         for j in range(3):
-            if s[i] == t[j]:
-                return s[i], s[(i + 1) % 3], s[(i + 2) % 3], t[(j + 1) % 3], t[(j + 2) % 3]
-    return s[0], s[1], s[2], t[1], t[2]
-
-
-@njit(forceinline=False)
-def _folded(x, s, t):
-    """Whether two triangles with a common side lie on each other."""
-    k = 0  # the corner of s that is not common
-    while s[k] == t[0] or s[k] == t[1] or s[k] == t[2]:
-        k += 1
-    m = 0
-    while t[m] == s[0] or t[m] == s[1] or t[m] == s[2]:
-        m += 1
-    a, b = s[(k + 1) % 3], s[(k + 2) % 3]
-    if volume_sign(x, a, b, s[k], t[m]) != 0:
-        return False
-    i, j, sign = _visible_axes(x, a, b, s[k])
-    return sign != 0 and area_sign(x, a, b, t[m], i, j) == sign
+            shared += s[i] == t[j]
+    return shared
 
 
 @njit(forceinline=False)
 def triangles_meet(x, s, t):
     """Whether two triangles, three rows of x each, have more in common than the corners and sides that they share."""
-    shared = 0
-    for i in range(3):
-        for j in range(3):
-            shared += s[i] == t[j]
+    shared = shared_corners(s, t)
     if shared == 0:
-        return _strangers_meet(x, s[0], s[1], s[2], t[0], t[1], t[2])
+        return _strangers_meet(x, s, t)
+    if shared == 3:
+        return True
+    i, j = _corner(s, t, shared == 1), _corner(t, s, shared == 1)
+    a, b, c = s[(i + 1) % 3], s[(i + 2) % 3], s[i]
     if shared == 1:
-        c, a, b, p, q = _common_corner(s, t)
+        p, q = t[(j + 1) % 3], t[(j + 2) % 3]
         return segment_meets_triangle(x, a, b, c, p, q) or segment_meets_triangle(x, p, q, c, a, b)
-    if shared == 2:
-        return _folded(x, s, t)
-    return True
+    # Whether they are folded onto each other along their common side a, b.
+    if volume_sign(x, a, b, c, t[j]) != 0:
+        return False
+    k, m, sign = _visible_axes(x, a, b, c)
+    return sign != 0 and area_sign(x, a, b, t[j], k, m) == sign
