@@ -13,6 +13,7 @@ import pytest
 from tests import same_examples  # noqa: F401 - it sets hypothesis up
 from tests.forked_children import forked_children
 
+from supple.errors import SuppleError
 from supple.mesh.io import in_child
 from supple.mesh.meshing import child_process
 from supple.results.export import video
@@ -32,6 +33,19 @@ _FLAGS = (
 @pytest.fixture(scope="session", autouse=True)
 def _forks() -> Iterator[None]:
     with forked_children():
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _errors_are_one_line() -> Iterator[None]:
+    """All that tests raise, with or without a look at the text."""
+
+    def checked(error: SuppleError, *arguments: object) -> None:
+        assert "\n" not in "".join(map(str, arguments)), arguments
+        Exception.__init__(error, *arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SuppleError, "__init__", checked)
         yield
 
 

@@ -63,7 +63,7 @@ def test_06_random_search_improves_the_reward_of_a_controller():
         warnings.filterwarnings("ignore", message=".*observation space m.*imum value is -?infinity")
         warnings.filterwarnings("ignore", category=sp.SuppleWarning)
         pytest.importorskip("gymnasium.utils.env_checker").check_env(make(), skip_render_check=True)
-    rewards = module.main(3, make, gymnasium.vector.SyncVectorEnv)
+    rewards = module.main(2, make, gymnasium.vector.SyncVectorEnv)
     assert rewards == sorted(rewards), "the best one is kept"
     assert rewards[0] < -0.2, "without forces, the tip hangs beside the goal"
     assert rewards[-1] > 0.7 * rewards[0], "on the average of the way, it is much nearer"
@@ -73,7 +73,9 @@ def test_07_rigid_jaws_carry_a_soft_cube_by_friction():
     assert run_example("07") == pytest.approx(1.0, rel=0.01)
 
 
-@pytest.mark.parametrize("solver", [sp.XPBD(substeps=80), sp.Implicit()], ids=["xpbd", "implicit"])
+@pytest.mark.parametrize(
+    "solver", [pytest.param(sp.XPBD(substeps=80), marks=pytest.mark.slow), sp.Implicit()], ids=["xpbd", "implicit"]
+)
 def test_08_a_quilt_rests_in_its_static_shape(solver):
     found = run_example("08", solver, 80, bar_cells=(8, 1, 2), patch_cells=(6, 1, 2), ramp=1.0)
     assert found["deflection"] > 0.05
@@ -96,7 +98,9 @@ def test_10_a_press_on_foam_feels_the_force_of_the_closed_form():
     assert found["stretch"] < 0.61
 
 
-@pytest.mark.parametrize("solver", [sp.XPBD(), sp.Implicit(contact=None)], ids=["xpbd", "implicit"])
+@pytest.mark.parametrize(
+    "solver", [pytest.param(sp.XPBD(), marks=pytest.mark.slow), sp.Implicit(contact=None)], ids=["xpbd", "implicit"]
+)
 def test_11_a_held_muscle_pulls_with_activation_times_strength_times_area(solver):
     found = run_example("11", solver)
     assert found["error"] < 0.01
@@ -104,7 +108,9 @@ def test_11_a_held_muscle_pulls_with_activation_times_strength_times_area(solver
     assert found["shortest"] < 0.85
 
 
-@pytest.mark.parametrize("solver", [sp.XPBD(), sp.Implicit()], ids=["xpbd", "implicit"])
+@pytest.mark.parametrize(
+    "solver", [pytest.param(sp.XPBD(), marks=pytest.mark.slow), sp.Implicit()], ids=["xpbd", "implicit"]
+)
 def test_12_a_tendon_bends_a_finger_and_releases_it(solver):
     found = run_example("12", solver)
     assert found["bent"] > 60.0
@@ -115,7 +121,7 @@ def test_12_a_tendon_bends_a_finger_and_releases_it(solver):
 
 
 def test_13_dominoes_knock_each_other_over():
-    found = run_example("13", 3, 260)
+    found = run_example("13", 3, 220)
     assert found["fallen"] == 3
     assert found["gain"] < 0.01
     assert found["nearest"] > 0.0
@@ -124,7 +130,7 @@ def test_13_dominoes_knock_each_other_over():
 @pytest.mark.slow
 def test_13_the_wave_of_twenty_dominoes_is_steady():
     found = run_example("13")
-    assert found["fallen"] == 20
+    assert found["fallen"] == 30
     assert found["spread"] < 0.2
     assert found["gain"] < 0.01
 
@@ -187,7 +193,10 @@ def test_every_scene_file_loads(path):
 
 
 def test_the_study_of_the_slope_follows_coulomb_s_law(tmp_path):
-    table = sp.studies.load_study(EXAMPLES / "studies" / "slope.yaml").run(tmp_path, workers=1)
+    text = (EXAMPLES / "studies" / "slope.yaml").read_text().replace("../scenes", str(EXAMPLES / "scenes"))
+    assert "[0.1, 0.3, 0.5, 0.7]" in text
+    (tmp_path / "slope.yaml").write_text(text.replace("[0.1, 0.3, 0.5, 0.7]", "[0.3, 0.7]"))
+    table = sp.studies.load_study(tmp_path / "slope.yaml").run(tmp_path, workers=1)
     # s = (g sin 30 - mu g cos 30) t^2 / 2 after one second, and nothing where tan 30 is less than mu
     expected = [max(0.0, 0.5 * (4.905 - mu * 8.495709)) for mu in table["obstacles.slope.friction"]]
     assert table["slid"] == pytest.approx(expected, rel=0.03, abs=2e-3)

@@ -35,7 +35,7 @@ from supple.mesh import shapes
 from supple.mesh.io.mesh_files import SURFACE_WRITERS
 from supple.results.checkpoint.file import read_checkpoint
 
-EXAMPLES = int(os.environ.get("SUPPLE_FUZZ_EXAMPLES", "40"))
+EXAMPLES = int(os.environ.get("SUPPLE_FUZZ_EXAMPLES", "25"))
 # Of `make fuzz`: an example of a time out of all proportion is an error there. The suite asserts no time.
 SECONDS = 10 if "SUPPLE_FUZZ_EXAMPLES" in os.environ else None
 LARGEST_GROWTH = 1_000_000_000  # of the memory of this process, over all examples of a reader [bytes]

@@ -194,7 +194,6 @@ def test_texts_that_are_no_formulas_are_refused_and_nothing_is_executed(text, me
     with pytest.raises(SceneError, match=message) as error:
         sp.EnergyMaterial(psi=text)
     assert str(error.value).startswith("EnergyMaterial: ")
-    assert "\n" not in str(error.value)
     assert not list(tmp_path.iterdir())
 
 

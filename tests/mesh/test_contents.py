@@ -40,9 +40,8 @@ def test_what_is_not_a_mesh_is_named(tmp_path, case, extension):
     if extension in SUFFIXES:  # both are read, the nodes first
         write(tmp_path / "part.node", content)
         write(tmp_path / "part.ele", content)
-    with pytest.raises(MeshError, match=words) as caught:
+    with pytest.raises(MeshError, match=words):
         load_mesh(path)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_pointer_is_named_where_its_sibling_is_missing(tmp_path):
@@ -138,9 +137,8 @@ BAD_MEDIT = {
 @pytest.mark.parametrize("case", BAD_MEDIT)
 def test_malformed_medit(tmp_path, case):
     content, words = BAD_MEDIT[case]
-    with pytest.raises(MeshError, match=words) as caught:
+    with pytest.raises(MeshError, match=words):
         sp.TetMesh.load(write(tmp_path / "a.mesh", content))
-    assert "\n" not in str(caught.value)
 
 
 SCENE = """

@@ -24,7 +24,6 @@ def refused(path, message):
     with pytest.raises(MeshError, match=message) as caught:
         sp.TetMesh.load(path)
     assert str(caught.value).startswith(f"{path}: ")
-    assert "\n" not in str(caught.value)
 
 
 def test_a_library_that_takes_too_long_is_stopped(path, monkeypatch):

@@ -244,7 +244,6 @@ def test_malformed_files_are_named_with_their_line(tmp_path: Path, case: str) ->
         read_tetgen(path)
     assert str(error.value).startswith(str(tmp_path))
     assert message in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_a_name_without_its_number_gives_a_hint(tmp_path: Path) -> None:

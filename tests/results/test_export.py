@@ -253,9 +253,8 @@ def test_unknown_formats_are_refused(recorded):
 )
 def test_a_suffix_of_another_format_is_refused(tmp_path, recorded, to, output, text):
     (tmp_path / "x.obj").write_text("mine")
-    with pytest.raises(OutputError, match=text) as caught:
+    with pytest.raises(OutputError, match=text):
         export(recorded[0], to, tmp_path / output)
-    assert "\n" not in str(caught.value)
     assert [path.name for path in tmp_path.iterdir()] == ["x.obj"]
     assert (tmp_path / "x.obj").read_text() == "mine"
 

@@ -140,9 +140,8 @@ def test_files_that_are_not_recordings(tmp_path, name, content, reason):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(OutputError, match=reason) as caught:
+    with pytest.raises(OutputError, match=reason):
         read_recording(path)
-    assert "\n" not in str(caught.value)
 
 
 def test_folders_and_plain_hdf5(tmp_path):
@@ -160,9 +159,8 @@ def test_files_cut_at_any_position(tmp_path, recorded):
     path = tmp_path / "cut.vtkhdf"
     for length in [1, 7, 8, 95, 96, len(whole) - 1, *(chance.randrange(1, len(whole)) for _ in range(40))]:
         path.write_bytes(whole[:length])
-        with pytest.raises(OutputError) as caught:
+        with pytest.raises(OutputError):
             read_recording(path)
-        assert "\n" not in str(caught.value)
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="the superuser may read everything")
@@ -180,9 +178,8 @@ def test_a_recording_with_damaged_names_is_not_copied(tmp_path, recorded):
     name = b"NumberOfCells\0"
     assert name in data
     (tmp_path / "r.vtkhdf").write_bytes(data.replace(name, b"\xff" * 13 + b"\0"))
-    with pytest.raises(OutputError, match=r"^\S*r\.vtkhdf: is damaged: ") as caught:
+    with pytest.raises(OutputError, match=r"^\S*r\.vtkhdf: is damaged: "):
         export(tmp_path / "r.vtkhdf", "vtkhdf")
-    assert "\n" not in str(caught.value)
     assert [path.name for path in tmp_path.iterdir()] == ["r.vtkhdf"]
 
 

@@ -44,7 +44,6 @@ BAD_BODIES = [
 def test_bad_bodies(changes, words):
     with pytest.raises(sp.SceneError, match=words) as caught:
         body(**changes)
-    assert "\n" not in str(caught.value)
     assert changes.get("name") is not None or "body 'cube'" in str(caught.value)
 
 
@@ -172,9 +171,8 @@ BAD_SCENES = [
 
 @pytest.mark.parametrize(("changes", "words"), BAD_SCENES)
 def test_bad_scenes(changes, words):
-    with pytest.raises(sp.SceneError, match=words) as caught:
+    with pytest.raises(sp.SceneError, match=words):
         sp.Scene(**{"bodies": [body()], **changes})
-    assert "\n" not in str(caught.value)
 
 
 def test_unnamed_obstacles_get_their_kind_and_number():

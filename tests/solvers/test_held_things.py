@@ -84,6 +84,9 @@ SCENES = {
 }
 # Relatives of others, or long.
 SLOW = (
+    "ball",
+    "weld",
+    "soft",
     "hinge",
     "universal",
     "slider",

@@ -82,7 +82,7 @@ def test_the_torque_of_a_weight_beside_the_shaft_is_carried(solver):
 @BOTH
 def test_the_swing_is_limited(solver):
     joint = sp.UniversalJoint("bar", point=(0, 0, 0), axis=(0, 1, 0), second_axis=(0, 0, 1), max_swing=0.4, name="u")
-    frames = list(sp.simulate(sp.Scene([bar()], joints=[joint]), solver, 0.01, 80))
+    frames = list(sp.simulate(sp.Scene([bar()], joints=[joint]), solver, 0.01, 60))
     swings = [frame.report.joints["u"].coordinate for frame in frames]
     assert max(swings) < 0.4 + 2e-3
     assert swings[-1] == pytest.approx(0.4, abs=2e-3)

@@ -105,9 +105,8 @@ def test_two_runs_into_one_folder(out):
     frames = sp.simulate(drifting_scene(), Drift(), DT, STEPS, sinks=[sp.RunFolder(out, Drift())])
     whole = [next(frames) for _ in range(3)]
     second = sp.simulate(drifting_scene(), Drift(), DT, STEPS, sinks=[sp.RunFolder(out, Drift(), overwrite=True)])
-    with pytest.raises(OutputError, match=r"another run is writing to it \(process \d+\); wait for it") as caught:
+    with pytest.raises(OutputError, match=r"another run is writing to it \(process \d+\); wait for it"):
         next(second)
-    assert "\n" not in str(caught.value)
     with pytest.raises(OutputError, match="another run is writing to it"):
         sp.resume(out, drifting_scene(), Drift())
     whole += list(frames)
@@ -141,9 +140,8 @@ def test_a_folder_that_is_removed_in_mid_run_is_an_error(out):
     frames = sp.simulate(drifting_scene(), Drift(), DT, STEPS, sinks=[sp.RunFolder(out, Drift(), checkpoint_every=2)])
     next(frames)
     shutil.rmtree(out)
-    with pytest.raises(OutputError, match=r"recording\.vtkhdf: was removed or replaced while it was written") as caught:
+    with pytest.raises(OutputError, match=r"recording\.vtkhdf: was removed or replaced while it was written"):
         next(frames)
-    assert "\n" not in str(caught.value)
     assert not out.exists()
 
 
@@ -169,9 +167,8 @@ def test_a_full_disk_at_a_checkpoint_keeps_the_run_resumable(out, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(replacing.os, "fsync", full)
-    with pytest.raises(OutputError, match="cannot be written: No space left on device") as caught:
+    with pytest.raises(OutputError, match="cannot be written: No space left on device"):
         list(frames)
-    assert "\n" not in str(caught.value)
     monkeypatch.setattr(replacing.os, "fsync", fsync)
     assert not is_locked(out)
     rest = list(sp.resume(out, drifting_scene(), Drift()))

@@ -143,7 +143,6 @@ def test_a_pipe_is_an_error_without_waiting_for_it(place):
 def test_hostile_files_are_errors_and_run_no_code(tmp_path, text):
     marker, path = tmp_path / "marker", tmp_path / "scene.yaml"
     path.write_text(text.replace("{marker}", str(marker)))
-    with pytest.raises(SuppleError) as caught:
+    with pytest.raises(SuppleError):
         load_run(path, confine=True)
-    assert "\n" not in str(caught.value)
     assert not marker.exists()

@@ -65,7 +65,6 @@ def test_errors_in_stitches_name_their_line(load, tmp_path, line, message):
         load(STITCHED + f"  - {{{line}}}\n")
     assert re.search(r"scene.yaml:8:", str(caught.value))
     assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_pairs_are_found_once_by_the_names_in_the_scene(load, tmp_path, monkeypatch):
@@ -93,7 +92,6 @@ def test_wrong_pairs_are_errors_that_name_their_line(load, tmp_path, pairs):
             f"  - {{kind: soft_vertex_triangle, {line}}}\n"
         )
     assert re.search(r"scene.yaml:9:", str(caught.value))
-    assert "\n" not in str(caught.value)
 
 
 def test_strengths_of_a_file_are_those_of_the_pairs(load):

@@ -85,7 +85,7 @@ def random_command(rng, bodies, solvers=("xpbd",)):
     return made()
 
 
-@pytest.mark.parametrize("count", [200, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_random_commands_leave_a_finite_state(count, loop, monkeypatch, caplog):
     monkeypatch.setattr(limits, "MOST_BODIES", 4)
     monkeypatch.setattr(limits, "MOST_TETS", 900)

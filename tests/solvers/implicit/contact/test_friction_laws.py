@@ -10,7 +10,7 @@ ANGLE = np.deg2rad(26.565)  # tan = .5
 NORMAL = np.array([np.sin(ANGLE), np.cos(ANGLE), 0.0])
 TURN = (0.0, 0.0, -ANGLE)
 GRAVITY = 9.81
-TIME, DT = 2.5, 0.025
+TIME, DT = 1.25, 0.025
 
 
 def downhill(mu):
@@ -59,7 +59,6 @@ def test_a_block_on_a_slope_sticks_at_the_angle_of_friction(kind):
 def test_a_block_on_a_slope_slides_by_coulombs_law(kind):
     _, way = slide(sp.Scene([block()], obstacles=[downhill(0.49)[kind]]))
     assert way == pytest.approx(way_down(0.49), rel=0.02)
-    assert way == pytest.approx(0.2742, rel=0.02)
 
 
 def test_friction_of_two_bodies_is_the_geometric_mean_of_their_coefficients():

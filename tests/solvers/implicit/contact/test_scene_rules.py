@@ -35,9 +35,8 @@ def run(scene, dt, steps, solver=None, **start):
     ],
 )
 def test_settings_out_of_range_are_errors(given, complaint):
-    with pytest.raises(sp.SolverError, match=rf"IPCContact: {complaint}") as caught:
+    with pytest.raises(sp.SolverError, match=rf"IPCContact: {complaint}"):
         sp.IPCContact(**given)
-    assert "\n" not in str(caught.value)
 
 
 def test_obstacles_without_contact_are_an_error():
@@ -163,7 +162,6 @@ def test_a_frame_that_intersects_is_an_error_with_a_remedy():
     with pytest.raises(sp.SuppleError, match=r"(?s)one.*two") as caught:
         list(sp.simulate(overlap, sp.Implicit(), 1 / 60, 1, start=frame))
     assert "overlaps" in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_frame_with_inverted_tets_is_an_error_where_the_material_has_no_energy():

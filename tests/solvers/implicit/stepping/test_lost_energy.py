@@ -23,7 +23,7 @@ def test_a_clay_cube_that_falls_in_long_steps():
 
 
 def test_a_shorter_step_of_second_order_does():
-    assert {report.status for report in fall(CLAY, "bdf2", 1 / 960, 60)} == {"converged"}
+    assert {report.status for report in fall(CLAY, "bdf2", 1 / 960, 30)} == {"converged"}
 
 
 def test_what_only_bounces_or_recovers_says_nothing():

@@ -33,9 +33,8 @@ def pile():
     ],
 )
 def test_wrong_settings_raise_an_error_that_names_them(wrong, message):
-    with pytest.raises(SolverError, match=message) as caught:
+    with pytest.raises(SolverError, match=message):
         XPBDContact(**wrong)
-    assert "\n" not in str(caught.value)
 
 
 def test_bodies_stop_at_the_given_thickness():

@@ -64,7 +64,7 @@ def test_a_tet_below_the_onset_may_not_be_compressed_more_and_is_not_pushed_back
 
 
 @MATERIALS
-@pytest.mark.parametrize(("speed", "substeps"), [(6.0, 20), (10.0, "auto"), (20.0, 20), (40.0, 2), (3.0, 1)])
+@pytest.mark.parametrize(("speed", "substeps"), [(10.0, "auto"), (20.0, 20), (40.0, 2), (3.0, 1)])
 def test_a_soft_body_that_hits_the_floor_keeps_every_tet_positive_and_gains_nothing(material, speed, substeps):
     body = sp.Body("cube", CUBE, material, position=(0, 0.07, 0), rotation=(0, 0, 0.3), velocity=(0, -speed, 0))
     start = None
