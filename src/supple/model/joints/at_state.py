@@ -45,15 +45,8 @@ def reported(geometry: JointGeometry, g: NDArray[np.float64]) -> dict[str, float
 
 def coordinates_at(geometry: JointGeometry, state: State) -> NDArray[np.float64]:
     """(s,) the functions' values at a state, angles over all turns."""
-    poses = geometry.poses(state.time)
-    corners = state.positions[geometry.corners]
-    arguments = np.stack(
-        [
-            np.einsum("fk,fki->fi", column.coefficients, corners[column.joint]) + column.offsets(poses)
-            for column in geometry.arguments
-        ],
-        axis=1,
-    )
+    vectors = geometry.arguments
+    arguments = geometry.at(vectors, state.positions, vectors.offsets(geometry.poses(state.time)))
     return followed(geometry, values(geometry.functions, arguments), state.hinge_angles, _APART)
 
 
@@ -65,14 +58,12 @@ def refuse_apart(geometry: JointGeometry, state: State) -> None:
     SceneError : where the two sides of one are apart, or its coordinate is outside of its limits; the text names it.
     """
     g = coordinates_at(geometry, state)
-    poses = geometry.poses(state.time)
     vectors = geometry.differences
-    corners = state.positions[geometry.corners[vectors.joint]]
-    q = np.einsum("fk,fki->fi", vectors.coefficients, corners) + vectors.offsets(poses)
+    q = geometry.at(vectors, state.positions, vectors.offsets(geometry.poses(state.time)))
     off = np.zeros(len(geometry.joints))
     np.maximum.at(off, vectors.joint, np.linalg.norm(q, axis=1))
     across = geometry.across
-    joint = geometry.arguments[0].joint[across]
+    joint = geometry.arguments.joint[across]
     np.maximum.at(off, joint, np.abs(g[across]) * geometry.sizes[joint] / geometry.units[across])
     for j, joint in enumerate(geometry.joints):
         if off[j] > _APART * geometry.sizes[j]:

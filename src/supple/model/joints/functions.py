@@ -1,23 +1,26 @@
 """The nonlinear functions of joints: of four vectors a, b, d and f each, with derivatives in closed form.
 
-A product, or a cosine, is a . b. An angle is atan2(s, c) with s = a . d and c = a . b, a twist with s = a . d - f . b
-and c = a . b + f . d; with n = s^2 + c^2 their derivatives are
+A product, or a cosine, is c = a . b. An angle is atan2(s, c) with s = a . d and c = a . b, a twist with
+s = a . d - f . b and c = a . b + f . d. With n = s^2 + c^2, their derivatives are
 
-    (c ds - s dc) / n,
-    (c dds - s ddc) / n + ((s^2 - c^2) (ds dc + dc ds) + 2 s c (dc dc - ds ds)) / n^2.
+    dg = u ds + w dc,    u = 0, w = 1 of c itself, and u = c / n, w = -s / n of angles,
+    ddg = u dds + w ddc + ((s^2 - c^2) (ds dc + dc ds) + 2 s c (dc dc - ds ds)) / n^2,
 
-A further function brings its own derivatives: `FORMS["name"] = Form(2, of=derivatives_of_it)`.
+whose last part is one of angles only. A further function brings its own derivatives:
+`FORMS["name"] = Form(2, of=derivatives_of_it)`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-_I = np.eye(3)
+from supple.numerics.mat3 import dot, row
+from supple.runtime.kernel_cache import njit
 
 
 class Values(NamedTuple):
@@ -49,10 +52,25 @@ ANGLE, PRODUCT, COSINE, TWIST = range(4)
 
 def values(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """(s,) of vectors (s, 4, 3), those of one function in each row."""
-    c, s = _cosine_and_sine(functions, vectors)
-    found = np.where(turns(functions), np.arctan2(s, c), c)
-    for rows, own in _others(functions, vectors):
-        found[rows] = own.value
+    return evaluated(functions, vectors, second=False).value
+
+
+def derivatives(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> Values:
+    """Values and derivatives at vectors (s, 4, 3)."""
+    return evaluated(functions, vectors, second=True)
+
+
+def evaluated(functions: NDArray[np.int64], vectors: NDArray[np.float64], *, second: bool) -> Values:
+    """The same, with second derivatives or none."""
+    count = len(functions)
+    found = Values(np.zeros(count), np.zeros((count, 4, 3)), np.zeros((count if second else 0, 4, 3, 4, 3)))
+    _evaluate(functions, vectors, found)
+    for k, form in enumerate(FORMS.values()):
+        rows = functions == k
+        if form.of is not None and rows.any():
+            for array, own in zip(found, form.of(vectors[rows]), strict=True):
+                if len(array):
+                    array[rows] = own
     return found
 
 
@@ -61,55 +79,53 @@ def turns(functions: NDArray[np.int64]) -> NDArray[np.bool_]:
     return np.array([form.turns for form in FORMS.values()])[functions]
 
 
-def _others(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> list[tuple[NDArray[np.bool_], Values]]:
-    """Rows of functions that bring their own derivatives, and these."""
-    own = [(functions == k, form.of) for k, form in enumerate(FORMS.values()) if form.of is not None]
-    return [(rows, of(vectors[rows])) for rows, of in own if rows.any()]
+@njit
+def is_own(function):
+    """Whether a function is one of those above."""
+    return function <= TWIST
 
 
-def _cosine_and_sine(
-    functions: NDArray[np.int64], vectors: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    a, b, d, f = vectors.transpose(1, 0, 2)
-    twisting = np.where(functions == TWIST, 1.0, 0.0)
-    c = np.einsum("si,si->s", a, b) + twisting * np.einsum("si,si->s", f, d)
-    return c, np.einsum("si,si->s", a, d) - twisting * np.einsum("si,si->s", f, b)
+@njit
+def value_at(function, q, dc, ds):
+    """One of those above at vectors q (4, 3), with u and w; dc and ds (4, 3) are set."""
+    a, b, d, f = row(q, 0), row(q, 1), row(q, 2), row(q, 3)
+    t = 1.0 if function == TWIST else 0.0
+    for i in range(3):
+        dc[0, i], dc[1, i], dc[2, i], dc[3, i] = b[i], a[i], t * f[i], t * d[i]
+        ds[0, i], ds[1, i], ds[2, i], ds[3, i] = d[i], -t * f[i], a[i], -t * b[i]
+    c, s = dot(a, b) + t * dot(f, d), dot(a, d) - t * dot(f, b)
+    if function in (PRODUCT, COSINE):
+        return c, 0.0, 1.0
+    n = s * s + c * c
+    return math.atan2(s, c), c / n, -s / n
 
 
-def derivatives(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> Values:
-    """Values and derivatives at vectors (s, 4, 3)."""
-    count = len(functions)
-    a, b, d, f = vectors.transpose(1, 0, 2)
-    c, s = _cosine_and_sine(functions, vectors)
-    twisting = np.where(functions == TWIST, 1.0, 0.0)
-    t = twisting[:, None]
-    dc = np.stack([b, a, t * f, t * d], axis=1)
-    ds = np.stack([d, -t * f, a, -t * b], axis=1)
-    ddc, dds = np.zeros((count, 4, 3, 4, 3)), np.zeros((count, 4, 3, 4, 3))
-    ddc[:, 0, :, 1], ddc[:, 1, :, 0] = _I, _I
-    dds[:, 0, :, 2], dds[:, 2, :, 0] = _I, _I
-    of_f = twisting[:, None, None] * _I
-    ddc[:, 2, :, 3], ddc[:, 3, :, 2] = of_f, of_f
-    dds[:, 1, :, 3], dds[:, 3, :, 1] = -of_f, -of_f
-    angle = turns(functions)
-    n = np.where(angle, s * s + c * c, 1.0)
-    dg = np.where(angle[:, None, None], (_scaled(c, ds) - _scaled(s, dc)) / n[:, None, None], dc)
-    twist = _outer(ds, dc)
-    twist = twist + np.einsum("saibj->sbjai", twist)
-    bent = _scaled(c, dds) - _scaled(s, ddc)
-    turned = _scaled(s * s - c * c, twist) + _scaled(2.0 * s * c, _outer(dc, dc) - _outer(ds, ds))
-    curved = _scaled(1.0 / n, bent) + _scaled(1.0 / n**2, turned)
-    hessian = np.where(angle[:, None, None, None, None], curved, ddc)
-    found = Values(np.where(angle, np.arctan2(s, c), c), dg, hessian)
-    for rows, own in _others(functions, vectors):
-        for array, given in zip(found, own, strict=True):
-            array[rows] = given
-    return found
-
-
-def _scaled(factor: NDArray[np.float64], array: NDArray[np.float64]) -> NDArray[np.float64]:
-    return factor.reshape(-1, *(1,) * (array.ndim - 1)) * array
-
-
-def _outer(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.einsum("sai,sbj->saibj", left, right)
+@njit(cache=True)
+def _evaluate(functions, vectors, out):
+    dc, ds = np.zeros((4, 3)), np.zeros((4, 3))
+    for k in range(len(functions)):
+        function = functions[k]
+        if not is_own(function):
+            continue
+        out.value[k], u, w = value_at(function, vectors[k], dc, ds)
+        for a in range(4):
+            for i in range(3):
+                out.gradient[k, a, i] = u * ds[a, i] + w * dc[a, i]
+        if len(out.hessian) == 0:
+            continue
+        # (s^2 - c^2) / n^2 and 2 s c / n^2; blocks of dds and ddc are multiples of the identity.
+        p, r = w * w - u * u, -2.0 * u * w
+        if function in (PRODUCT, COSINE):
+            p, r = 0.0, 0.0
+        t, H = 1.0 if function == TWIST else 0.0, out.hessian[k]
+        for a in range(4):
+            for i in range(3):
+                for b in range(4):
+                    for j in range(3):
+                        both = ds[a, i] * dc[b, j] + dc[a, i] * ds[b, j]
+                        turned = dc[a, i] * dc[b, j] - ds[a, i] * ds[b, j]
+                        H[a, i, b, j] = p * both + r * turned
+        for i in range(3):
+            for a, b, of_pair in ((0, 1, w), (0, 2, u), (2, 3, t * w), (1, 3, -t * u)):
+                H[a, i, b, i] += of_pair
+                H[b, i, a, i] += of_pair

@@ -49,13 +49,13 @@ from supple.scene.rotation import rotation_matrix
 
 @dataclass(frozen=True, eq=False)
 class Vectors:
-    """Points and directions, or differences of such.
+    """Points and directions, or differences of such, in an array of any shape for each of the f rows.
 
     Attributes
     ----------
     joint : (f,) the number of the joint
-    coefficients : (f, 8) of the joint's control points
-    world : (f, 3) X; is_point : (f,) w, of what the second side does not move with control points
+    coefficients : (f, ..., 8) of the joint's control points
+    world : (f, ..., 3) X; is_point : (f, ...) w, of what the second side does not move with control points
     """
 
     joint: NDArray[np.int64]
@@ -64,19 +64,21 @@ class Vectors:
     is_point: NDArray[np.float64]
 
     @classmethod
-    def of(cls, rows: Sequence[tuple[int, _Vector]]) -> Vectors:
-        """The vectors with the numbers of their joints."""
+    def of(cls, joint: Sequence[int], vectors: Sequence[_Vector], *shape: int) -> Vectors:
+        """The vectors, of this shape for each of the rows with the numbers of their joints."""
+        rows = (len(joint), *shape)
         return cls(
-            np.array([joint for joint, _ in rows], dtype=np.int64),
-            np.array([one.coefficients for _, one in rows], dtype=np.float64).reshape(-1, 8),
-            np.array([one.world for _, one in rows], dtype=np.float64).reshape(-1, 3),
-            np.array([one.is_point for _, one in rows], dtype=np.float64),
+            np.array(joint, dtype=np.int64),
+            np.array([one.coefficients for one in vectors], dtype=np.float64).reshape(*rows, 8),
+            np.array([one.world for one in vectors], dtype=np.float64).reshape(*rows, 3),
+            np.array([one.is_point for one in vectors], dtype=np.float64).reshape(rows),
         )
 
     def offsets(self, poses: tuple[NDArray[np.float64], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """(f, 3) R X + w t, with the poses (j, 3, 3), (j, 3) of the joints' second sides [m]."""
+        """(f, ..., 3) R X + w t, with the poses (j, 3, 3), (j, 3) of the joints' second sides [m]."""
         R, t = poses
-        return np.einsum("fij,fj->fi", R[self.joint], self.world) + self.is_point[:, None] * t[self.joint]
+        turned = np.einsum("fij,f...j->f...i", R[self.joint], self.world)
+        return turned + np.einsum("f...,fi->f...i", self.is_point, t[self.joint])
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,7 @@ class JointGeometry:
     stiffness : (j,) of the smaller body against strain [N/m]; masses : (j,) of the lighter one [kg]
     centers : where forces are reduced to, the joint's points
     differences : of the two sides, all of which vanish
-    functions : (s,) places in `FORMS`; arguments : their vectors a, b, d and f
+    functions : (s,) places in `FORMS`; arguments : (s, 4) their vectors a, b, d and f
     units : (s,) changes of the functions that count as much as a motion by the joint's size
     across, along : rows of `functions` that vanish; and the one that gives each joint's coordinate, or -1
     limits : (s, 2) of the functions, infinite where there are none
@@ -108,7 +110,7 @@ class JointGeometry:
     centers: Vectors
     differences: Vectors
     functions: NDArray[np.int64]
-    arguments: tuple[Vectors, Vectors, Vectors, Vectors]
+    arguments: Vectors
     units: NDArray[np.float64]
     across: NDArray[np.int64]
     along: NDArray[np.int64]
@@ -118,8 +120,8 @@ class JointGeometry:
     def of(cls, system: System) -> JointGeometry:
         """The joints of the system's scene."""
         sides = [(_Side(system, one, one.first, 0), _Side(system, one, one.second, 4)) for one in system.scene.joints]
-        centers, differences, functions = [], [], []
-        arguments: tuple[list, list, list, list] = ([], [], [], [])
+        centers, apart, functions, arguments = [], [], [], []
+        of_apart, of_function = [], []
         limits: list[tuple[float, float]] = []
         units, across, along = [], [], np.full(len(sides), -1)
         for j, (joint, (first, second)) in enumerate(zip(system.scene.joints, sides, strict=True)):
@@ -132,9 +134,10 @@ class JointGeometry:
             vectors = {"apart": point - second.point(place)}
             for k, e in enumerate(axes):
                 vectors[f"first.{k}"], vectors[f"second.{k}"] = first.direction(R @ e), second.direction(e)
-            centers.append((j, point))
-            differences += [(j, vectors["apart"])] if holds.together else []
-            differences += [(j, size * (vectors[f"first.{k}"] - vectors[f"second.{k}"])) for k in holds.parallel]
+            centers.append(point)
+            apart += [vectors["apart"]] if holds.together else []
+            apart += [size * (vectors[f"first.{k}"] - vectors[f"second.{k}"]) for k in holds.parallel]
+            of_apart += [j] * (len(apart) - len(of_apart))
             for one in holds.functions:
                 if one.vanishes:
                     across.append(len(functions))
@@ -148,9 +151,8 @@ class JointGeometry:
                 given = [vectors[name] for name in one.vectors]
                 # A product has no third vector, and only a twist has a fourth.
                 given += [given[1] if len(given) == 2 and column == 2 else _NOTHING for column in range(len(given), 4)]
-                for column, vector in zip(arguments, given, strict=True):
-                    column.append((j, vector))
-        a, b, d, f = (Vectors.of(column) for column in arguments)
+                arguments += given
+                of_function.append(j)
         return cls(
             joints=tuple(system.scene.joints),
             system=system,
@@ -159,10 +161,10 @@ class JointGeometry:
             sizes=np.array([min(side.size for side in pair) for pair in sides]),
             stiffness=np.array([min(side.stiffness for side in pair) for pair in sides]),
             masses=np.array([min(side.mass for side in pair) for pair in sides]),
-            centers=Vectors.of(centers),
-            differences=Vectors.of(differences),
+            centers=Vectors.of(range(len(sides)), centers),
+            differences=Vectors.of(of_apart, apart),
             functions=np.array(functions, dtype=np.int64),
-            arguments=(a, b, d, f),
+            arguments=Vectors.of(of_function, arguments, 4),
             units=np.array(units, dtype=np.float64),
             across=np.array(across, dtype=np.int64),
             along=along,
@@ -171,7 +173,11 @@ class JointGeometry:
 
     def limited(self, joint: int) -> NDArray[np.int64]:
         """The functions of a joint that have limits."""
-        return np.flatnonzero((self.arguments[0].joint == joint) & np.isfinite(self.limits).any(axis=1))
+        return np.flatnonzero((self.arguments.joint == joint) & np.isfinite(self.limits).any(axis=1))
+
+    def at(self, vectors: Vectors, x: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(f, ..., 3) some vectors at positions x (n, 3), with their `offsets`."""
+        return np.einsum("f...k,fki->f...i", vectors.coefficients, x[self.corners[vectors.joint]]) + offsets
 
     def poses(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotations (j, 3, 3) and translations (j, 3) [m] of the second sides that are obstacles, at `time` [s]."""

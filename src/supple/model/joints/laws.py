@@ -19,7 +19,6 @@ Source: Nocedal, Wright, "Numerical Optimization" (2006), section 17.4.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -27,8 +26,11 @@ from numpy.typing import NDArray
 
 from supple.model.joints.functions import ANGLE
 from supple.model.joints.geometry import JointGeometry
+from supple.runtime.kernel_cache import njit
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.motors import ForceMotor, Motor, PositionMotor, VelocityMotor
+
+Floats = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
 
@@ -36,60 +38,98 @@ TURN = 2.0 * np.pi
 class Law(NamedTuple):
     """One law; see the module.
 
+    Its g0 is the value g_n where a step begins and a `step` more, not below `least` or above `most`, and not farther
+    from g_n than `reach`. Its lambda is `given`, and a `slope` times g_n.
+
     function : whose value is g; adapts : whether lambda is updated
     """
 
     function: int
     k: float
-    start: float
     low: float = -np.inf
     high: float = np.inf
-    multiplier: float = 0.0
     adapts: bool = True
     is_motor: bool = False
+    slope: float = 0.0
+    least: float = -np.inf
+    most: float = np.inf
+    reach: float = np.inf
+    step: float | Floats = 0.0
+    given: float | Floats = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Laws:
-    """Many laws, each an entry of arrays (l,)."""
+def condition(function: int, k: float, value: float = 0.0, low: float = -np.inf, high: float = np.inf) -> Law:
+    """The law g = value, with a force between ends."""
+    return Law(function, k, low, high, least=value, most=value)
 
-    function: NDArray[np.int64]
-    k: NDArray[np.float64]
-    start: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    adapts: NDArray[np.bool_]
-    is_motor: NDArray[np.bool_]
+
+# One law in an array: its g0 and its lambda in the present step stand at the end.
+LAW = np.dtype(
+    [
+        ("function", np.int64),
+        *((name, np.float64) for name in ("k", "low", "high")),
+        *((name, np.bool_) for name in ("adapts", "is_motor")),
+        *((name, np.float64) for name in ("slope", "least", "most", "reach", "start", "multiplier")),
+    ],
+    align=True,
+)
+
+
+class Laws(NamedTuple):
+    """Many laws in s steps.
+
+    Attributes
+    ----------
+    table : (l,) of `LAW`, or of more than that; step, given : (s, l) as of `Law`
+    """
+
+    table: NDArray[np.void]
+    step: Floats
+    given: Floats
 
     @classmethod
-    def of(cls, laws: Sequence[Law]) -> tuple[Laws, NDArray[np.float64]]:
-        """The laws, and their multipliers (l,)."""
-        columns = list(zip(*laws, strict=True)) if laws else [()] * len(Law._fields)
-        function, k, start, low, high, multipliers, adapts, is_motor = columns
-        made = cls(
-            np.array(function, dtype=np.int64),
-            *(np.array(column, dtype=np.float64) for column in (k, start, low, high)),
-            adapts=np.array(adapts, dtype=np.bool_),
-            is_motor=np.array(is_motor, dtype=np.bool_),
-        )
-        return made, np.array(multipliers, dtype=np.float64)
+    def of(cls, laws: Sequence[Law], steps: int = 1, kind: np.dtype = LAW) -> Laws:
+        """The laws in so many steps, in an array of this kind."""
+        table, rates = np.zeros(len(laws), dtype=kind), np.zeros((2, steps, len(laws)))
+        for k, law in enumerate(laws):
+            for name, value in zip(law._fields[:-2], law, strict=False):
+                table[name][k] = value
+            rates[0, :, k], rates[1, :, k] = law.step, law.given
+        return cls(table, *rates)
 
-    def efforts(self, g: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def efforts(self, g: Floats, multipliers: Floats) -> Floats:
         """(l,) psi' at the values g (l,)."""
-        return np.clip(multipliers + self.k * (g - self.start), self.low, self.high)
+        return np.clip(self._lines(g, multipliers), self.table["low"], self.table["high"])
 
-    def energies(self, g: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energies(self, g: Floats, multipliers: Floats) -> Floats:
         """(l,) psi, up to a constant."""
-        line = multipliers + self.k * (g - self.start)
-        effort = np.clip(line, self.low, self.high)
-        stiff = self.k > 0.0
-        k = np.where(stiff, self.k, 1.0)
-        return np.where(stiff, effort * (line - 0.5 * effort) / k, multipliers * (g - self.start))
+        line, effort = self._lines(g, multipliers), self.efforts(g, multipliers)
+        stiff = self.table["k"] > 0.0
+        k = np.where(stiff, self.table["k"], 1.0)
+        return np.where(stiff, effort * (line - 0.5 * effort) / k, multipliers * (g - self.table["start"]))
 
-    def stiffness(self, g: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stiffness(self, g: Floats, multipliers: Floats) -> Floats:
         """(l,) psi''."""
-        line = multipliers + self.k * (g - self.start)
-        return np.where((line > self.low) & (line < self.high), self.k, 0.0)
+        line = self._lines(g, multipliers)
+        return np.where((line > self.table["low"]) & (line < self.table["high"]), self.table["k"], 0.0)
+
+    def _lines(self, g: Floats, multipliers: Floats) -> Floats:
+        return multipliers + self.table["k"] * (g - self.table["start"])
+
+
+@njit
+def begin_law(law, step, given, here):
+    """Set g0 and lambda of a law in a step that begins with the value `here`."""
+    start = min(max(here + step, law.least), law.most)
+    law.start = min(max(start, here - law.reach), here + law.reach)
+    law.multiplier = given + law.slope * here
+
+
+@njit(cache=True)
+def begin_step(table, step, given, g):
+    """The same of many laws (l,), with values g (s,) of the functions."""
+    for k in range(len(table)):
+        begin_law(table[k], step[k], given[k], g[table[k].function])
 
 
 def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -119,70 +159,53 @@ def followed(
     return out
 
 
-def laws_of(
-    geometry: JointGeometry,
-    stiffness: NDArray[np.float64],
-    start: NDArray[np.float64],
-    times: tuple[float, float],
-    *,
-    moving: bool,
-) -> tuple[Laws, NDArray[np.float64]]:
-    """The laws of a step, and their multipliers (l,) at its beginning.
+def laws_of(geometry: JointGeometry, stiffness: Floats, times: Floats, *, moving: bool) -> list[Law]:
+    """The laws of steps of one length.
 
     Parameters
     ----------
-    stiffness : (j,) k of conditions, of each joint [N/m]; start : (s,) values at the beginning, see `followed`
-    times : begin and end of the step [s]; moving : whether rates count; without them, as in equilibrium, motors do not
-        damp
+    stiffness : (j,) k of conditions, of each joint [N/m]
+    times : (s + 1,) begins of the steps, and the end of the last [s]; moving : whether rates count; without them, as in
+        equilibrium, motors do not damp
     """
-    of_joint = geometry.arguments[0].joint
+    of_joint, h = geometry.arguments.joint, times[1] - times[0]
     k_of = stiffness[of_joint] * (geometry.sizes[of_joint] / geometry.units) ** 2
-    laws = [Law(int(row), float(k_of[row]), 0.0) for row in geometry.across]
+    laws = [condition(int(row), float(k_of[row])) for row in geometry.across]
     for j, joint in enumerate(geometry.joints):
         for row in geometry.limited(j).tolist():
             k, (low, high) = float(k_of[row]), geometry.limits[row].tolist()
-            laws += [Law(row, k, low, high=0.0)] if np.isfinite(low) else []
-            laws += [Law(row, k, high, low=0.0)] if np.isfinite(high) else []
+            laws += [condition(row, k, low, high=0.0)] if np.isfinite(low) else []
+            laws += [condition(row, k, high, low=0.0)] if np.isfinite(high) else []
         if not isinstance(joint, AxisJoint):
             continue
-        row = int(geometry.along[j])
-        k, here, (low, high) = float(k_of[row]), float(start[row]), geometry.limits[row].tolist()
+        row, reach = int(geometry.along[j]), np.inf
+        k, (low, high) = float(k_of[row]), geometry.limits[row].tolist()
         if joint.max_velocity is not None and moving:
-            reach = (times[1] - times[0]) * joint.max_velocity
-            laws.append(Law(row, k, here - reach, high=0.0))
-            laws.append(Law(row, k, here + reach, low=0.0))
-            low, high = max(low, here - reach), min(high, here + reach)
+            reach = h * joint.max_velocity
+            laws += [Law(row, k, high=0.0, step=-reach), Law(row, k, low=0.0, step=reach)]
         if joint.damping > 0.0 and moving:
-            laws.append(Law(row, joint.damping / (times[1] - times[0]), here, adapts=False))
+            laws.append(Law(row, joint.damping / h, adapts=False))
         if joint.friction > 0.0 and moving:
-            laws.append(Law(row, k, here, -joint.friction, joint.friction))
+            laws.append(Law(row, k, -joint.friction, joint.friction))
         if joint.motor is not None:
-            laws.append(_motor_law(joint.motor, row, k, here, times, (low, high), moving=moving))
-    return Laws.of(laws)
+            # A limit of the coordinate or of its rate stops a velocity motor, also one without a largest force.
+            stops = {"least": low, "most": high, "reach": reach}
+            laws.append(_motor_law(joint.motor, row, k, times, stops, moving=moving))
+    return laws
 
 
-def _motor_law(
-    motor: Motor,
-    row: int,
-    k: float,
-    start: float,
-    times: tuple[float, float],
-    limits: tuple[float, float],
-    *,
-    moving: bool,
-) -> Law:
+def _motor_law(motor: Motor, row: int, k: float, times: Floats, stops: Mapping[str, float], *, moving: bool) -> Law:
     h = times[1] - times[0]
     bound = np.inf if motor.max_force is None else float(motor.max_force)
+    targets = np.array([motor.at(float(time)) for time in times[1:]])
     if isinstance(motor, ForceMotor):
-        return Law(row, 0.0, start, multiplier=-motor.at(times[1]), adapts=False, is_motor=True)
+        return Law(row, 0.0, given=-targets, adapts=False, is_motor=True)
     if isinstance(motor, VelocityMotor):
-        # A limit of the coordinate or of its rate stops the motor, also one without a largest force.
-        stopped = float(np.clip(start + h * motor.at(times[1]), *limits))
-        return Law(row, k, stopped, -bound, bound, is_motor=True)
+        return Law(row, k, -bound, bound, is_motor=True, step=h * targets, **stops)
     assert isinstance(motor, PositionMotor)
-    target = motor.at(times[1])
-    rate = (target - motor.at(times[0])) / h if moving else 0.0
-    damping = motor.damping if moving else 0.0
-    multiplier = motor.stiffness * (start - target) - damping * rate
+    damping, given = 0.0, -motor.stiffness * targets
+    if moving:
+        damping = motor.damping
+        given -= damping * np.diff(targets, prepend=motor.at(float(times[0]))) / h
     stiffness = motor.stiffness + damping / h
-    return Law(row, stiffness, start, -bound, bound, multiplier, adapts=False, is_motor=True)
+    return Law(row, stiffness, -bound, bound, adapts=False, is_motor=True, slope=motor.stiffness, given=given)

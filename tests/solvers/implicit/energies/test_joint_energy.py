@@ -6,7 +6,7 @@ from tests.derivatives import assert_derivatives, differences, hessian_product
 
 import supple as sp
 from supple.model.joints.geometry import JointGeometry
-from supple.model.joints.laws import Law, Laws
+from supple.model.joints.laws import Law, Laws, begin_step
 from supple.model.system import build_system, initial_state
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.stepping.joint_step import JointStep
@@ -95,7 +95,9 @@ def test_forces_of_a_joint_are_those_of_its_energy_and_have_no_sum(kind):
 
 
 def test_laws_are_lines_that_are_cut_off():
-    laws, multipliers = Laws.of([Law(0, 2.0, 1.0, -3.0, 5.0, 0.5), Law(0, 0.0, 0.0, multiplier=4.0, adapts=False)])
+    laws = Laws.of([Law(0, 2.0, -3.0, 5.0, step=1.0, given=0.5), Law(0, 0.0, given=4.0)])
+    begin_step(laws.table, laws.step[0], laws.given[0], np.zeros(1))
+    multipliers = laws.table["multiplier"]
     g = np.linspace(-4.0, 6.0, 2001)
     efforts = np.array([laws.efforts(np.full(2, value), multipliers) for value in g])
     energies = np.array([laws.energies(np.full(2, value), multipliers) for value in g])

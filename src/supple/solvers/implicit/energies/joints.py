@@ -6,6 +6,7 @@ multipliers until the differences vanish.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -54,14 +55,14 @@ class JointPotential(ContactPotential):
         geometry = self.geometry
         forces, pulls, _ = self._forces(x)
         _add(geometry, geometry.differences, forces, out)
-        for k, column in enumerate(geometry.arguments if len(pulls) else ()):
-            _add(geometry, column, pulls[:, k], out)
+        if len(pulls):
+            _add(geometry, geometry.arguments, pulls, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         """With `project`, of the functions the nearest positive semi-definite one by their vectors."""
         out.couplings.append(self._linear_couplings)
         geometry = self.geometry
-        if not len(self.laws.function):
+        if not len(self.laws.table):
             return
         at = derivatives(geometry.functions, self._arguments(x))
         g = self._law_values(x)
@@ -73,13 +74,13 @@ class JointPotential(ContactPotential):
         if project:
             eigenvalues, vectors = np.linalg.eigh(H)
             H = np.einsum("sij,sj,skj->sik", vectors, np.maximum(eigenvalues, 0.0), vectors)
-        C = np.stack([column.coefficients for column in geometry.arguments], axis=1)
+        C = geometry.arguments.coefficients
         blocks = np.einsum("sap,saibj,sbq->spqij", C, H.reshape(count, 4, 3, 4, 3), C, optimize=True)
-        out.couplings.append(_couplings(geometry, geometry.arguments[0].joint, blocks))
+        out.couplings.append(_couplings(geometry, geometry.arguments.joint, blocks))
 
     def differences(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(f, 3) the vectors that vanish where the joints hold [m]."""
-        return _at(self.geometry, self.geometry.differences, x, self._difference_offsets)
+        return self.geometry.at(self.geometry.differences, x, self._offsets[0])
 
     def coordinates(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s,) values of the functions."""
@@ -90,7 +91,7 @@ class JointPotential(ContactPotential):
         """The multipliers (f, 3) and (l,) that balance the forces of this energy at x."""
         efforts = self.laws.efforts(self._law_values(x), self.law_multipliers)
         new = self.multipliers + self._k[:, None] * self.differences(x)
-        return new, np.where(self.laws.adapts, efforts, self.law_multipliers)
+        return new, np.where(self.laws.table["adapts"], efforts, self.law_multipliers)
 
     def efforts(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(l,) of the laws [N], [N m]; a positive one pushes towards smaller coordinates."""
@@ -100,17 +101,16 @@ class JointPotential(ContactPotential):
         """The forces (j, 3) [N] on the first bodies, and their torques (j, 3) about the joints' points [N m]."""
         geometry = self.geometry
         count = len(geometry.joints)
-        points = _at(geometry, geometry.centers, x, np.zeros((count, 3)))
+        points = geometry.at(geometry.centers, x, np.zeros((count, 3)))
         forces, torques = np.zeros((count, 3)), np.zeros((count, 3))
         rows, pulls, _ = self._forces(x)
-        columns = [(geometry.differences, rows)]
-        columns += [(column, pulls[:, k]) for k, column in enumerate(geometry.arguments if len(pulls) else ())]
-        for vectors, gradient in columns:
-            c = vectors.coefficients[:, :4]
-            own = np.einsum("fk,fki->fi", c, x[geometry.corners[vectors.joint, :4]])
-            arms = own - c.sum(axis=1)[:, None] * points[vectors.joint]
-            np.add.at(forces, vectors.joint, -c.sum(axis=1)[:, None] * gradient)
-            np.add.at(torques, vectors.joint, -np.cross(arms, gradient))
+        for vectors, gradient in ((geometry.differences, rows), (geometry.arguments, pulls)):
+            if not len(gradient):
+                continue
+            by_corner = _by_corner(vectors, gradient)[:, :4]
+            arms = x[geometry.corners[vectors.joint, :4]] - points[vectors.joint][:, None]
+            np.subtract.at(forces, vectors.joint, by_corner.sum(axis=1))
+            np.subtract.at(torques, vectors.joint, np.cross(arms, by_corner).sum(axis=1))
         return forces, torques
 
     @cached_property
@@ -118,13 +118,10 @@ class JointPotential(ContactPotential):
         return self.stiffness[self.geometry.differences.joint]
 
     @cached_property
-    def _difference_offsets(self) -> NDArray[np.float64]:
-        return self.geometry.differences.offsets(self.geometry.poses(self.time))
-
-    @cached_property
-    def _argument_offsets(self) -> list[NDArray[np.float64]]:
-        poses = self.geometry.poses(self.time)
-        return [column.offsets(poses) for column in self.geometry.arguments]
+    def _offsets(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Of the differences and of the functions' vectors."""
+        geometry, poses = self.geometry, self.geometry.poses(self.time)
+        return geometry.differences.offsets(poses), geometry.arguments.offsets(poses)
 
     @cached_property
     def _linear_couplings(self) -> Couplings:
@@ -138,39 +135,37 @@ class JointPotential(ContactPotential):
 
     def _arguments(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s, 4, 3) the vectors of the functions."""
-        columns = zip(self.geometry.arguments, self._argument_offsets, strict=True)
-        return np.stack([_at(self.geometry, column, x, offsets) for column, offsets in columns], axis=1)
+        return self.geometry.at(self.geometry.arguments, x, self._offsets[1])
 
     def _law_values(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self.coordinates(x)[self.laws.function] if len(self.laws.function) else np.zeros(0)
+        return self.coordinates(x)[self.laws.table["function"]] if len(self.laws.table) else np.zeros(0)
 
     def _forces(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Derivatives by the differences (f, 3) and by the functions' vectors (s, 4, 3), and psi' of each function."""
         linear = self.multipliers + self._k[:, None] * self.differences(x)
         count = len(self.geometry.functions)
-        if not len(self.laws.function):
+        if not len(self.laws.table):
             return linear, np.zeros((0, 4, 3)), np.zeros(0)
         first = _sum(self.laws, self.efforts(x), count)
         at = derivatives(self.geometry.functions, self._arguments(x))
         return linear, first[:, None, None] * at.gradient, first
 
 
-def _at(
-    geometry: JointGeometry, vectors: Vectors, x: NDArray[np.float64], offsets: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    corners = x[geometry.corners[vectors.joint]]
-    return np.einsum("fk,fki->fi", vectors.coefficients, corners) + offsets
+def _by_corner(vectors: Vectors, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The gradient (f, 8, 3) by the control points, of one (f, ..., 3) by the vectors."""
+    rows, each = len(vectors.joint), math.prod(vectors.is_point.shape[1:])
+    c, g = vectors.coefficients.reshape(rows, each, 8), gradient.reshape(rows, each, 3)
+    return np.einsum("fak,fai->fki", c, g)
 
 
 def _add(geometry: JointGeometry, vectors: Vectors, by_vector: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """Add the gradient by the vertices, of one (f, 3) by the vectors."""
-    shares = vectors.coefficients[:, :, None] * by_vector[:, None, :]
-    np.add.at(out, geometry.corners[vectors.joint], shares)
+    """Add the gradient by the vertices, of one (f, ..., 3) by the vectors."""
+    np.add.at(out, geometry.corners[vectors.joint], _by_corner(vectors, by_vector))
 
 
 def _sum(laws: Laws, values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """(count,) sums over the laws of each function."""
-    return np.bincount(laws.function, weights=values, minlength=count).astype(np.float64)
+    return np.bincount(laws.table["function"], weights=values, minlength=count).astype(np.float64)
 
 
 def _couplings(geometry: JointGeometry, joint: NDArray[np.int64], blocks: NDArray[np.float64]) -> Couplings:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from supple.model.joints.at_state import coordinates_at, reported
 from supple.model.joints.functions import ANGLE
 from supple.model.joints.geometry import JointGeometry
-from supple.model.joints.laws import laws_of
+from supple.model.joints.laws import Laws, begin_step, laws_of
 from supple.model.state import State, Status
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.energies.joints import JointPotential
@@ -54,8 +54,10 @@ class JointStep:
         if scale is not None:
             stiffness = stiffness + _INERTIA * geometry.masses / scale
         g = coordinates_at(geometry, start)
-        laws, multipliers = laws_of(geometry, stiffness, g, times, moving=scale is not None)
+        laws = Laws.of(laws_of(geometry, stiffness, np.array(times), moving=scale is not None))
+        begin_step(laws.table, laws.step[0], laws.given[0], g)
         zero = np.zeros((len(geometry.differences.joint), 3))
+        multipliers = laws.table["multiplier"].copy()
         return cls(geometry, JointPotential(geometry, times[1], stiffness, laws, g, zero, multipliers))
 
     def update(self, x: NDArray[np.float64]) -> bool:
@@ -99,19 +101,20 @@ class JointStep:
         out = np.zeros(len(geometry.joints))
         lengths = np.linalg.norm(potential.differences(x), axis=1)
         np.maximum.at(out, geometry.differences.joint, lengths / geometry.sizes[geometry.differences.joint])
-        laws = potential.laws
-        if laws.adapts.any():
-            missing = np.abs(potential.efforts(x) - potential.law_multipliers)[laws.adapts] / laws.k[laws.adapts]
-            function = laws.function[laws.adapts]
-            np.maximum.at(out, geometry.arguments[0].joint[function], missing / geometry.units[function])
+        laws = potential.laws.table
+        adapts = laws["adapts"]
+        if adapts.any():
+            missing = np.abs(potential.efforts(x) - potential.law_multipliers)[adapts] / laws["k"][adapts]
+            function = laws["function"][adapts]
+            np.maximum.at(out, geometry.arguments.joint[function], missing / geometry.units[function])
         return out
 
     def measured(self, details: ImplicitDetails, x: NDArray[np.float64]) -> ImplicitDetails:
         """The details of a step that ended at x (n, 3), with what the joints do there."""
         geometry = self.geometry
         forces, torques = self.potential.actions(x)
-        efforts, laws = self.potential.efforts(x), self.potential.laws
-        motors = {int(laws.function[k]): -float(efforts[k]) for k in np.flatnonzero(laws.is_motor)}
+        efforts, laws = self.potential.efforts(x), self.potential.laws.table
+        motors = {int(laws["function"][k]): -float(efforts[k]) for k in np.flatnonzero(laws["is_motor"])}
         names = [str(joint.name) for joint in geometry.joints]
         along = {name: int(row) for name, row in zip(names, geometry.along, strict=True) if row >= 0}
         return replace(

@@ -31,7 +31,7 @@ from supple.solvers.xpbd.contact.solve import keep_impulses, push_kept
 from supple.solvers.xpbd.contact.tets import Tets
 from supple.solvers.xpbd.response_rates import response_rates
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
-from supple.solvers.xpbd.rigid.joint_rows import JointRows
+from supple.solvers.xpbd.rigid.joints import JointProjection
 
 # Of the mean edge: how far nodes may go beyond the places that were expected when rows were found.
 SLACK = 0.0125
@@ -241,9 +241,9 @@ class Contact:
         """Project the tets of active islands; see `tets.project_low`."""
         volumes.project_low(self.nodes.x, self.tets, self._solver.islands, bounds)
 
-    def solve_joined(self, rows: int, joints: JointRows, enough: float) -> tuple[NDArray[np.float64], float]:
+    def solve_joined(self, rows: int, joints: JointProjection) -> None:
         """Solve the rows of contacts and of joints; see `RowSolver`."""
-        return self._solver.solve_joined(self._rows, rows, joints, self._h, enough)
+        self._solver.solve_joined(self._rows, rows, joints, self._h)
 
     def keep(self, rows: int) -> None:
         """Note the forces, and keep the impulses with which the next substep begins."""

@@ -21,6 +21,7 @@ class Nodes:
     begin, v : (N, 3) places where the substep began [m], velocities [m/s]
     impulses : (n, 3) changes of velocities of the vertices by contact in the present substep [m/s]
     bodies : the rigid bodies that nodes are on; movers : with the nodes of each
+    embedded : the first node on a rigid body's surface, and control points and weights (k, 4) of all of these
     """
 
     def __init__(
@@ -31,7 +32,7 @@ class Nodes:
         self.x, self.begin, self.v = np.zeros((count, 4)), np.zeros((count, 3)), np.zeros((count, 3))
         self.x[: len(inverse_masses), 3] = inverse_masses
         self.impulses, self.origin = np.zeros((n, 3)), np.zeros(3)
-        self._embedded = (count - len(surface.embedded[0]), *surface.embedded)
+        self.embedded = (count - len(surface.embedded[0]), *surface.embedded)
         self.bodies = Bodies.of(surface.body, len(rigid))
         on_bodies = np.flatnonzero(surface.body >= 0)
         self._on_bodies = on_bodies, surface.body[on_bodies]
@@ -41,7 +42,7 @@ class Nodes:
         """(N,) the piece of each node, of pieces (n,) of the vertices; -1 for nodes of obstacles."""
         found = np.full(len(self.x), -1, dtype=np.int32)
         found[: len(pieces)] = pieces
-        first, control, _ = self._embedded
+        first, control, _ = self.embedded
         found[first:] = pieces[control[:, 0]]
         return found
 
@@ -50,7 +51,7 @@ class Nodes:
         self.origin = origin
         self._place_obstacles(time)
         self.follow()
-        self.x[self._embedded[0] :, 3] = self.x[self._embedded[1][:, 0], 3]
+        self.x[self.embedded[0] :, 3] = self.x[self.embedded[1][:, 0], 3]
         self.begin[:] = self.x[:, :3]
 
     def _place_obstacles(self, time: float) -> slice:
@@ -70,7 +71,7 @@ class Nodes:
             self.v[moved] = (self.x[moved, :3] - self.begin[moved]) / h
         rigid = self._rigid
         if len(rigid):
-            place_nodes(self.v, *self._embedded)
+            place_nodes(self.v, *self.embedded)
             free = self.x[rigid.control[:, 0], 3] > 0.0
             describe(self.begin, rigid.control, rigid.masses, free, self.bodies)
 
@@ -87,7 +88,7 @@ class Nodes:
 
     def follow(self) -> None:
         """Put the points of rigid bodies where their bodies are."""
-        place_nodes(self.x, *self._embedded)
+        place_nodes(self.x, *self.embedded)
 
     def take_twists(self, h: float) -> None:
         """Give what twists displaced in h [s] to the velocities of bodies."""
@@ -107,7 +108,7 @@ class Nodes:
         if len(self._rigid):
             self._rigid.place(self.x[: len(self.impulses), :3])
             self.follow()
-            place_nodes(self.v, *self._embedded)
+            place_nodes(self.v, *self.embedded)
 
     def bend(self, h: float) -> None:
         """Set how far the ways of nodes in h [s] are from straight ones, as bodies turn."""

@@ -14,10 +14,6 @@ from supple.solvers.xpbd.frame.volumes import hold_volumes, restore
 from supple.solvers.xpbd.integration import first_lost, hold, predict
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
-# The rows of joints are linear in small turns of bodies. They are linearized again at the same places, at most so many
-# times, until none is off by more than this share of its joint's size.
-MOST_LINEARIZATIONS, JOINT_EXACT = 20, 1e-5
-
 
 def substep(
     ws: XPBDWorkspace, damping: Damping | None, targets: NDArray[np.float64], end: float, h: float, last: bool
@@ -57,12 +53,15 @@ def substep(
     if first_lost(x, v) >= 0:
         return
     rows = contact.detect()  # 7: (C4)
-    solve(ws, rows, end, h)
+    if len(ws.joints):
+        contact.solve_joined(rows, ws.joints)
+    else:
+        contact.solve(rows)
     low = hold_volumes(ws, rows, h)  # (X7)
     contact.keep(rows)
     contact.admit(rows, low)  # 8: (C7)
     if len(ws.joints):
-        add_works(ws.works.by_name, {"joints": ws.joints.end_substep(x, x_n, ws.origins, end, h)})
+        add_works(ws.works.by_name, {"joints": ws.joints.end_substep(x, x_n, h)})
     ws.actuators.end_substep(at)
     forces = [*ws.loads.acting] if damping is None else [*ws.loads.acting, ("damping", *damping.acting)]
     ws.works.end_substep(at, forces, contact, ws.extended, (ws.actuators.add_forces, ws.joints.add_forces))
@@ -79,18 +78,3 @@ def push(ws: XPBDWorkspace, damping: Damping | None, h: float) -> None:
         # Constraints use welded vertices at the places that their bodies will have. Momenta are restored to those
         # without internal forces, of which bodies have their part already.
         ws.velocities[welded] -= internal
-
-
-def solve(ws: XPBDWorkspace, rows: int, end: float, h: float) -> None:
-    """Solve the rows of contacts and joints together."""
-    contact, joints = ws.contact, ws.joints
-    if not len(joints):
-        contact.solve(rows)
-        return
-    joints.begin_substep(ws.previous, ws.origins, end, h)
-    for k in range(MOST_LINEARIZATIONS):
-        of_joints = joints.rows(ws.points, ws.previous, ws.origins, end, h, contact.nodes.bodies.J)
-        impulses, off = contact.solve_joined(rows, of_joints, JOINT_EXACT if k else 0.0)
-        joints.note(of_joints, impulses, ws.points[:, :3] + ws.origins, h)
-        if off <= JOINT_EXACT:
-            return

@@ -7,14 +7,34 @@ momenta determine the end: see `motion`.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System
+from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.rigid.motion import advance, spins
 
 # Relative difference of squares of distances that a motion of a body may make without being corrected.
 _RIGID = 1e-13
+
+
+class Welds(NamedTuple):
+    """Welded vertices as kernels take them.
+
+    Attributes
+    ----------
+    vertices : (s,); control : (s, 4) control points of their bodies; weights : (s, 4)
+    shares : (s, 4) how an impulse that moves a vertex changes their velocities
+    placed : (s, 3) places where the bodies had the vertices last [m]
+    """
+
+    vertices: NDArray[np.int32]
+    control: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    shares: NDArray[np.float64]
+    placed: NDArray[np.float64]
 
 
 class RigidBodies:
@@ -49,11 +69,11 @@ class RigidBodies:
         self.welded_to = np.full(len(system.masses), -1, dtype=np.int32)
         self.welded_to[self.welding.vertices] = self.of_vertex[self.welding.control[:, 0]]
         w = system.inverse_masses[self.welding.vertices]
-        # Over those of the control points: how an impulse that moves a welded vertex changes their velocities.
-        self._shares = np.where(w > 0.0, 1.0, 0.0) / np.where(w > 0.0, w, 1.0)
-        self._shares = self._shares[:, None] * self.welding.weights / system.masses[self.welding.control]
-        self._placed = np.zeros((len(self.welding), 3))
+        shares = np.where(w > 0.0, 1.0, 0.0) / np.where(w > 0.0, w, 1.0)
+        shares = shares[:, None] * self.welding.weights / system.masses[self.welding.control]
         self._impulses, self._begun = np.zeros((len(self.welding), 3)), np.zeros((len(self.welding), 3))
+        welding = self.welding
+        self.welds = Welds(welding.vertices, welding.control, welding.weights, shares, np.zeros_like(self._begun))
         self._joined_masses = system.masses[self.welding.control[:, 0]]
 
     def __len__(self) -> int:
@@ -83,9 +103,7 @@ class RigidBodies:
     def follow(self, points: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
         """Put welded vertices where their bodies are, in place: points (n, 4), velocities (n, 3)."""
         if len(self.welding):
-            self.welding.follow(points[:, :3])
-            self.welding.follow(velocities)
-            self._placed[:] = points[self.welding.vertices, :3]
+            follow_welds(self.welds, points, velocities)
 
     def gather(self, points: NDArray[np.float64], velocities: NDArray[np.float64], h: float) -> None:
         """Change the velocities of bodies by the impulses that moved their welded vertices since `follow`, in place.
@@ -93,11 +111,7 @@ class RigidBodies:
         An impulse J at a vertex acts on the control points as w_k J, so that its moment is that at the vertex.
         """
         if len(self.welding):
-            moved = (points[self.welding.vertices, :3] - self._placed) / h
-            changes = self._shares[:, :, None] * moved[:, None, :]
-            np.add.at(velocities, self.welding.control, changes)
-            self._impulses += self._joined_masses[:, None] * changes.sum(axis=1)
-            self._placed[:] = points[self.welding.vertices, :3]
+            gather_welds(self.welds, points, velocities, h, self._joined_masses, self._impulses)
 
     def welded_impulses(self, masses: NDArray[np.float64], velocities: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s, 3) what the bodies gave in the frame to their welded vertices of masses (s,) [kg m/s].
@@ -136,3 +150,30 @@ class RigidBodies:
     def spins(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """(b,) how fast the bodies turn at positions x and velocities v (n, 3) [rad/s]."""
         return spins(x, v, self.control) if len(self) else np.zeros(0)
+
+
+@njit(cache=True)
+def follow_welds(welds, points, velocities):
+    """See `RigidBodies.follow`; points (N, >= 3)."""
+    for k in range(len(welds.vertices)):
+        i = welds.vertices[k]
+        for j in range(3):
+            x = v = 0.0
+            for c in range(4):
+                x += welds.weights[k, c] * points[welds.control[k, c], j]
+                v += welds.weights[k, c] * velocities[welds.control[k, c], j]
+            points[i, j], velocities[i, j], welds.placed[k, j] = x, v, x
+
+
+@njit(cache=True)
+def gather_welds(welds, points, velocities, h, masses, impulses):
+    """See `RigidBodies.gather`; masses (s,) of a control point, impulses (s, 3) so far, in place."""
+    for k in range(len(welds.vertices)):
+        i = welds.vertices[k]
+        for j in range(3):
+            moved = (points[i, j] - welds.placed[k, j]) / h
+            for c in range(4):
+                change = welds.shares[k, c] * moved
+                velocities[welds.control[k, c], j] += change
+                impulses[k, j] += masses[k] * change
+            welds.placed[k, j] = points[i, j]
