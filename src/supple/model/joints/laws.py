@@ -189,19 +189,21 @@ def laws_of(geometry: JointGeometry, stiffness: Floats, times: Floats, *, moving
             laws.append(Law(row, k, -joint.friction, joint.friction))
         if joint.motor is not None:
             # A limit of the coordinate or of its rate stops a velocity motor, also one without a largest force.
-            stops = {"least": low, "most": high, "reach": reach}
+            stops = (low, high, reach)
             laws.append(_motor_law(joint.motor, row, k, times, stops, moving=moving))
     return laws
 
 
-def _motor_law(motor: Motor, row: int, k: float, times: Floats, stops: Mapping[str, float], *, moving: bool) -> Law:
+def _motor_law(
+    motor: Motor, row: int, k: float, times: Floats, stops: tuple[float, float, float], *, moving: bool
+) -> Law:
     h = times[1] - times[0]
     bound = np.inf if motor.max_force is None else float(motor.max_force)
     targets = np.array([motor.at(float(time)) for time in times[1:]])
     if isinstance(motor, ForceMotor):
         return Law(row, 0.0, given=-targets, adapts=False, is_motor=True)
     if isinstance(motor, VelocityMotor):
-        return Law(row, k, -bound, bound, is_motor=True, step=h * targets, **stops)
+        return Law(row, k, -bound, bound, True, True, 0.0, *stops, step=h * targets)
     assert isinstance(motor, PositionMotor)
     damping, given = 0.0, -motor.stiffness * targets
     if moving:

@@ -77,7 +77,7 @@ def advance(
     ws.contact.forces.keep_standing(sleep.contacts, sleep.asleep)
     ws.sound[:] = ws.assessment.begin(ws.moment(state.time), ws.contact.tets.now, h, memory.ledger)
     ws.begin_frame(state.time, h)
-    times = state.time + h * np.arange(substeps + 1)
+    times = state.time + h * np.arange(substeps + 1, dtype=np.float64)
     ws.joints.begin_frame(state, sleep.asleep, ws.origins[0], times)
     damping, lengths = damping_in(ws, h), cycles(substeps)
     if damping is not None:

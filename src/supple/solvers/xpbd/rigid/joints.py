@@ -130,11 +130,7 @@ class JointProjection:
         """As of `State`."""
         g = self.geometry
         along = zip(g.joints, g.along, strict=True)
-        return {
-            str(joint.name): float(self._g[row])
-            for joint, row in along
-            if row >= 0 and g.functions[row] == ANGLE
-        }
+        return {str(joint.name): float(self._g[row]) for joint, row in along if row >= 0 and g.functions[row] == ANGLE}
 
     def fields(self, x: Floats, time: float) -> Mapping[str, Any]:
         """What the details of a frame that ended at world positions x (n, 3) have; forces are means over it."""
