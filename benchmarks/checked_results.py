@@ -20,7 +20,7 @@ from benchmarks.measuring import PEERS_PYTHON, peers_installed, run_json
 from benchmarks.published import publish
 from benchmarks.table import Table
 from supple.results.check.checker import check_series
-from supple.results.check.series import Given
+from supple.results.check.series import SeriesMetadata
 
 PEERS = Path(__file__).parent / "peers"
 sys.path.insert(0, str(PEERS))
@@ -72,7 +72,9 @@ def main(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     short: dict[str, list[str]] = {name: [] for name in programs}
     for name in scenes.NAMES:
         own = scenes.scene(name)
-        given = Given(scenes.DENSITY, scenes.YOUNGS, scenes.POISSON, (0.0, 0.0, own.gravity), free=not own.floor)
+        given = SeriesMetadata(
+            scenes.DENSITY, scenes.YOUNGS, scenes.POISSON, (0.0, 0.0, own.gravity), free=not own.floor
+        )
         for program, run in programs.items():
             if program == "PyBullet" and not own.floor:  # it has no velocities of points at the start
                 short[program].append("cannot run")

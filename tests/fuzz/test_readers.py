@@ -28,7 +28,7 @@ from hypothesis import strategies as st
 import supple as sp
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import read_journal
-from supple.app.runs.keeper import frame_of
+from supple.app.runs.run_writer import frame_of
 from supple.app.scene_file.loader import load_run
 from supple.app.studies.run_case import read_result
 from supple.mesh import shapes

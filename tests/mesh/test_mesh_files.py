@@ -300,7 +300,7 @@ def test_negative_tets_and_unused_vertices_in_files(tmp_path, caplog):
     meshio.write(tmp_path / "a.vtu", meshio.Mesh(points, [("tetra", tets), ("line", [[0, 1]])]))
     with caplog.at_level(logging.INFO):
         loaded = TetMesh.load(tmp_path / "a.vtu")
-    assert loaded.turned == len(tets[::2])
+    assert loaded.reoriented == len(tets[::2])
     assert loaded.volume == pytest.approx(BODY.volume)
-    assert f"{loaded.turned} of {len(tets)} tets had negative winding" in caplog.text
+    assert f"{loaded.reoriented} of {len(tets)} tets had negative winding" in caplog.text
     assert "dropped 1 of" in caplog.text

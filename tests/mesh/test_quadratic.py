@@ -93,7 +93,7 @@ def test_tets_that_are_inside_out_are_turned_with_their_nodes(mirror):
     scale = np.ones(3)
     scale[mirror] = -1.0
     mesh = sp.TetMesh(WAVY.vertices * scale, WAVY.nodes)
-    assert mesh.turned == len(mesh.tets)
+    assert mesh.reoriented == len(mesh.tets)
     np.testing.assert_allclose(mesh.volumes, WAVY.volumes, rtol=1e-12)
 
 

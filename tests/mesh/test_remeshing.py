@@ -50,7 +50,7 @@ def test_a_tetrahedron_with_two_turned_triangles_is_turned_first(caplog):
     mesh, report = tetrahedralize_reported(turned_tetrahedron(), tets=500)
     assert report.mesher == "mmg"
     assert mesh.volume == pytest.approx(0.05**3 / 6, rel=1e-6)
-    assert "turned 2 triangles to agree" in caplog.text
+    assert "reoriented 2 triangles to agree" in caplog.text
 
 
 def test_shells_that_overlap_are_united(caplog):

@@ -61,7 +61,7 @@ def test_mixed_orientation_is_made_to_agree(seed: int, caplog: pytest.LogCapture
 def test_an_inward_surface_is_turned() -> None:
     repaired, report = repair_surface(BALL.flipped())
     assert repaired.volume == pytest.approx(BALL.volume)
-    assert report.steps == ("turned 1 components that faced the wrong way",)
+    assert report.steps == ("reoriented 1 components that faced the wrong way",)
 
 
 def test_a_one_sided_surface_cannot_be_oriented() -> None:

@@ -30,7 +30,7 @@ def test_box(divisions):
     a, b, c = divisions
     assert len(mesh.vertices) == (a + 1) * (b + 1) * (c + 1)
     assert len(mesh.tets) == 6 * a * b * c
-    assert mesh.turned == 0
+    assert mesh.reoriented == 0
     assert mesh.volume == pytest.approx(0.06)
     assert np.ptp(mesh.volumes) < 1e-12
     assert np.allclose(mesh.surface.bounds, [(-0.5, -0.1, -0.15), (0.5, 0.1, 0.15)])

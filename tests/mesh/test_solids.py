@@ -50,7 +50,7 @@ def assert_fills(points, blocks, volume):
     """All facets inside are of two tets, and the whole is as large as the cells."""
     result = tets_of(soup_of(points, **{str(k): block for k, block in enumerate(blocks)}))
     mesh = sp.TetMesh.dropping_unused(result.points, result.tets)
-    assert mesh.turned == 0
+    assert mesh.reoriented == 0
     assert mesh.volume == pytest.approx(volume, rel=1e-12)
     keys = np.concatenate([facet_keys(mesh.tets[:, facet], len(mesh.vertices)) for facet in TET_FACETS])
     _, counts = np.unique(keys, return_counts=True)

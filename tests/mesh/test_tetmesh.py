@@ -23,7 +23,7 @@ def determinants(mesh):
 
 def test_two_tets():
     mesh = TetMesh(CORNERS, TWO)
-    assert mesh.turned == 0
+    assert mesh.reoriented == 0
     assert mesh.volumes.tolist() == pytest.approx([1 / 6, 1 / 3])
     assert mesh.volume == pytest.approx(0.5)
     assert mesh.adjacency.tolist() == [[1, -1, -1, -1], [-1, -1, -1, 0]]
@@ -38,7 +38,7 @@ def test_winding_is_normalized_and_counted():
     tets = np.array(TWO)
     tets[1] = tets[1][[1, 0, 2, 3]]
     mesh = TetMesh(CORNERS, tets)
-    assert mesh.turned == 1
+    assert mesh.reoriented == 1
     assert (determinants(mesh) > 0).all()
     assert mesh.surface.volume == pytest.approx(0.5)
 
@@ -137,7 +137,7 @@ def test_transformed_body():
     mesh = TetMesh(CORNERS, TWO)
     assert mesh.transformed(scale=2.0, translation=(1, 2, 3)).volume == pytest.approx(4.0)
     mirrored = mesh.transformed(scale=(-1, 1, 1))
-    assert mirrored.turned == 2
+    assert mirrored.reoriented == 2
     assert mirrored.volume == pytest.approx(0.5)
 
 

@@ -143,7 +143,7 @@ def test_triangles_that_disagree_are_turned_first(caplog: pytest.LogCaptureFixtu
     mesh, report = tetrahedralize_reported(mixed)
     assert report.mesher == "tetgen"
     assert mesh.volume == pytest.approx(SPHERE.volume, rel=1e-3)
-    assert "turned 5 triangles to agree with their neighbours" in caplog.text
+    assert "reoriented 5 triangles to agree with their neighbours" in caplog.text
 
 
 def test_surfaces_with_faults_are_filled(caplog: pytest.LogCaptureFixture) -> None:

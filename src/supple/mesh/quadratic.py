@@ -19,7 +19,7 @@ from supple.numerics.quadratic_shape_functions import (
 from supple.runtime.kernel_cache import read_only
 
 
-def turned_nodes(nodes: NDArray[np.int32], negative: NDArray[np.bool_]) -> NDArray[np.int32]:
+def reoriented_nodes(nodes: NDArray[np.int32], negative: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Tets (m, 4) or (m, 10) with corners 2 and 3 exchanged where `negative`."""
     order = TURNED[: nodes.shape[1]]
     return np.where(negative[:, None], nodes[:, order], nodes)

@@ -20,7 +20,7 @@ from supple.mesh.quadratic import (
     check_positive,
     facet_quarters,
     half_edges,
-    turned_nodes,
+    reoriented_nodes,
     volumes_of,
     with_middle_nodes,
 )
@@ -50,7 +50,7 @@ ROUND_OFF_UNITS = 64.0
 class TetMesh(Showable):
     """Tetrahedra in space, each with det[x1-x0, x2-x0, x3-x0] > 0.
 
-    Tets given with the other winding are turned by swapping their last two vertices; `turned` is their number.
+    Tets given with the other winding are reoriented by swapping their last two vertices; `reoriented` is their number.
 
     Quadratic tets have ten nodes: the four corners, and one on each of the edges (0, 1), (1, 2), (0, 2), (0, 3),
     (1, 3), (2, 3), in this order, that of VTK. Their edges and sides may be curved. The determinant of the map
@@ -69,7 +69,7 @@ class TetMesh(Showable):
     tets : (m, 4) the corners, rows of `vertices`
     nodes : (m, 4), or (m, 10) of quadratic tets
     order : 1, or 2 of quadratic tets
-    turned : int
+    reoriented : int
         Number of tets that were given with negative winding.
 
     Raises
@@ -82,7 +82,7 @@ class TetMesh(Showable):
     vertices: NDArray[np.float64]
     tets: NDArray[np.int32]
     nodes: NDArray[np.int32]
-    turned: int
+    reoriented: int
 
     _arguments: ClassVar[dict[str, str]] = {"vertices": "vertices", "tets": "nodes"}  # see `supple.kinds.codec`
 
@@ -91,14 +91,14 @@ class TetMesh(Showable):
         given = index_array(tets, _width(tets), len(points), "TetMesh", "tet")
         _check_repeated_corners(given)
         negative = _negative_winding(points, given[:, :4])
-        nodes = turned_nodes(given, negative)
+        nodes = reoriented_nodes(given, negative)
         corners = np.ascontiguousarray(nodes[:, :4])
         _check_unused(points, nodes)
         _check_duplicates(corners, len(points))
         object.__setattr__(self, "vertices", points)
         object.__setattr__(self, "tets", frozen(corners))
         object.__setattr__(self, "nodes", self.tets if nodes.shape[1] == 4 else frozen(nodes))
-        object.__setattr__(self, "turned", int(np.count_nonzero(negative)))
+        object.__setattr__(self, "reoriented", int(np.count_nonzero(negative)))
         _ = self.adjacency  # raises for facets that three or more tets share
         if self.order == 2:
             check_middle_nodes(nodes, len(points))
@@ -152,7 +152,7 @@ class TetMesh(Showable):
 
         Tets of ten nodes stay quadratic; of TetGen's only the corners are used. Hexahedra, wedges, pyramids and voxels
         are split into tets that fit those of their neighbours: by the numbers of their corners (Dompierre et al. 1999).
-        Vertices that belong to no tet are dropped, and negative tets are turned; the log says so.
+        Vertices that belong to no tet are dropped, and negative tets are reoriented; the log says so.
 
         Parameters
         ----------
@@ -174,8 +174,10 @@ class TetMesh(Showable):
             mesh = cls.dropping_unused(file.points, file.tets)
         except MeshError as error:
             raise MeshError(f"{source}: {str(error).removeprefix('TetMesh: ')} (counted from 0)") from None
-        if mesh.turned:
-            logger.info("%s: %d of %d tets had negative winding and were turned", source, mesh.turned, len(mesh.tets))
+        if mesh.reoriented:
+            logger.info(
+                "%s: %d of %d tets had negative winding and were reoriented", source, mesh.reoriented, len(mesh.tets)
+            )
         return mesh._with_sets(sets_of(file))
 
     def save(self, path: str | Path) -> None:

@@ -81,7 +81,7 @@ def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str], capl
     turned = np.vstack([BALL.triangles[:9, ::-1], BALL.triangles[9:]])
     SurfaceMesh(BALL.vertices, turned).save(ball)
     assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--mesher", "tetgen"]) == 0
-    assert "turned 9 triangles to agree with their neighbours" in caplog.text
+    assert "reoriented 9 triangles to agree with their neighbours" in caplog.text
     SurfaceMesh(BALL.vertices, BALL.triangles[1:]).save(ball)
     assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--mesher", "tetgen"]) == 2
     assert "open boundary edge" in capsys.readouterr().err

@@ -254,4 +254,4 @@ def test_inverted_tets_are_reoriented(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     assert main(["info", "t.ele"]) == ExitCode.OK
     out = capfd.readouterr().out
-    assert [line.split()[-1] for line in out.splitlines() if line.startswith("tets turned")] == ["1"]
+    assert [line.split()[-1] for line in out.splitlines() if line.startswith("tets reoriented")] == ["1"]

@@ -36,7 +36,7 @@ def test_time_runs_only_while_somebody_watches(loop):
         commands.Watch(1)
 
 
-def test_a_paused_simulation_sends_signs_of_life_and_no_snapshots(loop, monkeypatch):
+def test_a_paused_simulation_sends_heartbeats_and_no_snapshots(loop, monkeypatch):
     monkeypatch.setattr(simulation_loop, "HEARTBEAT", 0.0)
     loop.execute(commands.Pause())
     loop.publish(time.perf_counter())

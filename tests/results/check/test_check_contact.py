@@ -215,10 +215,10 @@ def test_excluded_and_stitched_pairs_are_recorded(tmp_path):
     path = tmp_path / "r.vtkhdf"
     with sp.read_recording(recorded(path, scene, sp.XPBD(substeps=2))) as recording:
         trajectory = RecordedTrajectory(recording)
-        untouching = set(map(tuple, np.argwhere(~trajectory.surfaces.allowed).tolist()))
+        excluded_pairs = set(map(tuple, np.argwhere(~trajectory.surfaces.allowed).tolist()))
         n = len(recording.rest_positions)
-        assert {(0, 1), (0, 2), (1, 2), (2, 2)} <= untouching
-        assert not {(0, 0), (1, 1), (0, 3)} & untouching
+        assert {(0, 1), (0, 2), (1, 2), (2, 2)} <= excluded_pairs
+        assert not {(0, 0), (1, 1), (0, 3)} & excluded_pairs
         a = scene.bodies[0].mesh.surface.triangles[3]
         assert [row.tolist() for row in np.sort(recording.stitches.nodes)] == [
             [*sorted(a), 2 * n // 3],

@@ -79,7 +79,7 @@ _ANNOUNCED = ("supple.mesh.meshing", "supple.app.scene_file")
 
 
 class _Handler(logging.StreamHandler):
-    """Writes to the present stderr, which a sign of life replaces so that lines appear above it."""
+    """Writes to the present stderr, which a progress line replaces so that lines appear above it."""
 
     def __init__(self) -> None:
         logging.Handler.__init__(self)

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from supple.app.runs.journal import differences, versions
-from supple.app.runs.keeper import checkpoint_of, facts_of, frame_of
+from supple.app.runs.run_writer import checkpoint_of, facts_of, frame_of
 from supple.app.scene_file.loader import Run
 from supple.errors import SuppleError
 from supple.results.checkpoint.file import RunFacts, read_checkpoint, write_checkpoint

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal, differences, read_journal, versions
-from supple.app.runs.keeper import Keeper, frame_of
 from supple.app.runs.run_folder import FolderSink
+from supple.app.runs.run_writer import RunWriter, frame_of
 from supple.errors import OutputError, SceneError
 from supple.results.checkpoint.file import Checkpoint, read_checkpoint
 from supple.results.frame import Frame
@@ -39,11 +39,11 @@ class ResumedFolder(FolderSink):
         self._journal = journal
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        """Lock the folder, and make room for the rest."""
+        """Lock the folder, and reserve the remaining frames."""
         self._lock = FolderLock(self.paths.folder)
         recorder = self._recorder()
-        self._keeper = Keeper(self.paths, recorder, self._journal, checkpointed=first.index)
-        self._keeper.begin(first, dt, steps)
+        self._writer = RunWriter(self.paths, recorder, self._journal, checkpointed=first.index)
+        self._writer.begin(first, dt, steps)
         self.paths.remove_checkpoints_after(first.index)
 
     def _recorder(self) -> Recorder:

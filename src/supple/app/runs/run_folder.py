@@ -12,7 +12,7 @@ import numpy as np
 
 from supple.app.runs.contents import RunPaths
 from supple.app.runs.journal import Journal
-from supple.app.runs.keeper import Keeper, facts_of
+from supple.app.runs.run_writer import RunWriter, facts_of
 from supple.errors import OutputError, SceneError
 from supple.kinds.validators import POSITIVE
 from supple.results.frame import Frame
@@ -43,26 +43,26 @@ class SceneSource:
 
 
 class FolderSink:
-    """A sink that locks a folder and passes everything on to a `Keeper`."""
+    """A sink that locks a folder and passes everything on to a `RunWriter`."""
 
     def __init__(self, folder: Path) -> None:
         self.paths = RunPaths(folder)
         self._lock: FolderLock | None = None
-        self._keeper: Keeper | None = None
+        self._writer: RunWriter | None = None
 
     def write(self, frame: Frame) -> None:
         """Record a frame, and write a checkpoint where one is due."""
-        if self._keeper is None:
+        if self._writer is None:
             raise OutputError(f"{self.paths.folder}: write was called before begin; let simulate drive the run folder")
-        self._keeper.write(frame)
+        self._writer.write(frame)
 
     def end(self) -> None:
         """Write the last checkpoint and the tables, close the recording, and unlock the folder."""
-        keeper, self._keeper = self._keeper, None
+        writer, self._writer = self._writer, None
         lock, self._lock = self._lock, None
         try:
-            if keeper is not None:
-                keeper.end()
+            if writer is not None:
+                writer.end()
         finally:
             if lock is not None:
                 lock.release()
@@ -159,8 +159,8 @@ class RunFolder(FolderSink):
             self._copy_source()
         except OSError as error:
             raise output_error(self.paths.folder, error) from None
-        self._keeper = Keeper(self.paths, recorder, journal)
-        self._keeper.begin(first, dt, steps)
+        self._writer = RunWriter(self.paths, recorder, journal)
+        self._writer.begin(first, dt, steps)
 
     def _refuse(self) -> None:
         """Raise where the folder cannot be used."""

@@ -114,17 +114,17 @@ def _nested(s: StartSurfaces, table: PairTable, met: set[tuple[int, int]]) -> li
     low, high = _boxes(s)
     none = np.zeros((0, 2), dtype=np.int64)
     found: dict[tuple[int, int, str], Intersection] = {}
-    is_room = np.isin(np.arange(len(s.solid)), s.rooms)
+    is_container = np.isin(np.arange(len(s.solid)), s.rooms)
     for thing, vertex in s.pieces.tolist():
-        if is_room[thing]:
+        if is_container[thing]:
             continue
         q = s.points[vertex]
         point = (q[0], q[1], q[2])
         within = s.solid & (low < q).all(axis=1) & (q < high).all(axis=1)
-        for other in np.flatnonzero(table.collide[thing] & (within | is_room)).tolist():
+        for other in np.flatnonzero(table.collide[thing] & (within | is_container)).tolist():
             if other == thing or (min(thing, other), max(thing, other)) in met:
                 continue
-            room = bool(is_room[other])
+            room = bool(is_container[other])
             inside = round(winding_number(s.points, s.of(other), point)) != 0
             if inside == room:
                 continue

@@ -67,7 +67,7 @@ def start_surfaces(system: System, positions: NDArray[np.float64], time: float) 
             normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
             planes.append((thing, corners[0], normal / np.linalg.norm(normal)))
             continue
-        if part.obstacle.is_room:
+        if part.obstacle.is_container:
             rooms.append(thing)
             solid[thing] = False
         solid[thing] &= is_closed(part.triangles)

@@ -149,8 +149,8 @@ def _split(
             )
         kept = ~warped[cell]
         tets, cell = np.concatenate([tets[kept], around]), np.concatenate([cell[kept], again])
-    turned = sign[cell] < 0.0
-    tets[turned] = tets[turned][:, [0, 1, 3, 2]]
+    reoriented = sign[cell] < 0.0
+    tets[reoriented] = tets[reoriented][:, [0, 1, 3, 2]]
     return tets, cell, points, int(warped.sum())
 
 
@@ -158,8 +158,8 @@ def _fan(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
     """Triangles (k, n - 2, 3) of polygons (k, n), from the vertex with the smallest number."""
     n = polygons.shape[1]
     start = polygons.argmin(axis=1)[:, None]
-    turned = np.take_along_axis(polygons, (start + np.arange(n)) % n, axis=1)
-    return np.stack([turned[:, [0, j, j + 1]] for j in range(1, n - 1)], axis=1)
+    rotated = np.take_along_axis(polygons, (start + np.arange(n)) % n, axis=1)
+    return np.stack([rotated[:, [0, j, j + 1]] for j in range(1, n - 1)], axis=1)
 
 
 def _determinants(points: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:

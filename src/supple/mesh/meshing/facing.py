@@ -33,7 +33,7 @@ def facing_outward(surface: SurfaceMesh) -> tuple[SurfaceMesh, SurfaceReport]:
     if len(wrong) == 0 or report.self_intersecting:
         return surface, report
     flipped = np.isin(surface.components.labels, wrong)
-    # If all are wrong, the surface is inside out. Otherwise only bodies are turned: a cavity could be a mistake.
+    # If all are wrong, the surface is inside out. Otherwise only bodies are reoriented: a cavity could be a mistake.
     if len(wrong) < report.component_count:
         for k in wrong:
             alone = SurfaceMesh(
@@ -43,11 +43,11 @@ def facing_outward(surface: SurfaceMesh) -> tuple[SurfaceMesh, SurfaceReport]:
                 flipped[surface.components.labels == k] = False
     if not flipped.any():
         return surface, report
-    logger.warning("turned %d of %d triangles that faced inward", np.count_nonzero(flipped), len(flipped))
+    logger.warning("reoriented %d of %d triangles that faced inward", np.count_nonzero(flipped), len(flipped))
     triangles = surface.triangles.copy()
     triangles[flipped] = triangles[flipped][:, ::-1]
-    turned = SurfaceMesh(surface.vertices, triangles)
-    return turned, turned.check()
+    reoriented = SurfaceMesh(surface.vertices, triangles)
+    return reoriented, reoriented.check()
 
 
 def consistently_oriented(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
@@ -55,11 +55,11 @@ def consistently_oriented(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh
     report = surface.check()
     if len(report.inconsistent_edges) == 0 or len(report.non_manifold_edges):
         return surface
-    turned = _disagreeing(surface.triangles, len(surface.vertices))
-    if turned is None:
+    reoriented = _disagreeing(surface.triangles, len(surface.vertices))
+    if reoriented is None:
         return surface
-    steps.append(f"turned {np.count_nonzero(turned)} triangles to agree with their neighbours")
-    return SurfaceMesh(surface.vertices, np.where(turned[:, None], surface.triangles[:, ::-1], surface.triangles))
+    steps.append(f"reoriented {np.count_nonzero(reoriented)} triangles to agree with their neighbours")
+    return SurfaceMesh(surface.vertices, np.where(reoriented[:, None], surface.triangles[:, ::-1], surface.triangles))
 
 
 def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bool_] | None:
@@ -80,8 +80,8 @@ def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bo
     labels = graph_components(2 * m, rows, columns)
     if (labels[:m] == labels[m:]).any():
         return None
-    # Each piece appears twice in the graph, as it is and turned; the lower label is one of the two.
-    turned = labels[:m] > labels[m:]
+    # Each piece appears twice in the graph, as it is and reoriented; the lower label is one of the two.
+    reoriented = labels[:m] > labels[m:]
     piece = np.minimum(labels[:m], labels[m:])
-    share = np.bincount(piece, weights=turned) / np.maximum(np.bincount(piece), 1)
-    return turned ^ (share[piece] > 0.5)
+    share = np.bincount(piece, weights=reoriented) / np.maximum(np.bincount(piece), 1)
+    return reoriented ^ (share[piece] > 0.5)

@@ -145,7 +145,7 @@ def _orient(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
     if len(report.wrong_facing_components):
         rows = np.isin(surface.components.labels, report.wrong_facing_components)
         surface = SurfaceMesh(surface.vertices, np.where(rows[:, None], surface.triangles[:, ::-1], surface.triangles))
-        steps.append(f"turned {len(report.wrong_facing_components)} components that faced the wrong way")
+        steps.append(f"reoriented {len(report.wrong_facing_components)} components that faced the wrong way")
     return surface
 
 

@@ -72,9 +72,9 @@ def tetrahedralize(
     sharp edges stay, the boundary moves by about a tenth of an edge and is fitted so that the volume stays. Closed
     components that overlap are united first. Any other surface that is not clean is filled by isosurface stuffing,
     which rounds sharp edges at the size of a tet. The log has the distance between both surfaces; draw the original one
-    as the skin of the body. Triangles that disagree with their neighbours, and components that face inward, are turned
-    first. Cavities (closed shells inside others, facing inward) stay empty. All meshers run in child processes: a
-    crash, an endless loop or a lack of memory there does not affect this process.
+    as the skin of the body. Triangles that disagree with their neighbours, and components that face inward, are
+    reoriented first. Cavities (closed shells inside others, facing inward) stay empty. All meshers run in child
+    processes: a crash, an endless loop or a lack of memory there does not affect this process.
 
     Parameters
     ----------

@@ -252,7 +252,7 @@ def near_boxes(boxes: NDArray[np.float64], together: NDArray[np.bool_]) -> tuple
 
 @njit(cache=True)
 def _near_boxes(boxes, low, high, together, starts, found):
-    """Count what is near box k in starts[k + 1]; where `found` has room for that, write it instead."""
+    """Count what is near box k in starts[k + 1]; where `found` has capacity for that, write it instead."""
     count = len(boxes)
     for k in range(count):
         total = 0

@@ -23,7 +23,7 @@ from supple.results.check.checks.works import Works
 from supple.results.check.frame_check import UNKNOWN, FrameCheck, skipped
 from supple.results.check.recorded import RecordedTrajectory
 from supple.results.check.report import CheckReport, CheckResult, Verdict
-from supple.results.check.series import Given, SeriesTrajectory
+from supple.results.check.series import SeriesMetadata, SeriesTrajectory
 from supple.results.check.settings import CheckSettings
 from supple.results.check.shown import place_of
 from supple.results.check.trajectory import Trajectory
@@ -84,7 +84,7 @@ def check_recording(
 
 def check_series(
     series: Series | str | Path,
-    given: Given | None = None,
+    given: SeriesMetadata | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
     **settings: Any,
@@ -110,7 +110,7 @@ def check_series(
     """
     wanted = CheckSettings(**settings)
     opened_series = series if isinstance(series, Series) else open_series(series)
-    return _checked(SeriesTrajectory(opened_series, given or Given()), wanted, progress)
+    return _checked(SeriesTrajectory(opened_series, given or SeriesMetadata()), wanted, progress)
 
 
 def _checked(source: Trajectory, wanted: CheckSettings, progress: Callable[[int, int], None] | None) -> CheckReport:

@@ -32,7 +32,7 @@ _APART = 1e-6
 
 
 @dataclass(frozen=True)
-class Given(Kind):
+class SeriesMetadata(Kind):
     """What a user knows of a series beside its files.
 
     Parameters
@@ -78,7 +78,7 @@ class SeriesPart:
 class SeriesTrajectory(Trajectory):
     """The frames of another program."""
 
-    def __init__(self, series: Series, given: Given) -> None:
+    def __init__(self, series: Series, given: SeriesMetadata) -> None:
         self.path, self._series, count = Path(series.path), series, len(series)
         first = self._first()
         parts = parts_of(series.cells, first, self._last(count))
@@ -183,7 +183,7 @@ def _step(times: NDArray[np.float64] | None, given: float | None) -> float | Non
     return step if np.isfinite(step) and step > 0.0 else None
 
 
-def _material(given: Given, tets: int) -> TetMaterial:
+def _material(given: SeriesMetadata, tets: int) -> TetMaterial:
     if given.youngs is None or given.poisson is None:
         return NotRecorded(name="unknown").per_tet(tets)
     return LAWS[given.law](youngs=given.youngs, poisson=given.poisson, density=given.density or 1.0).per_tet(tets)

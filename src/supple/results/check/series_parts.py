@@ -126,7 +126,7 @@ def _pieces(cells: Cells, tets: Ints, triangles: Ints) -> tuple[Ints, tuple[str,
 def _wound(tets: Ints, piece: Ints, x: NDArray[np.float64], notes: list[str]) -> Ints:
     """The tets with the winding that makes those of the first frame positive.
 
-    Where a file winds all tets of a part the other way, all are turned, so that a tet that is inverted in the first
+    Where a file winds all tets of a part the other way, all are reoriented, so that a tet that is inverted in the first
     frame stays so.
     """
     if len(tets) == 0:
@@ -134,11 +134,11 @@ def _wound(tets: Ints, piece: Ints, x: NDArray[np.float64], notes: list[str]) ->
     negative = volume_signs(np.ascontiguousarray(x), tets.astype(np.int32)) < 0
     share = np.bincount(piece, negative) / np.maximum(np.bincount(piece), 1)
     mixed = (share >= _EITHER_WINDING) & (share <= 1.0 - _EITHER_WINDING)
-    turned = np.where(mixed[piece], negative, share[piece] > 0.5)
+    reoriented = np.where(mixed[piece], negative, share[piece] > 0.5)
     if mixed.any():
-        notes.append("tets are wound both ways; those that are negative in the first frame are turned")
+        notes.append("tets are wound both ways; those that are negative in the first frame are reoriented")
     out = tets.copy()
-    out[turned] = out[turned][:, [1, 0, 2, 3]]
+    out[reoriented] = out[reoriented][:, [1, 0, 2, 3]]
     return out
 
 

@@ -19,7 +19,7 @@ NAMES = {
     "inversion": "no tet is inverted or flat, by the exact sign of its determinant",
     "intersection": "no two surfaces meet, by exact tests of their triangles",
     "tunnelling": "no surface passes through another one between two frames",
-    "obstacles": "no body is in a half-space or a round solid, or outside its room",
+    "obstacles": "no body is in a half-space or a round solid, or outside its container",
     "containment": "nothing is completely inside another thing",
     "distance": "the distance of surfaces is above zero",
     "rigidity": "rigid bodies are neither deformed nor mirrored",

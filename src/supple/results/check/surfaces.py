@@ -81,7 +81,7 @@ class Surfaces:
         self.closed = [all(piece.closed for piece in pieces if piece.owner == k) for k in range(len(self.names))]
 
     def place(self, positions: Floats, poses: Floats) -> Floats:
-        """All points (n + skins' + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
+        """All points (n + skins' + obstacles' + 2, 3) of a frame; the last two rows are for a ray."""
         x = np.zeros((self.points + 2, 3))
         x[: len(positions)] = positions
         for body, skin, row in self.skins:

@@ -73,10 +73,10 @@ class Studio:
             elif self._shaded:
                 mesh.point_data["color"] = np.tile(np.array(surface.color, dtype=np.uint8), (mesh.n_points, 1))
                 look = _phong(surface.look) | {"scalars": "color", "rgb": True}
-            room = surface.room
-            opacity = 1.0 if room else surface.opacity
+            inner = surface.container
+            opacity = 1.0 if inner else surface.opacity
             # Sides that cannot be seen are not drawn: a third of the time of a renderer on a processor.
-            hidden = "front" if room else "back" if flat.hides_its_backs(model) else None
+            hidden = "front" if inner else "back" if flat.hides_its_backs(model) else None
             actor = plotter.add_mesh(mesh, opacity=opacity, culling=hidden, **look)
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
@@ -166,7 +166,7 @@ class Studio:
     def _shade(self, points: list[NDArray[np.float64]], normals: list[NDArray[np.float64]]) -> None:
         """Darken what little light reaches."""
         surfaces = [surface for _, surface in self._meshes]
-        facing = [-n if surface.room else n for n, surface in zip(normals, surfaces, strict=True)]
+        facing = [-n if surface.container else n for n, surface in zip(normals, surfaces, strict=True)]
         drawn = [(x, surface.triangles, n) for x, surface, n in zip(points, surfaces, facing, strict=True)]
         for (mesh, surface), dark in zip(self._meshes, occlusion(drawn, self._bodies), strict=True):
             if "color" in mesh.point_data:

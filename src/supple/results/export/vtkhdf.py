@@ -1,4 +1,4 @@
-"""A copy of a recording: compressed, without unused room, and complete for VTK where its writer was killed."""
+"""A copy of a recording: compressed, without unused space, and complete for VTK where its writer was killed."""
 
 from __future__ import annotations
 

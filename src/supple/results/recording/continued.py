@@ -38,7 +38,7 @@ class ContinuedRecorder(Recorder):
         self._next = 0
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        """Make room for `steps` frames after `first`."""
+        """Reserve `steps` frames after `first`."""
         fresh = temporary_name(self.path)
         try:
             with read_recording(self.path) as recording:

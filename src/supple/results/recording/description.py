@@ -153,8 +153,8 @@ def _check_consistency(found: Description, functions: list[int]) -> None:
         raise ValueError("it has a function of time without values")
     for body in found.scene.bodies:
         shape = body.shape if isinstance(body, RigidBody) else body.mesh
-        if isinstance(shape, TetMesh) and shape.turned:  # those that are written have been turned
-            raise ValueError(f"{shape.turned} tets of body {body.name!r} are inverted at rest")
+        if isinstance(shape, TetMesh) and shape.reoriented:  # those that are written have been reoriented
+            raise ValueError(f"{shape.reoriented} tets of body {body.name!r} are inverted at rest")
     _ = found.scene.stitching  # raises where a pair does not exist
     found.details.check()
 

@@ -1,12 +1,13 @@
 """A VTKHDF file of which a killed writer loses at most the frame that it writes.
 
 The HDF5 library alone does not guarantee this (notes/decisions.md, 4). Therefore it first lays out the whole file, with
-room for many frames, and closes it. Every series of frames then has a fixed position ("contiguous" layout), and a frame
-is written there as plain bytes; the last write of a frame is the count of frames. Room that is not used takes no disk
-space where the file system supports holes.
+capacity for many frames, and closes it. Every series of frames then has a fixed position ("contiguous" layout), and a
+frame is written there as plain bytes; the last write of a frame is the count of frames. Capacity that is not used takes
+no disk space where the file system supports holes.
 
-When the room is used up, the file is copied to a file with twice the room, which then replaces it. When the simulation
-ends, it is copied to a file without room, which has the steps of VTK: until then ParaView shows the first frame.
+When the capacity is used up, the file is copied to a file with twice the capacity, which then replaces it. When the
+simulation ends, it is copied to a file without spare capacity, which has the steps of VTK: until then ParaView shows
+the first frame.
 
 Source: VTKHDF file format 2.x (docs.vtk.org).
 """
@@ -71,7 +72,7 @@ class RecordingFile:
 
     Parameters
     ----------
-    path : the file; layout : of its frames; capacity : how many frames it has room for; written : how many it has.
+    path : the file; layout : of its frames; capacity : its frames; written : how many it has.
     """
 
     def __init__(self, path: Path, layout: Layout, capacity: int, written: int = 0) -> None:
@@ -136,7 +137,7 @@ class RecordingFile:
 
 
 def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5py.File], None]) -> None:
-    """Lay out a file with room for `capacity` frames and no frame; `write_static` adds all that does not change."""
+    """Lay out a file for `capacity` frames, with none yet; `write_static` adds all that does not change."""
     # A draft in memory gives the size.
     with h5py.File(path, "w", driver="core", backing_store=False) as draft:
         write_static(draft)
@@ -151,7 +152,8 @@ def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5
 
 
 def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *, compress: bool = False) -> None:
-    """Copy the complete frames of a recording to a file with another capacity; None: to one for ParaView, without room.
+    """Copy the complete frames of a recording to a file with another capacity; None: to one for ParaView, without spare
+    capacity.
 
     With `compress`, the series are stored in gzip chunks, one per frame; nothing can be added to them then.
 
@@ -169,7 +171,7 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
                 _HEADER + item.id.get_storage_size() if isinstance(item, h5py.Dataset) and path not in paths else 0
             )
         )
-        small = sizes[0] <= _COPY_BYTES  # then it is tried once whether there is room, which takes milliseconds
+        small = sizes[0] <= _COPY_BYTES  # then it is tried once whether there is space, which takes milliseconds
         _require_room(target, sum(sizes if small else sizes[1:]))
         _copy_static(old, new, "", paths)
         new.create_dataset(WRITTEN, data=np.int64(written))

@@ -42,7 +42,7 @@ REPORT_VECTORS = ("linear_momentum", "angular_momentum")
 INTERNAL = "supple/frames/internal"
 BROKEN_STITCHES = "supple/frames/broken_stitches"
 MESSAGE_BYTES = 512  # longer messages are cut
-# Frames, and bytes of frames, for which there is room at first; the file grows when more are needed.
+# Frames, and bytes of frames, that the file can hold at first; the file grows when more are needed.
 _FIRST_FRAMES, _FIRST_ROOM = 1 << 16, 1 << 30
 
 
@@ -109,7 +109,7 @@ class Recorder:
     Raises
     ------
     OutputError : from the constructor for an unusable path or field; from `begin` and `write` where the system reports
-        an error (no permission, no room), or the file was removed. All complete frames stay readable.
+        an error (no permission, no space), or the file was removed. All complete frames stay readable.
     """
 
     def __init__(
@@ -213,7 +213,7 @@ class Recorder:
                 raise output_error(self.path, error) from None
 
     def end(self) -> None:
-        """Release room that was not used, add the steps of VTK, and close the file."""
+        """Release space that was not used, add the steps of VTK, and close the file."""
         file, self._file = self._file, None
         if file is None:
             return
@@ -229,11 +229,11 @@ class Recorder:
             fresh.unlink(missing_ok=True)
 
     def first_capacity(self, layout: Layout, written: int = 0) -> int:
-        """For how many frames there is room at first, where `written` are there before."""
+        """The capacity at first, in frames, where `written` are there before."""
         return min(self._wanted, written + min(_FIRST_FRAMES, max(2, _FIRST_ROOM // layout.frame_bytes)))
 
     def _make_room(self, file: RecordingFile) -> RecordingFile:
-        """Copy the frames to a file with more room, which replaces this one."""
+        """Copy the frames to a file with more capacity, which replaces this one."""
         capacity = 2 * file.capacity
         if file.capacity < self._wanted:
             capacity = min(capacity, self._wanted)
@@ -243,7 +243,7 @@ class Recorder:
             rewrite(file.path, fresh, file.layout, capacity)
             larger = RecordingFile(fresh, file.layout, capacity, file.written)
             larger.write_count()
-            logger.debug("%s: room for %d frames", file.path, capacity)
+            logger.debug("%s: capacity for %d frames", file.path, capacity)
             return larger.moved(file.path)
         finally:
             fresh.unlink(missing_ok=True)
@@ -270,7 +270,7 @@ class Recorder:
         for pose, obstacle in zip(poses, frame.system.obstacles, strict=True):
             pose[:, :3], pose[:, 3] = obstacle.pose(frame.time)
         file.put("supple/frames/poses", poses)
-        if report.message:  # otherwise the room, which is all zeros, stays a hole in the file
+        if report.message:  # otherwise the space, which is all zeros, stays a hole in the file
             file.put("supple/frames/message", _message_bytes(report.message))
         for field in self._details.fields:
             file.put(field.series.path, field.stored(getattr(report.details, field.name)))

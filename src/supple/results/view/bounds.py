@@ -48,7 +48,7 @@ class View:
 def view_of_scene(points: NDArray[np.float64], up: NDArray[np.float64], obstacles: Sequence[Obstacle]) -> View:
     """The view of bodies in the hull of points (k, 3) [m], of the floor not far below, and of obstacles about them.
 
-    Obstacles that are much larger do not count. Of a room the lower half counts, which is drawn.
+    Obstacles that are much larger do not count. Of a container the lower half counts, which is drawn.
     """
     bodies = View(points.min(axis=0), points.max(axis=0), up, points)
     outline = [bodies.outline]
@@ -61,7 +61,7 @@ def view_of_scene(points: NDArray[np.float64], up: NDArray[np.float64], obstacle
             continue
         drawn, _ = obstacle.drawn(bodies.center, bodies.radius)
         heights = drawn @ up
-        if obstacle.is_room:
+        if obstacle.is_container:
             drawn = drawn[heights <= 0.5 * (heights.min() + heights.max())]
         both = np.concatenate([points, drawn])
         if np.linalg.norm(np.ptp(both, axis=0)) < _LARGEST * 2.0 * bodies.radius:

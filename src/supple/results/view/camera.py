@@ -13,7 +13,7 @@ ANGLE = 35.0  # vertical field of view [degrees]
 PRESETS = ("corner", "front", "side", "top", "back")
 # Of the direction from which a scene is seen: to the side, up, and ahead. A bowl must show its inside.
 _CORNER = (0.45, 0.5, 0.84)
-_MARGIN = 1.12  # of the distance of the camera: room beside the bodies
+_MARGIN = 1.12  # of the distance of the camera: margin beside the bodies
 
 
 def direction_of(preset: str, view: View) -> NDArray[np.float64]:

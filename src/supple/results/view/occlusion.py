@@ -36,9 +36,9 @@ def occlusion(surfaces: Surfaces, bodies: int) -> list[NDArray[np.float64]]:
     x = np.concatenate([own for own, _, _ in surfaces[:bodies]])
     low, high = x.min(axis=0), x.max(axis=0)
     cell = max(float((high - low).max()), 1e-9) / _CELLS
-    room = int(np.ceil((3.0 + _ABOVE) * _BLUR)) + 1
-    origin = low - room * cell
-    grid = np.zeros(tuple(np.ceil((high - low) / cell).astype(int) + 2 * room + 1))
+    margin = int(np.ceil((3.0 + _ABOVE) * _BLUR)) + 1
+    origin = low - margin * cell
+    grid = np.zeros(tuple(np.ceil((high - low) / cell).astype(int) + 2 * margin + 1))
     longest = [_collect(np.ascontiguousarray(own), each, origin, 1.0 / cell, grid) for own, each, _ in surfaces]
     # Of the area [cells^2] in a cell, blurred: at a plane, that of a Gaussian across it.
     density = gaussian_filter(grid, _BLUR, mode="constant", truncate=3.0)

@@ -19,8 +19,8 @@ from supple.results.view.skin_contact import kept_out
 from supple.runtime.kernel_cache import njit
 from supple.scene.rows import BodyRows
 
-# A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
-ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
+# A container is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
+CONTAINER_OPACITY, WALL_OPACITY = 0.13, 0.05
 # Between a skin and an obstacle, as a share of the scene's radius: a round wall is drawn as flat triangles within it.
 _SKIN_GAP = 2e-3
 _STRETCH = 2.0  # of the part of a skin that reaches beyond tets, at most
@@ -79,7 +79,7 @@ class SoftSurface(Surface):
     skin: bool
     rows: NDArray[np.int64]
     opacity: ClassVar[float] = 1.0
-    room: ClassVar[bool] = False
+    container: ClassVar[bool] = False
     casts_shadow: ClassVar[bool] = True
     is_floor: ClassVar[bool] = False
 
@@ -112,15 +112,15 @@ class RigidSurface(Surface):
     vertices : (k, 3) in its own coordinates [m]
     pose : (3, 4) rotation and translation of a moment
     opacity : from 0 to 1
-    room : whether it is seen from within; its triangles face outwards, and a page draws only their backs
-    casts_shadow : on floors; planes and rooms do not
+    container : whether it is seen from within; its triangles face outwards, and a page draws only their backs
+    casts_shadow : on floors; planes and containers do not
     is_floor : whether it is a plane that bodies stand on, which pictures draw as a disc
     """
 
     vertices: NDArray[np.float64]
     pose: Callable[[Moment], NDArray[np.float64]]
     opacity: float = 1.0
-    room: bool = False
+    container: bool = False
     casts_shadow: bool = True
     is_floor: bool = False
 
@@ -170,19 +170,19 @@ def boundary_surface(body: BodyRows) -> SoftSurface:
 def obstacle_surfaces(model: Model, dark: bool = False) -> list[RigidSurface]:
     """Those of the obstacles before a bright or `dark` background; a half-space is drawn as a square about the bodies.
 
-    Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not a floor. Of a room the
-    lower half is drawn, so that it looks like a bowl.
+    Obstacles that would hide the bodies are transparent: containers, and half-spaces that are not a floor. Of a
+    container the lower half is drawn, so that it looks like a bowl.
     """
     made, view, color = [], model.view, theme(dark).obstacle
     for number, obstacle in enumerate(model.obstacles):
         vertices, triangles = obstacle.drawn(view.center, 2.5 * view.radius)
         is_wall = obstacle.plane is not None and float(obstacle.plane[1] @ view.up) < 0.5
-        opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if obstacle.is_room else 1.0
+        opacity = WALL_OPACITY if is_wall else CONTAINER_OPACITY if obstacle.is_container else 1.0
         triangles = triangles.astype(np.int32)
-        if obstacle.is_room and _volume(vertices, triangles) < 0.0:
+        if obstacle.is_container and _volume(vertices, triangles) < 0.0:
             triangles = triangles[:, ::-1].copy()
-        solid, pose = obstacle.plane is None and not obstacle.is_room, _pose_of(number)
-        if obstacle.is_room:
+        solid, pose = obstacle.plane is None and not obstacle.is_container, _pose_of(number)
+        if obstacle.is_container:
             vertices, triangles = _lower_half(vertices, triangles, view.up)
         made.append(
             RigidSurface(
@@ -193,12 +193,12 @@ def obstacle_surfaces(model: Model, dark: bool = False) -> list[RigidSurface]:
                 vertices,
                 pose,
                 opacity,
-                obstacle.is_room,
+                obstacle.is_container,
                 solid,
                 obstacle.plane is not None and not is_wall,
             )
         )
-        rim = rim_of(vertices, triangles, view.up, _RIM * view.radius) if obstacle.is_room else None
+        rim = rim_of(vertices, triangles, view.up, _RIM * view.radius) if obstacle.is_container else None
         if rim is not None:
             made.append(RigidSurface(f"{obstacle.name!s}, rim", rim[1], color, OBSTACLE, rim[0], pose))
     return made

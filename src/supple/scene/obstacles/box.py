@@ -1,4 +1,4 @@
-"""A solid box, or a room with six walls."""
+"""A solid box, or a container with six walls."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from supple.scene.rotation import rotation_matrix
 
 @dataclass(frozen=True, eq=False)
 class Box(Obstacle):
-    """A solid box, or with `inside=True` a room that keeps bodies in.
+    """A solid box, or with `inside=True` a container that keeps bodies in.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ def _signed_distance(parameters, s):
 
 @dataclass(frozen=True, eq=False)
 class Capsule(SegmentObstacle):
-    """All points within `radius` of a segment, or with `inside=True` a room of that shape.
+    """All points within `radius` of a segment, or with `inside=True` a container of that shape.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ def _signed_distance(parameters, s):
 
 @dataclass(frozen=True, eq=False)
 class Cylinder(SegmentObstacle):
-    """A solid cylinder with flat ends, or with `inside=True` a room of that shape.
+    """A solid cylinder with flat ends, or with `inside=True` a container of that shape.
 
     Parameters
     ----------

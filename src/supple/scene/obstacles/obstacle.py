@@ -1,6 +1,6 @@
 """The interface of obstacles. A kind is one class in one file, and one line in `registry`.
 
-An obstacle is a solid, a room with a convex inside, or a mesh of triangles. Its shape is given where it is at
+An obstacle is a solid, a container with a convex inside, or a mesh of triangles. Its shape is given where it is at
 time 0; `motion` moves it from there (see `supple.scene.motion`).
 """
 
@@ -62,7 +62,7 @@ class Obstacle(Kind, ABC):
         return (points - t0) @ R0 @ R1.T + t1
 
     @property
-    def is_room(self) -> bool:
+    def is_container(self) -> bool:
         """Whether it keeps bodies in."""
         return bool(getattr(self, "inside", False))
 
@@ -78,8 +78,8 @@ class Obstacle(Kind, ABC):
 
     @cached_property
     def contact_mesh(self) -> SurfaceMesh | None:
-        """The triangles, at time 0, that XPBD keeps apart from those of bodies; None for rooms and half-spaces."""
-        if self.surface_mesh is not None or self.is_room or self.plane is not None:
+        """The triangles, at time 0, that XPBD keeps apart from those of bodies; None for containers and half-spaces."""
+        if self.surface_mesh is not None or self.is_container or self.plane is not None:
             return self.surface_mesh
         return SurfaceMesh(*self.triangles())
 
@@ -104,7 +104,7 @@ class Obstacle(Kind, ABC):
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
         """Vertices (k, 3) [m] at time 0 and triangles (t, 3), facing outwards: the surface that Implicit and pages use.
 
-        A polyhedron about a round solid; one inside of a round room. So bodies never cross the true surface.
+        A polyhedron about a round solid; one inside of a round container. So bodies never cross the true surface.
         """
 
     def drawn(self, center: NDArray[np.float64], reach: float) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
@@ -118,8 +118,8 @@ class Obstacle(Kind, ABC):
     def _oriented(
         self, distances: NDArray[np.float64], normals: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Distance and normal of the solid, or of the room with the same wall."""
-        return (-distances, -normals) if self.is_room else (distances, normals)
+        """Distance and normal of the solid, or of the container with the same wall."""
+        return (-distances, -normals) if self.is_container else (distances, normals)
 
 
 def lengths_and_directions(

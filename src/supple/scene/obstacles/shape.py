@@ -46,7 +46,7 @@ def frame_of(anchor: NDArray[np.float64], first: NDArray[np.float64]) -> NDArray
 
 @cache
 def concave_contact(signed_distance: Callable[..., Any]) -> Callable[..., Any]:
-    """Contact with the wall of a room whose inside is convex; `signed_distance` is that of the solid."""
+    """Contact with the wall of a container whose inside is convex; `signed_distance` is that of the solid."""
 
     def contact_from_inside(parameters, s0, s1):
         d1, n1 = signed_distance(parameters, s1)

@@ -12,7 +12,7 @@ import supple as sp
 from supple.app.cli.app import main
 from supple.results.check.checker import check_series
 from supple.results.check.geometry.moving_triangles import triangles_pass
-from supple.results.check.series import Given
+from supple.results.check.series import SeriesMetadata
 
 from .generated import FAULTS, SURFACES, WRITERS, clean
 
@@ -96,7 +96,7 @@ def test_momentum_and_energy_of_a_free_fall(tmp_path):
     given = {"density": 1e3, "youngs": 1e5, "poisson": 0.4, "gravity": (0.0, 0.0, -9.81), "free": True}
     for factor, verdict in ((1.0, "pass"), (1.5, "fail")):
         np.savez(tmp_path / "fall.npz", positions=x + factor * (fall - x), tets=tets, times=times)
-        report = check_series(tmp_path / "fall.npz", Given(**given))
+        report = check_series(tmp_path / "fall.npz", SeriesMetadata(**given))
         assert [report[name].verdict for name in ("momentum", "energy")] == [verdict] * 2, report
 
 

@@ -126,7 +126,7 @@ def _report(paths: tuple[Path, ...], given: dict[str, Any], settings: dict[str, 
     from supple.errors import OutputError
     from supple.mesh.io.series.open import open_series
     from supple.results.check.checker import check_recording, check_series
-    from supple.results.check.series import Given
+    from supple.results.check.series import SeriesMetadata
     from supple.results.recording.checked_hdf5 import is_of_another_program
 
     folder = paths[0].is_dir() and not (paths[0] / "recording.vtkhdf").exists()
@@ -139,7 +139,7 @@ def _report(paths: tuple[Path, ...], given: dict[str, Any], settings: dict[str, 
         if given:
             raise OutputError(f"{paths[0]}: a recording contains its {next(iter(given))}; omit the option")
         return check_recording(recording_at(paths[0]), **settings)
-    return check_series(open_series(*paths), Given(**given), **settings)
+    return check_series(open_series(*paths), SeriesMetadata(**given), **settings)
 
 
 def _print(report: CheckReport, *, only_failures: bool) -> None:

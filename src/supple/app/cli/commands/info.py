@@ -131,7 +131,7 @@ def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
         ("tet volumes", f"{mesh.volumes.min():.3g} to {mesh.volumes.max():.3g} m^3"),
         ("smallest dihedral", f"{mesh.min_dihedrals.min():.2f} degrees (tet {int(mesh.min_dihedrals.argmin())})"),
         ("radius ratio", f"worst {mesh.radius_ratios.min():.3f}, mean {mesh.radius_ratios.mean():.3f} (1 is regular)"),
-        ("tets turned", str(mesh.turned)),
+        ("tets reoriented", str(mesh.reoriented)),
     ]
 
 

@@ -84,7 +84,7 @@ class Controller:
         try:
             return self.simulation.send(make())
         except SuppleError as error:
-            notify(client, "Not done", str(error))
+            notify(client, "Rejected", str(error))
             return 0
 
 

@@ -105,7 +105,7 @@ class NumberInput:
             value = self._number()
             if not self._low <= value <= self._high:
                 ends = f"{self._low / self._factor:g} to {self._high / self._factor:g}"
-                notify(client, "Not done", f"{self.handle.label} is {self.handle.value:g}; it must be from {ends}")
+                notify(client, "Rejected", f"{self.handle.label} is {self.handle.value:g}; it must be from {ends}")
                 self.show(self._value)
                 return
             self.show(value)

@@ -84,7 +84,7 @@ class SimulationLoop:
         if (self._fresh and since >= SHORTEST) or self._interpolates(now):
             self.publish(now)
         elif since >= HEARTBEAT:
-            # Nothing has changed: a sign of life costs less than a snapshot.
+            # Nothing has changed: a heartbeat costs less than a snapshot.
             self._published = now
             self.outbox.put_progress(None)
 

@@ -45,7 +45,7 @@ class Outbox:
             self._changed.notify()
 
     def put_progress(self, progress: Any) -> None:
-        """Send the progress of a long step, or None: a sign of life."""
+        """Send the progress of a long step, or None: a heartbeat."""
         data = packed(PROGRESS, progress)
         with self._changed:
             self._progress = data

@@ -49,8 +49,8 @@ def clearance(
 ) -> Clearance:
     """The clearance of a surface from an obstacle at a pose (3, 4). `vertices` and `triangles` are rows of x.
 
-    A static half-space is decided exactly, from its recorded point and normal. For a room vertices decide. For a solid
-    whole triangles decide, up to about 1e-6 of their size where they lie along its surface.
+    A static half-space is decided exactly, from its recorded point and normal. For a container vertices decide. For a
+    solid whole triangles decide, up to about 1e-6 of their size where they lie along its surface.
     """
     R, t = pose[:, :3], pose[:, 3]
     points = x[vertices]
@@ -69,7 +69,7 @@ def clearance(
             entered = bool(values[worst] < -_rounding(points, point))
         return Clearance(float(values[worst]), int(vertices[worst]), True, entered)
     tolerance = _rounding(points, t) + _rounding(shape.triangles()[0])
-    if shape.is_room:  # the distance from its wall is concave: smallest at a vertex
+    if shape.is_container:  # the distance from its wall is concave: smallest at a vertex
         values, _ = shape.signed_distance(moved_back(points, pose))
         worst = int(np.argmin(values))
         return Clearance(float(values[worst]), int(vertices[worst]), True, bool(values[worst] < -tolerance))
@@ -152,7 +152,7 @@ class Obstacles(FrameCheck):
 
     def begin(self) -> None:
         if all(obstacle.checked_by_triangles for obstacle in self.of.obstacles):
-            self.why_not = "the scene has no half-space, round solid or room"
+            self.why_not = "the scene has no half-space, round solid or container"
 
     def see(self, at: Snapshot) -> None:
         found = list(clearances(at))
@@ -196,7 +196,7 @@ class Containment(FrameCheck):
     def _solids_in_bodies(self, at: Snapshot) -> Iterator[str]:
         surfaces = self.of.surfaces
         for j, obstacle in enumerate(self.of.obstacles):
-            if obstacle.checked_by_triangles or obstacle.is_room or obstacle.plane is not None:
+            if obstacle.checked_by_triangles or obstacle.is_container or obstacle.plane is not None:
                 continue
             # Of a convex solid, the mean of points about it is inside.
             center = moved(obstacle.triangles()[0].mean(axis=0)[None], at.poses[j])[0]

@@ -23,7 +23,7 @@ from supple.runtime.kernel_cache import njit
 _EPSILON = 2.0**-53
 _BOUND_3 = (7.0 + 56.0 * _EPSILON) * _EPSILON
 _BOUND_2 = (3.0 + 16.0 * _EPSILON) * _EPSILON
-# dot((x - p), n): three products of a difference, three roundings each, two sums; with room to spare.
+# dot((x - p), n): three products of a difference, three roundings each, two sums, with a margin.
 _BOUND_DOT = 8.0 * _EPSILON
 # The bounds hold where nothing underflows; what is smaller than this is decided without rounding.
 _TINY = 1e-200

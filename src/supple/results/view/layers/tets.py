@@ -42,7 +42,7 @@ class ColoredTriangles:
             )
             for i, color in enumerate(colors)
         ]
-        self._room = [_LEAST] * len(self.handles)
+        self._capacity = [_LEAST] * len(self.handles)
 
     def update(self, corners: NDArray[np.float64], color: NDArray[np.int64]) -> None:
         """Draw triangles with these corners (t, 3, 3) [m], each in one of the colors (t,)."""
@@ -54,13 +54,13 @@ class ColoredTriangles:
                 handle.visible = False
                 continue
             # The capacity is a power of two: the browser creates new buffers only where it changes.
-            room = max(_LEAST, 1 << (len(mine) - 1).bit_length())
-            points = np.repeat(mine[:1, :1], 3 * room, axis=0).reshape(-1, 3)
+            capacity = max(_LEAST, 1 << (len(mine) - 1).bit_length())
+            points = np.repeat(mine[:1, :1], 3 * capacity, axis=0).reshape(-1, 3)
             points[: 3 * len(mine)] = mine.reshape(-1, 3)
             handle.vertices = single(points)
-            if room != self._room[i]:
-                handle.faces = _faces(room)
-                self._room[i] = room
+            if capacity != self._capacity[i]:
+                handle.faces = _faces(capacity)
+                self._capacity[i] = capacity
             handle.visible = True
 
 

@@ -60,7 +60,7 @@ def frame_of(checkpoint: Checkpoint, scene: Scene, solver: Solver) -> Frame | No
 logger = logging.getLogger(__name__)
 
 
-class Keeper:
+class RunWriter:
     """A sink for the rest of a run from one frame on.
 
     Parameters
