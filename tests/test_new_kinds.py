@@ -331,7 +331,7 @@ def test_errors_of_a_scene_file_have_line_and_key(tmp_path):
     with pytest.raises(sp.SceneError, match=r"scene.yaml:17: joints\[0\].length: is -1; it must be above 0"):
         load_run(file)
     file.write_text(SCENE.replace("force: [0, 20, 0]", "forse: [0, 20, 0]"))
-    with pytest.raises(sp.SceneError, match=r"loads\[0\].forse: unknown key; did you mean `force`\?"):
+    with pytest.raises(sp.SceneError, match=r"loads\[0\].forse: unknown key; did you mean 'force'\?"):
         load_run(file)
 
 

@@ -151,6 +151,10 @@ class Kind(metaclass=Described):
         given = ((one.validator, getattr(self, key)) for key, one in declared(type(self)).items())
         return tuple(name for validator, value in given if value is not None for name in validator.bodies(value))
 
+    def facts(self, scene: Any) -> str:
+        """What `supple info` says of it: what was given, and what follows from the scene that it is in."""
+        return self.summary()
+
     def summary(self) -> str:
         """What was given, without names and what has its default."""
         parts = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,9 +69,21 @@ class ByLaw(Hyperelastic):
         mu, bulk = self.rest_moduli()
         return (3.0 * bulk - 2.0 * mu) / (6.0 * bulk + 2.0 * mu)
 
+    def facts(self, scene: Any) -> str:
+        return f"{super().facts(scene)} {small_strains(self)}"
+
     def per_tet(self, n_tets: int) -> TetMaterial:
         name = type(self).__name__
         columns = [one_per_tet(value, n_tets, f"{name}: {key}") for key, value in self.law_parameters()]
         mu, bulk = self.rest_moduli()
         basis = self._tet_material(n_tets, BY_LAW, mu, bulk - 2.0 * mu / 3.0)
         return basis.with_laws(LawTets(self.law(), np.arange(n_tets), np.column_stack(columns)))
+
+
+def small_strains(material: Hyperelastic) -> str:
+    """The moduli of small strains in words."""
+    youngs, poisson = (
+        " to ".join(f"{value:.6g}" for value in sorted({np.min(of_tets), np.max(of_tets)}))
+        for of_tets in (material.youngs, material.poisson)
+    )
+    return f"(small strains: E = {youngs} Pa, nu = {poisson})"

@@ -70,6 +70,10 @@ class Material(Kind, ABC):
         """The name of the material in messages."""
         return type(self).__name__
 
+    def facts(self, scene: Any) -> str:
+        """Its class, with the moduli of small strains where other parameters were given."""
+        return type(self).__name__
+
     @property
     def otherwise(self) -> Material | None:
         """What stands for a material of a user in a recording, where its class is not known."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.kinds.validators import ListOf, OneOf
+from supple.materials.by_law import small_strains
 from supple.materials.elastic import ELASTIC_MATERIALS
 from supple.materials.holzapfel_gasser_ogden import HolzapfelGasserOgden
 from supple.materials.isotropic import rest_lame_parameters
@@ -72,6 +73,9 @@ class Viscoelastic(Hyperelastic):
         if not pairs[:, 0].sum() < 1.0:
             raise SceneError(f"Viscoelastic: the shares of prony add up to {pairs[:, 0].sum():g}; it must be below 1")
         object.__setattr__(self, "prony", tuple((share, time) for share, time in pairs.tolist()))
+
+    def facts(self, scene: Any) -> str:
+        return f"{super().facts(scene)} {type(self.material).__name__} {small_strains(self)}"
 
     @property
     def youngs(self) -> float | NDArray[np.float64]:

@@ -196,6 +196,11 @@ class Body(PlacedBody):
         self._check_placement(self.mesh.edges)
         self._require_one_value_per_tet(owner)
 
+    def facts(self, scene: Any) -> str:
+        mesh, kind = self.mesh, "tets" if self.mesh.order == 1 else "quadratic tets"
+        amounts = f"{mesh.volume:.6g} m^3, {self.lumped_masses().sum():.6g} kg"
+        return f"{self.material.facts(scene)}, {len(mesh.tets)} {kind}, {amounts}"
+
     @property
     def drawn_look(self) -> str:
         return self.look or ("foam" if float(np.mean(self.material.density)) < _FOAM else "rubber")

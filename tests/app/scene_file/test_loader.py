@@ -334,7 +334,7 @@ def test_contact_of_the_implicit_solver(load):
         ("dhat: -1", "solver.contact.dhat: is -1; it must be above 0"),
         ("stiffness: stiff", "solver.contact.stiffness: is the text 'stiff'"),
         ("friction_iterations: 0", "solver.contact.friction_iterations: is 0; it must be at least 1"),
-        ("dhatt: 1", "solver.contact.dhatt: unknown key; did you mean `dhat`?"),
+        ("dhatt: 1", "solver.contact.dhatt: unknown key; did you mean 'dhat'?"),
     ],
 )
 def test_errors_in_contact_of_the_implicit_solver(load, words, complaint):

@@ -57,7 +57,7 @@ def test_regions_of_a_body_have_materials_of_their_own(load, tmp_path):
             "",
             r":11: bodies\[0\].regions\[1\]: give the tets of a region by either `box`, `tets` or `set`",
         ),
-        ("tets: [0, 1]", "tet: [0, 1]", r"regions\[1\].tet: unknown key; did you mean `tets`"),
+        ("tets: [0, 1]", "tet: [0, 1]", r"regions\[1\].tet: unknown key; did you mean 'tets'"),
         (
             "{kind: arap, youngs: 1e3, poisson: 0.4}",
             "{kind: edges_and_volume}",

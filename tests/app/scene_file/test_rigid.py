@@ -76,7 +76,7 @@ def test_the_schema_and_the_resolved_file_know_them(scene_file, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("density: 2700", "densty: 2700", "4: bodies[0].rigid.densty: unknown key; did you mean `density`?"),
+        ("density: 2700", "densty: 2700", "4: bodies[0].rigid.densty: unknown key; did you mean 'density'?"),
         ("{density: 2700}", "{}", "4: bodies[0].rigid: a rigid body needs either `density` or `mass`; give one"),
         ("mass: 2,", "density: 2,", "9: bodies[1].rigid.inertia: rigid body 'stone': inertia needs a mass"),
         ("[0, 0, 4]", "[0, 0, 6]", "9: bodies[1].rigid.inertia: rigid body 'stone': inertia has the principal moments"),

@@ -24,10 +24,10 @@ steps: 5
 
 # text to replace, its replacement, and the start of the error: line, key, words
 CASES = [
-    ("youngs: 1e5", "yungs: 1e5", "6: bodies[0].material.yungs: unknown key; did you mean `youngs`?"),
-    ("position:", "postion:", "8: bodies[0].postion: unknown key; did you mean `position`?"),
+    ("youngs: 1e5", "yungs: 1e5", "6: bodies[0].material.yungs: unknown key; did you mean 'youngs'?"),
+    ("position:", "postion:", "8: bodies[0].postion: unknown key; did you mean 'position'?"),
     ("dt: 1/60", "dt: 1e-300", "13: dt: is 1e-300; it must be at least 1e-30"),
-    ("dt: 1/60", "colour: red", "13: colour: unknown key; known here: supple, bodies"),
+    ("dt: 1/60", "colour: red", "13: colour: unknown key; there are 'supple', 'bodies'"),
     (
         "kind: stable_neo_hookean",
         "kind: StableNeoHookean",
@@ -36,7 +36,7 @@ CASES = [
     (
         "kind: stable_neo_hookean",
         "kind: stable neo hookean",
-        "5: bodies[0].material.kind: unknown kind 'stable neo hookean'; did you mean `stable_neo_hookean`?",
+        "5: bodies[0].material.kind: unknown kind 'stable neo hookean'; did you mean 'stable_neo_hookean'?",
     ),
     ("      kind: stable_neo_hookean\n", "", "4: bodies[0].material: the key `kind` is missing"),
     ("      youngs: 1e5\n", "", "4: bodies[0].material: the key `youngs` is missing; add it"),
@@ -70,7 +70,7 @@ CASES = [
     ),
     ("[1, 1, 1]}", "[1000000, 1000000, 1000000]}", "3: bodies[0].shape.divisions: box"),
     ("{kind: box, divisions: [1, 1, 1]}", "box", "3: bodies[0].shape: is the text 'box'; give keys and values"),
-    ("{kind: box, ", "{kind: cube, ", "3: bodies[0].shape.kind: unknown kind 'cube'; known here: box, sphere"),
+    ("{kind: box, ", "{kind: cube, ", "3: bodies[0].shape.kind: unknown kind 'cube'; there are 'box', 'sphere'"),
     ("    shape: {kind: box, divisions: [1, 1, 1]}\n", "", "2: bodies[0]: a body needs either `mesh` or `shape`"),
     ("    position", "    mesh: {file: a.stl}\n    position", "2: bodies[0]: a body needs either `mesh` or `shape`"),
     ("shape: {kind: box, divisions: [1, 1, 1]}", "mesh: {file: absent.stl}", "3: bodies[0].mesh.file: "),
@@ -98,7 +98,7 @@ CASES = [
     (
         "{kind: half_space}",
         "{kind: halfspace}",
-        "10: obstacles[0].kind: unknown kind 'halfspace'; did you mean `half_space`?",
+        "10: obstacles[0].kind: unknown kind 'halfspace'; did you mean 'half_space'?",
     ),
     ("{kind: half_space}", "floor", "10: obstacles[0]: is the text 'floor'; give keys and values"),
     ("{kind: half_space}", "{kind: sphere, radius: 0}", "10: obstacles[0].radius: is 0; it must be above 0"),
@@ -199,12 +199,12 @@ CASES = [
     ("steps: 5", "steps: 2.5", "14: steps: is 2.5; give a whole number"),
     ("steps: 5", "steps: -1", "14: steps: is -1; it must be at least 0"),
     ("steps: 5", "steps: 99999999999999999999999999", "14: steps: is 99999999999999999999999999; it must be at most"),
-    ("steps: 5", "solver: {kind: xpdb}", "14: solver.kind: unknown kind 'xpdb'; did you mean `xpbd`?"),
+    ("steps: 5", "solver: {kind: xpdb}", "14: solver.kind: unknown kind 'xpdb'; did you mean 'xpbd'?"),
     ("steps: 5", "solver: {kind: xpbd, substeps: 0}", "14: solver.substeps: is 0; it must be at least 1"),
     ("steps: 5", "solver: {kind: xpbd, threads: 1000}", "14: solver.threads: XPBD: threads is 1000"),
     ("steps: 5", "solver: xpbd", "14: solver: is the text 'xpbd'; give keys and values"),
     ("steps: 5", "gravity: down", "14: gravity: is the text 'down'; give a list"),
-    ("steps: 5", "supple: 2", "14: supple: is 2; known here: 1"),
+    ("steps: 5", "supple: 2", "14: supple: is 2; there are '1'"),
     ("    position: [0, 1, 0]", "    copies: {}", "8: bodies[0].copies: copies need either `offsets` or `grid`"),
     (
         "    position: [0, 1, 0]",

@@ -81,15 +81,15 @@ def test_designs(write, text, design):
     [
         ("scene: fall.yaml\n", "", "study.yaml:1: the key `scene` is missing"),
         ("fall.yaml", "absent.yaml", "absent.yaml: the file does not exist"),
-        ("{kind: grid}", "{kind: gird}", "study.yaml:5: design.kind: unknown kind 'gird'; did you mean `grid`"),
+        ("{kind: grid}", "{kind: gird}", "study.yaml:5: design.kind: unknown kind 'gird'; did you mean 'grid'"),
         ("{kind: grid}", "{kind: latin_hypercube, samples: 0}", "study.yaml:5: design.samples: is 0"),
         ("[-1.0, -2.0]", "[]", r"study.yaml:3: factors.gravity.1.values: has 0 values"),
         ("[-1.0, -2.0]", "3", r"study.yaml:3: factors.gravity.1: is 3; give keys and values"),
         (", count: 2", ", values: [1]", "study.yaml:4: factors.size: .* give exactly one of"),
         ("[0.1, 1]", "[1, 0.1]", "study.yaml:4: factors.size: .* the lower one first"),
         ("quantity: kinetic_energy", "quantity: kinetic", "study.yaml:8: measures.energy"),
-        ("axis: y", "axes: y", "study.yaml:7: measures.drop.axes: unknown key; did you mean `axis`"),
-        ("measures:", "measure:", "study.yaml:6: measure: unknown key; did you mean `measures`"),
+        ("axis: y", "axes: y", "study.yaml:7: measures.drop.axes: unknown key; did you mean 'axis'"),
+        ("measures:", "measure:", "study.yaml:6: measure: unknown key; did you mean 'measures'"),
     ],
 )
 def test_a_study_file_that_is_wrong_is_one_line_with_its_place(write, old, new, words):

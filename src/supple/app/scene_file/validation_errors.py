@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from pydantic import ValidationError
@@ -11,6 +10,7 @@ from pydantic import ValidationError
 from supple.app.scene_file.model import UnknownKeyError
 from supple.app.scene_file.yaml_files import Key, YamlDocument, printable
 from supple.errors import SceneError
+from supple.kinds.suggestion import suggestion
 
 
 def scene_error(document: YamlDocument, error: ValidationError) -> SceneError:
@@ -43,7 +43,7 @@ def _describe(keys: tuple[Key, ...], absent: str | None, item: Any) -> tuple[tup
     kind, context, value = item["type"], item.get("ctx", {}), item.get("input")
     error = context.get("error")
     if isinstance(error, UnknownKeyError):
-        return (*keys, error.key), f"unknown key; {suggestion(error.key, error.known)}"
+        return (*keys, error.key), f"unknown key; {suggestion(error.key, list(error.known))}"
     if kind == "missing":
         return keys, f"the key `{absent}` is missing; add it"
     if kind == "union_tag_not_found":
@@ -62,13 +62,6 @@ def _describe(keys: tuple[Key, ...], absent: str | None, item: Any) -> tuple[tup
     if kind in ("value_error", "assertion_error"):
         return keys, item["msg"].removeprefix("Value error, ")
     return keys, f"is {_value(value)}: {item['msg']}"
-
-
-def suggestion(given: str, known: Iterable[str]) -> str:
-    """The most similar of the known words, or all of them where none is similar."""
-    known = list(known)
-    near = difflib.get_close_matches(given.lower().replace("-", "_").replace(" ", "_"), known, n=1, cutoff=0.6)
-    return f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(known)}"
 
 
 def _value(value: Any) -> str:

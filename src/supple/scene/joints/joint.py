@@ -17,7 +17,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -115,6 +115,10 @@ class Joint(Kind, ABC):
         return (
             f"{type(self).__name__} of {self.first!r} and {'the world' if self.second is None else repr(self.second)}"
         )
+
+    def facts(self, scene: Any) -> str:
+        joined = f"{type(self).__name__} of {self.first} and {self.second or 'the world'}"
+        return ", ".join(filter(None, [joined, self.summary()]))
 
     def axes(self) -> NDArray[np.float64]:
         """(3, 3) three perpendicular unit vectors (rows), right-handed, which `conditions` refers to by number."""

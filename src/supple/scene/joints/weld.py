@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,10 @@ class Weld(OnVertices):
         super().__post_init__()
         if (self.vertices is None) == (self.max_distance is None):
             raise SceneError(f"{self.label}: give the vertices by one of `vertices`, `box` and `max_distance`")
+
+    def facts(self, scene: Any) -> str:
+        count = int((scene.welding.weld == scene.welds.index(self)).sum())
+        return f"{count} vertices of {self.body} are points of {self.rigid}"
 
     def bodies_of(self, bodies: Mapping[str, PlacedBody]) -> tuple[PlacedBody, RigidBody]:
         """The soft and the rigid body.

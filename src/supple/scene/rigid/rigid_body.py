@@ -16,7 +16,7 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -137,6 +137,14 @@ class RigidBody(PlacedBody):
             object.__setattr__(self, key, value)
         self._check_placement(surface.edges)
         self._set_stiffness(self.stiffness or 1.0)  # without one, a scene sets it, from its heaviest load
+
+    def facts(self, scene: Any) -> str:
+        p = self.properties
+        inertia = ", ".join(f"{value:.6g}" for value in np.linalg.eigvalsh(p.inertia))
+        return (
+            f"rigid, {len(self.triangles)} triangles, {p.volume:.6g} m^3, {p.mass:.6g} kg, principal moments of "
+            f"inertia {inertia} kg m^2, stiffness {self.kappa:.3g} Pa"
+        )
 
     @property
     def points(self) -> NDArray[np.float64]:

@@ -103,6 +103,16 @@ class Stitch(Kind, ABC):
         if self.first == self.second:
             raise SceneError(f"{self.label}: it joins a body with itself; give two")
 
+    def facts(self, scene: Any) -> str:
+        """How many pairs it has, how far they are apart, how many rest vertices had to be moved, and its strength."""
+        part = next(part for part in scene.stitching.ranges if part.stitch is self)
+        near, far = part.pairs.distances.min(), part.pairs.distances.max()
+        text = f"{type(self).__name__}, {len(part.pairs.vertices)} pairs, {near:.6g} to {far:.6g} m apart"
+        if part.tets.stop > part.tets.start:
+            text += f", {int(scene.stitching.tets.offset[part.tets].sum())} rest vertices offset"
+        low, high = float(part.strength.min()), float(part.strength.max())
+        return text + (f", breaks at {low:g}{f' to {high:g}' * (high > low)} N" if np.isfinite(low) else "")
+
     @property
     def label(self) -> str:
         """The name of this stitch in messages."""

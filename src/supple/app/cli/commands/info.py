@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
     from supple.model.state import State
     from supple.model.system import System
     from supple.scene.body import PlacedBody
-    from supple.scene.rigid.rigid_body import RigidBody
-    from supple.scene.stitches.stitching import Stitching
 
 SCENE_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
@@ -190,32 +187,17 @@ def _counted(system: System) -> list[tuple[str, str]]:
 
 def _described(system: System, points: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
     """What each thing of a scene is; points : of each body at the start [m]."""
-    from supple.scene.rigid.rigid_body import RigidBody
+    from supple.scene.registry import PARTS
 
     rows, scene = [], system.scene
-    for part in system.bodies:
-        mass = system.masses[part.vertices].sum()
-        rows.append((f"place of {part.name}", _place(points[part.name])))
-        if isinstance(part.body, RigidBody):
-            rows.append((f"body {part.name}", _rigid_text(part.body)))
-            continue
-        mesh = part.body.mesh
-        tets = f"{len(mesh.tets)} {'tets' if mesh.order == 1 else 'quadratic tets'}"
-        text = f"{_material_text(part.body)}, {tets}, {mesh.volume:.6g} m^3, {mass:.6g} kg"
-        rows.append((f"body {part.name}", text))
-        rows += _locking_rows(part.body)
+    for body in scene.bodies:
+        rows += [(f"place of {body.name}", _place(points[body.name])), (f"body {body.name}", body.facts(scene))]
+        rows += _locking_rows(body)
     for each in system.actuators:
         unit = "m^3" if each.kind == "cavity" else "m"
         rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} {unit} at the start"))
-    rows += _stitch_rows(scene.stitching)
-    rows += [(each.label, each.summary()) for each in (*scene.loads, *scene.sensors)]
-    for joint in scene.joints:
-        text = f"{type(joint).__name__} of {joint.first} and {joint.second or 'the world'}"
-        rows.append((joint.label, ", ".join([text, joint.summary()] if joint.summary() else [text])))
-    for k, weld in enumerate(scene.welds):
-        count = int((scene.welding.weld == k).sum())
-        rows.append((weld.name or weld.kind, f"{count} vertices of {weld.body} are points of {weld.rigid}"))
-    return rows
+    things = (thing for key in PARTS if key != "bodies" for thing in getattr(scene, key))
+    return rows + [(thing.label, facts) for thing in things if (facts := thing.facts(scene))]
 
 
 def _place(x: np.ndarray) -> str:
@@ -249,37 +231,6 @@ def _frame_time(run: Run) -> str:
     return f"{1e3 * seconds:.3g} ms at the start; {run.steps} steps take about {whole:.3g} s if all are like these"
 
 
-def _material_text(body: PlacedBody) -> str:
-    """The material, with the moduli of small strains where other parameters were given."""
-    import numpy as np
-
-    from supple.materials.by_law import ByLaw
-    from supple.materials.viscoelastic import Viscoelastic
-
-    material = body.material
-    name = type(material).__name__
-    if isinstance(material, Viscoelastic):
-        name = f"{name} {type(material.material).__name__}"
-    elif not isinstance(material, ByLaw):
-        return name
-    youngs, poisson = (
-        " to ".join(f"{value:.6g}" for value in sorted({np.min(of_tets), np.max(of_tets)}))
-        for of_tets in (material.youngs, material.poisson)
-    )
-    return f"{name} (small strains: E = {youngs} Pa, nu = {poisson})"
-
-
-def _rigid_text(body: RigidBody) -> str:
-    import numpy as np
-
-    p = body.properties
-    inertia = ", ".join(f"{value:.6g}" for value in np.linalg.eigvalsh(p.inertia))
-    return (
-        f"rigid, {len(body.triangles)} triangles, {p.volume:.6g} m^3, {p.mass:.6g} kg, principal moments of inertia "
-        f"{inertia} kg m^2, stiffness {body.kappa:.3g} Pa"
-    )
-
-
 # Of the surface: below it, a few thin parts such as edges of a wedge are not worth a warning.
 _THIN_SHARE = 0.1
 
@@ -309,21 +260,6 @@ def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
         "(order: 2, for Implicit only), or smaller tets"
     )
     return [(f"warning {body.name}", text)]
-
-
-def _stitch_rows(stitching: Stitching) -> list[tuple[str, str]]:
-    """How many pairs each stitch has, how far they are apart, how many rest vertices had to be moved, and strengths."""
-    rows = []
-    for part in stitching.ranges:
-        near, far = part.pairs.distances.min(), part.pairs.distances.max()
-        text = f"{type(part.stitch).__name__}, {len(part.pairs.vertices)} pairs, {near:.6g} to {far:.6g} m apart"
-        if part.tets.stop > part.tets.start:
-            text += f", {int(stitching.tets.offset[part.tets].sum())} rest vertices offset"
-        low, high = float(part.strength.min()), float(part.strength.max())
-        if math.isfinite(low):
-            text += f", breaks at {low:g}" + (f" to {high:g} N" if high > low else " N")
-        rows.append((part.stitch.label, text))
-    return rows
 
 
 def _time_error(largest: float) -> list[tuple[str, str]]:
