@@ -194,14 +194,6 @@ def test_what_cannot_be_done_is_one_line(folder, capfd, arguments, reason):
     assert sorted(path.name for path in folder.iterdir()) == ["meshes", "scene.yaml"]
 
 
-def test_a_complete_run_is_refused(folder, capfd):
-    assert main(["run", "scene.yaml", *QUIET]) == ExitCode.OK
-    before = {path: path.stat().st_mtime_ns for path in (folder / "out").rglob("*")}
-    assert main(["resume", "out"]) == ExitCode.INPUT
-    assert capfd.readouterr().err == "supple: out: 8 of 8 frames are there; give a larger number of steps\n"
-    assert {path: path.stat().st_mtime_ns for path in (folder / "out").rglob("*")} == before
-
-
 def test_a_changed_copy_of_a_mesh_is_refused(folder, capfd, monkeypatch):
     with monkeypatch.context() as patch:
         interrupted_at(4, patch)

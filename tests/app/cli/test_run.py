@@ -9,7 +9,6 @@ import supple as sp
 from supple.app.cli.app import main
 from supple.app.cli.console import ExitCode
 from supple.results.recording.reader import read_recording
-from supple.results.recording.recorder import Recorder
 from supple.solvers.xpbd.solver import XPBD
 
 SCENE = """
@@ -141,16 +140,6 @@ def test_ctrl_c_keeps_the_frames_before_it(folder, capfd, monkeypatch):
     assert err.count("\n") == 1
     with read_recording("out/recording.vtkhdf") as recording:
         assert len(recording) == 4
-    assert listing(folder / "out") == ALWAYS
-
-
-def test_a_full_disk_keeps_the_frames_before_it(folder, capfd, monkeypatch):
-    full = sp.OutputError("out/recording.vtkhdf: cannot be written: No space left on device")
-    monkeypatch.setattr(Recorder, "write", fails_at(3, full, Recorder.write))
-    assert main(["run", "scene.yaml", "-q"]) == ExitCode.INPUT
-    assert capfd.readouterr().err.count("\n") == 1
-    with read_recording("out/recording.vtkhdf") as recording:
-        assert len(recording) == 3
     assert listing(folder / "out") == ALWAYS
 
 

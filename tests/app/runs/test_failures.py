@@ -208,7 +208,7 @@ def mounted(folder, size):
 def small_disk(tmp_path):
     disk = tmp_path / "disk"
     if not mounted(disk, "64k"):
-        pytest.skip("mounting is not allowed here; test_a_limit_of_file_sizes_is_one_line is without")
+        pytest.skip("mounting is not allowed here; test_a_full_disk_at_any_write_of_the_recording is without")
     yield disk
     subprocess.run(["umount", "-l", str(disk)], check=True)
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -176,7 +173,7 @@ def test_a_full_disk_at_a_checkpoint_keeps_the_run_resumable(out, monkeypatch):
     assert all(map(same_bits, whole[4:], rest))
 
 
-@pytest.mark.parametrize("failing", range(1, 28, 3))
+@pytest.mark.parametrize("failing", range(1, 28, 5))
 def test_a_full_disk_at_any_write_of_the_recording(out, monkeypatch, failing):
     """The write that fails is any of those of some frame, or of the start."""
     from supple.results.recording.file import RecordingFile
@@ -202,36 +199,6 @@ def test_a_full_disk_at_any_write_of_the_recording(out, monkeypatch, failing):
         assert len(recording) == 5
         assert all(map(same_bits, whole, list(recording)[1:]))
     assert all(map(same_bits, whole[-len(rest) :], rest))
-
-
-IN_NO_ROOM = """
-import resource, sys
-sys.path.insert(0, sys.argv[2])
-import supple as sp
-from conftest import Drift, drifting_scene, kept
-for limit in sys.argv[3:]:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(limit), resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
-    try:
-        kept(sys.argv[1] + limit, drifting_scene(), Drift(), steps=400, checkpoint_every=10)
-    except sp.OutputError as error:
-        print(error)
-"""
-
-
-def test_a_limit_of_file_sizes_is_one_line(out):
-    limits = ["100", "1000", "100000"]
-    pytest.importorskip("resource", reason="only POSIX limits the size of files")
-    command = [sys.executable, "-c", IN_NO_ROOM, str(out), str(Path(__file__).parent), *limits]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=200)
-    assert done.returncode == 0, done.stderr[-2000:]
-    lines = done.stdout.splitlines()
-    assert len(lines) == len(limits)
-    for limit, line in zip(limits, lines, strict=True):
-        folder = f"{out}{limit}"
-        assert line.startswith(folder)
-        assert "cannot be written: File too large" in line
-        assert not is_locked(Path(folder))
-    assert "Traceback" not in done.stderr
 
 
 def test_ctrl_c_within_a_step_leaves_the_last_frame_as_a_checkpoint(out):

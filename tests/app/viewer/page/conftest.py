@@ -331,9 +331,6 @@ class Screen:
             places.append(button.bounding_box())
         button.click()
 
-    def show_tab(self, name: str) -> None:
-        self.tab.get_by_role("tab", name=name).click()
-
     def choose(self, handle, option: str) -> None:
         self.tab.locator(f'[id="{handle._impl.uuid}"]').click()
         self.tab.get_by_role("option", name=option, exact=True).click()
@@ -342,22 +339,6 @@ class Screen:
         thumb = self._thumb(handle)
         for _ in range(times):
             thumb.press(key)
-
-    def insist(self, act, holds, what: str, interval: float = 5.0):
-        """Repeat an action until it has an effect: a busy browser may lose a key or a click.
-
-        The action must be harmless where it is repeated.
-        """
-        again = 0.0
-
-        def done():
-            nonlocal again
-            if time.monotonic() > again:
-                act()
-                again = time.monotonic() + interval
-            return holds()
-
-        return self.wait(done, what)
 
     def reads(self, handle) -> float:
         """The value of a slider in the browser."""
