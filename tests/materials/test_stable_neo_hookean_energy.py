@@ -57,12 +57,6 @@ def test_small_strains_of_a_rotated_body_keep_their_digits(kind, strain):
 
 
 @pytest.mark.parametrize("kind", MATERIALS)
-def test_rest_has_no_energy(kind):
-    material = kind(youngs=YOUNGS, poisson=POISSON)
-    assert material.energy_density(np.eye(3)) == 0.0
-
-
-@pytest.mark.parametrize("kind", MATERIALS)
 @settings(max_examples=50, deadline=None)
 @given(
     seed=st.integers(0, 2**31),
@@ -94,17 +88,3 @@ def test_inverted_degenerate_and_huge_states_agree(kind, seed, stretches):
     assert material.energy_density(F) == pytest.approx(
         float(expected), rel=1e-13, abs=10.0 * change + 1e-14 * mu * max(size, 1.0) ** power
     )
-
-
-def test_stable_neo_hookean_is_its_published_formula():
-    rng = np.random.default_rng(5)
-    F = np.eye(3) + rng.normal(scale=0.6, size=(200, 3, 3))
-    youngs = rng.uniform(1e3, 1e6, size=200)
-    for material in (
-        sp.StableNeoHookean(youngs=2e4, poisson=0.45),
-        sp.StableNeoHookean(youngs=youngs, poisson=0.3),
-    ):
-        mu, lam = material.lame_parameters()
-        J = np.linalg.det(F)
-        expected = mu * (0.5 * (np.einsum("tij,tij->t", F, F) - 3.0) - (J - 1.0)) + 0.5 * lam * (J - 1.0) ** 2
-        np.testing.assert_allclose(material.energy_density(F), expected, rtol=1e-12)

@@ -26,41 +26,6 @@ def test_free_fall_of_backward_euler_is_exact():
     assert error_of(frames) < 1e-12
 
 
-def acceleration_of_a_ball(edge, friction, dt=0.01, steps=50):
-    """Down a slope of 15 degrees, as a share of g sin a; and the share that its spin has of rolling."""
-    slope, radius = np.radians(15.0), 0.1
-    normal, down = np.array([np.sin(slope), np.cos(slope), 0.0]), np.array([np.cos(slope), -np.sin(slope), 0.0])
-    plane = sp.HalfSpace(point=(0, 0, 0), normal=normal, friction=friction)
-    ball = rigid(shape=sp.shapes.sphere_surface(radius, edge), position=(radius + 2e-4) * normal)
-    poses = [f.poses["rigid"] for f in run(sp.Scene([ball], obstacles=[plane]), dt, steps, "bdf2")]
-    times = dt * np.arange(1, steps + 1)
-    rate, spin = (
-        np.polyfit(times[5:], values[5:], 1)[0]
-        for values in (np.array([p.velocity @ down for p in poses]), np.array([-p.angular_velocity[2] for p in poses]))
-    )
-    return rate / (G * np.sin(slope)), spin * radius / rate
-
-
-def test_a_ball_slides_on_a_smooth_slope_and_rolls_on_a_rough_one():
-    """A polyhedron loses energy from facet to facet, in proportion to its edges: 5/7 is its limit from below."""
-    sliding, spin = acceleration_of_a_ball(0.025, 0.03)
-    assert sliding == pytest.approx(1.0 - 0.03 / np.tan(np.radians(15.0)), rel=2e-3)
-    assert abs(spin) < 0.1  # it stays on one facet
-    rolling, spin = acceleration_of_a_ball(0.025, 0.3)
-    assert spin == pytest.approx(1.0, rel=0.05)
-    assert 0.92 * 5.0 / 7.0 < rolling < 5.0 / 7.0
-
-
-@pytest.mark.slow
-def test_a_finer_ball_rolls_closer_to_five_sevenths():
-    errors = [
-        1.4 * acceleration_of_a_ball(edge, 0.3, dt, int(1.0 / dt))[0] - 1.0
-        for edge, dt in ((0.025, 0.01), (0.0125, 0.005))
-    ]
-    assert errors[0] < errors[1] < 0.0
-    assert abs(errors[1]) < 0.03
-
-
 @pytest.mark.parametrize(("under", "above", "masses"), [("soft", "rigid", (1e-3, 1e3)), ("rigid", "soft", (1e-3, 1e3))])
 def test_heavy_on_light(under, above, masses):
     """A million times as heavy as what carries it, in kilograms."""
