@@ -1,7 +1,5 @@
 """What starts once for all tests: one browser, and one process of which meshers and readers are forks."""
 
-from __future__ import annotations
-
 import io
 import os
 import shutil

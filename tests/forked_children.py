@@ -1,7 +1,5 @@
 """Meshers, readers that use a library, and what draws films: forks of one process that has imported what takes long."""
 
-from __future__ import annotations
-
 import os
 import select
 import signal

@@ -1,7 +1,5 @@
 """Changes of what a recording says about its scene, which a test then expects to be found or refused."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`make test` executes the same examples each time, whatever ran before; `make fuzz` executes those of a seed."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

@@ -3,8 +3,6 @@
 `make fuzz` runs many more examples; so does the environment variable SUPPLE_FUZZ_EXAMPLES.
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import logging

@@ -1,7 +1,5 @@
 """Every material against finite differences, LAPACK and linear elasticity; element kernels against the batched form."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

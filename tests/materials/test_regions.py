@@ -1,7 +1,5 @@
 """Several materials in one body."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Uniaxial tension and compression with free lateral faces, against tables; and states with J <= 0."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

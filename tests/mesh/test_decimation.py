@@ -1,7 +1,5 @@
 """Surfaces with fewer triangles: their number, shape and faults."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Holes of surfaces are closed without the extra: their triangles, and what is refused."""
 
-from __future__ import annotations
-
 import importlib.util
 
 import numpy as np

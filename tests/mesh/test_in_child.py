@@ -1,7 +1,5 @@
 """Files that a library reads in a child process: what its limits do, and what is left behind."""
 
-from __future__ import annotations
-
 import tempfile
 
 import pytest

@@ -1,7 +1,5 @@
 """Messages about meshing use the words of Python, of scene files or of the shell."""
 
-from __future__ import annotations
-
 import pytest
 
 from supple.errors import MeshingError

@@ -1,7 +1,5 @@
 """Repair: what it changes, that it reports each change, and that it drops nothing silently."""
 
-from __future__ import annotations
-
 import importlib.util
 import logging
 

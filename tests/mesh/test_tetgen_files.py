@@ -1,7 +1,5 @@
 """TetGen's .node/.ele/.edge/.face: round trips, every spelling, and every fault."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """From surfaces to tets: real shapes, cavities, options that are met, and every way in which a mesher can fail."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

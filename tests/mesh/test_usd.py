@@ -1,7 +1,5 @@
 """Tet meshes in USD files: written, read again, and read as OpenUSD writes them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The smallest positive root against exact rational arithmetic."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """3x3 algebra on tuples against NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

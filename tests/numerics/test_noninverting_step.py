@@ -1,7 +1,5 @@
 """The step filter against exact rational arithmetic."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

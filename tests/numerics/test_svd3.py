@@ -1,7 +1,5 @@
 """The rotation-variant SVD: accuracy for every rank, sign, repetition and scale."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

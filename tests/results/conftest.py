@@ -1,7 +1,5 @@
 """A small scene, and a solver that moves it along known paths, so that tests of output do not depend on solvers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The half of the Blender add-on that runs beside Supple; `make blender` tests the other one, in Blender."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 from pathlib import Path

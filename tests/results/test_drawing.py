@@ -1,7 +1,5 @@
 """Drawn surfaces face outward and are in view of the camera."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Exports are read with the readers of other programs, and must contain the data of the recording."""
 
-from __future__ import annotations
-
 import json
 import struct
 

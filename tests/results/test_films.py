@@ -1,7 +1,5 @@
 """Films and pictures of recordings are what was asked for."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

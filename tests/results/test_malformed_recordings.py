@@ -1,7 +1,5 @@
 """For any contents of the file, the reader returns frames or raises an error of one line."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,7 +1,5 @@
 """Where the system limits the size of files, there is an error of one line and no partial file. HDF5 would crash."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What notebooks show: short texts, tables, players, and a line of progress."""
 
-from __future__ import annotations
-
 import io
 import re
 from html.parser import HTMLParser

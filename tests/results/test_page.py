@@ -1,7 +1,5 @@
 """The page of a recording, which `tests/app/viewer/page/test_recorded_page.py` plays in a browser."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from supple.results.recording.reader import read_recording

@@ -1,7 +1,5 @@
 """The plot is a picture of the numbers in the recording."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The progress bar: a bar in a terminal, otherwise one line."""
 
-from __future__ import annotations
-
 import io
 import re
 import sys

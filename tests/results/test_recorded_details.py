@@ -1,7 +1,5 @@
 """The solver's details in a recording: typed, of fixed size for each frame, and equal when they are read."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields, replace
 
 import h5py

@@ -1,7 +1,5 @@
 """A recording has the scene as it was described: every kind of thing, with functions as their values in each frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Recordings: all numbers read back equal, and VTK reads them."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Recordings of writers that are killed, and on full disks: what is there can be read, and errors are one line."""
 
-from __future__ import annotations
-
 import errno
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Replacing files as a whole, and deleting what killed writers left."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import subprocess

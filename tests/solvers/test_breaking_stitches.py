@@ -47,7 +47,7 @@ def broken(frames):
 
 
 @parametrized
-@pytest.mark.parametrize(("kind", "held"), zip(KINDS, HELD, strict=True))
+@pytest.mark.parametrize(("kind", "held"), list(zip(KINDS, HELD, strict=True)))
 def test_those_break_whose_force_exceeds_their_strength(tmp_path, solver, kind, held):
     """Four pairs share the load. One of 1 N breaks at 4 N. Then its neighbours carry 2 N each, and hold to 6 N."""
     pairs = hanging(kind, None, 8.0, held).stitching.names.pairs

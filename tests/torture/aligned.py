@@ -1,7 +1,5 @@
 """Eight exactly aligned cubes collide: faces, edges and corners meet at the same time."""
 
-from __future__ import annotations
-
 import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, center, mass, mechanical_energy, torture
 

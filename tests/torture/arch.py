@@ -1,7 +1,5 @@
 """A masonry arch of 25 loose blocks, held by friction and its own weight."""
 
-from __future__ import annotations
-
 import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, center, mass, push, torture
 

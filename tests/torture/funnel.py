@@ -1,7 +1,5 @@
 """A gummy bear is pulled through a funnel that is much narrower than the bear."""
 
-from __future__ import annotations
-
 import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, torture
 

@@ -1,7 +1,5 @@
 """A heavy cube on a light one: ten times the size, ten thousand times the density, ten million times the mass."""
 
-from __future__ import annotations
-
 from tests.torture.watch import ContactMeasurement, Size, mass, push, torture
 
 from supple.app.demos.demo import Claim

@@ -1,7 +1,5 @@
 """A soft mat falls on knives: upright triangles without thickness."""
 
-from __future__ import annotations
-
 import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, mass, mechanical_energy, push, torture
 

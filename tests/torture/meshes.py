@@ -1,7 +1,5 @@
 """A box whose tets are mirror images across its middle planes, so that symmetric problems stay symmetric."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

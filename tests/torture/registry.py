@@ -1,7 +1,5 @@
 """All torture scenes by name. A new one is one file and one line here."""
 
-from __future__ import annotations
-
 from tests.torture.aligned import ALIGNED
 from tests.torture.arch import ARCH
 from tests.torture.funnel import FUNNEL

@@ -1,7 +1,5 @@
 """Two turning rollers pull a soft ball through a gap that is narrower than the ball."""
 
-from __future__ import annotations
-
 import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, torture
 

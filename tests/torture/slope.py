@@ -1,7 +1,5 @@
 """Two blocks on a slope: one stays, one slides as far as Coulomb's law predicts."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import brentq
 from tests.torture.watch import ContactMeasurement, Size, center, torture

@@ -1,7 +1,5 @@
 """Tetrahedra and a cube fall through a slot that is wider than they are by one micrometre on either side."""
 
-from __future__ import annotations
-
 import numpy as np
 from tests.torture.watch import ContactMeasurement, Size, center, torture
 

@@ -1,7 +1,5 @@
 """Spike on spike, edge on edge, point on point, with a friction coefficient of one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Nothing but the tilt of loaded faces pushes them sideways. With less than four c
 per cent smaller than the one below it: outlines are above faces there, and above each other in finer stacks.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

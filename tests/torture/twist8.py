@@ -1,7 +1,5 @@
 """A rod is twisted by eight turns while its ends move together: it folds and touches itself."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

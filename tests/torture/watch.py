@@ -1,7 +1,5 @@
 """A torture scene in several sizes, and the claims that all torture scenes share."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """`supple mesh`: files in, files out, and errors as one line with exit code 2."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

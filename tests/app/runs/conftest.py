@@ -1,7 +1,5 @@
 """Small scenes in which a solver needs all of its memory: contact, friction, stitches, damping and scripts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

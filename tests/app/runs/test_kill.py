@@ -1,7 +1,5 @@
 """Runs that are killed at random times: each resumes, each recording reads, and the end has the same bits."""
 
-from __future__ import annotations
-
 import os
 import random
 import subprocess

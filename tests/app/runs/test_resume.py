@@ -1,7 +1,5 @@
 """A run that goes on equals the one that was never interrupted, bit by bit."""
 
-from __future__ import annotations
-
 import json
 import logging
 from dataclasses import replace

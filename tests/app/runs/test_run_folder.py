@@ -1,7 +1,5 @@
 """What a run folder contains, what it refuses, and what is left where the system fails."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 

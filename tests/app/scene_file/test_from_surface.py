@@ -1,7 +1,5 @@
 """A surface file is a scene: a body above a floor, of a sensible size, material and number of tets."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A small scene that each case of a study simulates, and a real cluster of worker processes."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

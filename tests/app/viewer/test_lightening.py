@@ -1,7 +1,5 @@
 """Scenes that are slower than real time get lighter meshes, or another solver, on a page."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

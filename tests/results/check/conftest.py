@@ -1,7 +1,5 @@
 """Recordings to check, copies of them that are corrupted on purpose, and the results of checks."""
 
-from __future__ import annotations
-
 import shutil
 
 import h5py

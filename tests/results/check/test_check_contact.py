@@ -1,7 +1,5 @@
 """Bodies and obstacles that meet, contain each other or come near, where they may and where they may not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.recordings import set_in_scene, system_in

@@ -1,7 +1,5 @@
 """Spoilt copies: numbers that are none, tets turned inside out, frames twice or left out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.recordings import set_in_scene, system_in

@@ -1,7 +1,5 @@
 """Momentum, spin and energy without a cause; measures that differ from the recorded states."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.recordings import system_in

@@ -1,7 +1,5 @@
 """`check_recording` on good recordings: settings, results, and the shell."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Scenes with stitches: good recordings pass, energy that stitches could not give is found."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The exact predicates against rational arithmetic, on input where floating point alone is wrong."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import permutations
 

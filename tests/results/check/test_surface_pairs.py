@@ -1,7 +1,5 @@
 """The search over the tree of boxes against looking at every pair."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The balance of energy: works against closed forms, numerical losses that vanish, residuals that stay small."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

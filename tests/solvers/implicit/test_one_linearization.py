@@ -1,7 +1,5 @@
 """`Implicit(max_iterations=1)`: one linearization a step, for real time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Bodies at rest sleep, carry their weight, and wake when anything happens to them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A fake simulation for tests of the page: it stores received commands, and sends given snapshots."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import threading

@@ -1,7 +1,5 @@
 """Generated series of soft bodies without faults, faults to plant in them, and writers of many formats."""
 
-from __future__ import annotations
-
 import json
 import struct
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Every planted fault is found in every format, and no series without a fault fails."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The estimate of what the length of a step adds to the error of positions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The guarantee of rows with all pushes switched off: exact tests of surfaces and of J after every substep."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
