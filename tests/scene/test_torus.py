@@ -1,7 +1,6 @@
 """The torus: bodies fall through its hole and rest on it, in both solvers, and the check knows its triangles."""
 
 import h5py
-import numpy as np
 import pytest
 from tests.scenes import converged
 
@@ -46,18 +45,3 @@ def test_a_large_ball_rests_in_it_and_the_check_agrees(solver, tmp_path):
     found = sp.check_recording(path, only=["intersection"])["intersection"]
     assert found.first_failure == 5
     assert "obstacle ring" in found.where
-
-
-def test_a_scene_file_describes_it(tmp_path):
-    path = tmp_path / "scene.yaml"
-    ring = "{kind: torus, center: [0, 1, 0], axis: [0, 0, 2], radius: 2, tube_radius: 0.5}"
-    body = "{name: a, shape: {kind: box}, material: {kind: arap, youngs: 1e4, poisson: 0.3}, position: [0, 9, 0]}"
-    path.write_text(f"bodies: [{body}]\nobstacles:\n  - {ring}\n")
-    (found,) = sp.load_scene(path).obstacles
-    assert isinstance(found, sp.obstacles.Torus)
-    distances, normals = found.signed_distance(np.array([[3.0, 1, 0], [0, 1, 0], [0, 3, 1.0]]))
-    np.testing.assert_allclose(distances, [0.5, 1.5, 0.5])
-    np.testing.assert_allclose(normals[[0, 2]], [[1, 0, 0], [0, 0, 1]], atol=1e-15)
-    path.write_text(path.read_text().replace("0.5}", "2.5}"))
-    with pytest.raises(sp.SceneError, match=r":3: obstacles\[0\].tube_radius: Torus: tube_radius is 2.5, and closes"):
-        sp.load_scene(path)

@@ -181,32 +181,6 @@ def test_what_is_welded_sleeps_together():
     np.testing.assert_array_equal(details[-1].weld_forces["weld"], awake.weld_forces["weld"])
 
 
-SCENE = """\
-bodies:
-  - name: finger
-    shape: {kind: box, size: [0.4, 0.1, 0.1], divisions: [2, 1, 1]}
-    material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.3}
-  - name: palm
-    shape: {kind: box, size: [0.1, 0.1, 0.1], divisions: [1, 1, 1]}
-    rigid: {mass: 1}
-    position: [-0.25, 0, 0]
-welds:
-  - {body: finger, rigid: palm, max_distance: 1e-4}
-"""
-
-
-def test_welds_of_scene_files(tmp_path):
-    path = tmp_path / "scene.yaml"
-    for chosen in ("max_distance: 1e-4", "box: {low: [-1, -1, -1], high: [-0.19, 1, 1]}", "vertices: [0, 3, 6, 9]"):
-        path.write_text(SCENE.replace("max_distance: 1e-4", chosen))
-        scene = sp.load_scene(path)
-        assert len(scene.welding) == 4
-        assert scene.welds[0].name == "Weld 1"
-    path.write_text(SCENE.replace("1e-4}", "1e-4, box: {low: [0, 0, 0], high: [1, 1, 1]}}"))
-    with pytest.raises(sp.SceneError, match=r"scene.yaml:10: welds\[0\].box: weld of .*: give the vertices by one of"):
-        sp.load_scene(path)
-
-
 @pytest.mark.parametrize(
     ("make", "problem"),
     [

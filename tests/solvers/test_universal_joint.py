@@ -5,9 +5,6 @@ import pytest
 from tests.scenes import BAR, bar, converged, momenta, rigid
 
 import supple as sp
-from supple.app.cli.app import main
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
-from supple.results.view.layers.joints import joint_lines, joint_segments
 from supple.scene.rotation import rotation_matrix
 
 SOLVERS = {"xpbd": sp.XPBD(substeps=10), "implicit": sp.Implicit(contact=None, integrator="bdf2")}
@@ -86,45 +83,3 @@ def test_the_swing_is_limited(solver):
     swings = [frame.report.joints["u"].coordinate for frame in frames]
     assert max(swings) < 0.4 + 2e-3
     assert swings[-1] == pytest.approx(0.4, abs=2e-3)
-
-
-FILE = """\
-bodies:
-  - {name: bar, shape: {kind: box, size: [1, .05, .05], divisions: [1, 1, 1]}, rigid: {mass: 2}, position: [0.5, 0, 0]}
-joints:
-  - {kind: universal, first: bar, point: [0, 0, 0], axis: [0, 2, 0], second_axis: [0, 0, 1], max_swing: 1.0, name: u}
-solver: {kind: implicit, contact: null}
-dt: 0.01
-steps: 12
-"""
-
-
-def test_file_info_recording_check_and_page_know_it(tmp_path, capsys):
-    path = tmp_path / "scene.yaml"
-    path.write_text(FILE)
-    (joint,) = sp.load_scene(path).joints
-    assert (type(joint), joint.axis.tolist(), joint.max_swing) == (sp.UniversalJoint, [0, 1, 0], 1.0)
-    main(["info", str(path)])
-    assert "UniversalJoint of bar and the world, point (0, 0, 0), axis (0, 1, 0), max swing 1" in " ".join(
-        capsys.readouterr().out.split()
-    )
-    main(["run", str(path), "-o", str(tmp_path / "out"), "--quiet"])
-    recording = tmp_path / "out" / "recording.vtkhdf"
-    report = sp.check_recording(recording)
-    assert report.ok, report.failures
-    assert 0.0 <= report["joints"].worst < 1e-6
-    with sp.read_recording(recording) as read:
-        (drawn,), (recorded_joint,) = read.joints, read.scene.joints
-        model = model_of_recording(read)
-        lines = [joint_lines(drawn, 1.0)]
-        segments = joint_segments(moment_of_frame(model, read[-1]), lines)
-        turned = read[-1].poses["bar"].rotation @ [0, 1, 0]
-    assert type(recorded_joint) is sp.UniversalJoint
-    # The axis that the bar has is drawn where the bar has it now; the other one stays.
-    ways = segments[:, 1] - segments[:, 0]
-    directions = ways / np.linalg.norm(ways, axis=1)[:, None]
-    for axis in (turned, (0, 0, 1)):
-        assert np.abs(directions @ axis).max() == pytest.approx(1.0, abs=1e-6)
-    path.write_text(FILE.replace("[0, 0, 1], max", "[0, 1, 1], max"))
-    with pytest.raises(sp.SceneError, match=r":4: joints\[0\].axis: joint 'u': axis and second_axis are at 45 degrees"):
-        sp.load_scene(path)

@@ -9,7 +9,6 @@ from tests.derivatives import differences, gradient_of
 from tests.recordings import set_in_scene
 
 import supple as sp
-from supple.app.scene_file.loader import load_scene
 from supple.errors import OutputError, SceneError
 from supple.model.system import build_system
 from supple.results.recording.reader import read_recording
@@ -153,25 +152,3 @@ def test_what_is_refused():
     ):
         with pytest.raises(SceneError, match=message):
             sp.Scene([body or sp.Body("bar", BAR, RUBBER)], loads=[load()])
-
-
-def test_a_scene_file_has_growth(tmp_path):
-    text = """
-bodies:
-  - name: bar
-    shape: {kind: box, size: [1, 1, 1], divisions: [1, 1, 1]}
-    material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.3}
-loads:
-  - {kind: growth, body: bar, stretch: {times: [0, 1], values: [1, 1.2]}, direction: [0, 2, 0], tets: [0, 2]}
-solver: {kind: implicit}
-dt: 0.01
-steps: 1
-"""
-    path = tmp_path / "scene.yaml"
-    path.write_text(text)
-    (growth,) = load_scene(path).loads
-    assert isinstance(growth, sp.Growth)
-    np.testing.assert_array_equal(growth.direction, [0, 1, 0])
-    assert isinstance(growth.stretch, sp.Curve)
-    assert float(growth.stretch(0.5)) == pytest.approx(1.1)
-    np.testing.assert_array_equal(np.asarray(growth.tets), [0, 2])

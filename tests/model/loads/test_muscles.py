@@ -88,32 +88,6 @@ def test_a_free_muscle_shortens_to_its_equilibrium_and_keeps_its_momentum(name):
         assert np.abs(frame.report.angular_momentum).max() < error * 0.4 * moving
 
 
-FILE = """
-bodies:
-  - name: bar
-    shape: {{kind: box, size: [0.4, 0.2, 0.2], divisions: [4, 2, 2]}}
-    material: {{kind: neo_hookean, youngs: 1e5, poisson: 0.3}}
-loads:
-  - {{kind: muscle, body: bar, direction: [2, 0, 0], {more}}}
-"""
-
-
-def test_scene_files_describe_muscles(tmp_path):
-    path = tmp_path / "scene.yaml"
-    text = "strength: 2e4, activation: {times: [0, 1], values: [0, 1]}, box: {low: [0, -1, -1], high: [1, 1, 1]}"
-    path.write_text(FILE.format(more=text + ", force_length: {stretches: [0.5, 1], values: [0, 1]}"))
-    scene = sp.load_scene(path)
-    (muscle,) = scene.loads
-    assert muscle.activation(0.5) == 0.5
-    rows, directions = muscle.fibres(scene.bodies[0])
-    assert len(rows) == len(BAR.tets) // 2
-    np.testing.assert_array_equal(directions[3], [1, 0, 0])
-    assert muscle.force_length[1].tolist() == [0, 1]
-    path.write_text(FILE.format(more="strength: 2e4, activation: 1.5"))
-    with pytest.raises(sp.SceneError, match=r"scene.yaml:7.*activation: is 1.5; it must be at most 1"):
-        sp.load_scene(path)
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [

@@ -136,29 +136,6 @@ def test_scenes_without_contact_feel_nothing():
     assert not frame.sensors["skin"].normal.any()
 
 
-FILE = """
-bodies:
-  - name: block
-    shape: {kind: box, size: [0.2, 0.1, 0.2], divisions: [2, 1, 2]}
-    material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.3}
-sensors:
-  - {kind: force, name: tip, body: block, box: {low: [-1, 0.04, -1], high: [1, 1, 1]}}
-  - {kind: taxels, name: palm, body: block, corner: [0, 0, 0], first: [0.1, 0, 0], second: [0, 0, 0.1], cells: [3, 2]}
-"""
-
-
-def test_scene_files_describe_sensors(tmp_path):
-    path = tmp_path / "scene.yaml"
-    path.write_text(FILE)
-    scene = sp.load_scene(path)
-    tip, palm = scene.sensors
-    assert len(tip.triangles(scene.bodies)) == 8
-    assert palm.cells == (3, 2)
-    path.write_text(FILE.replace("cells: [3, 2]", "cells: [3]"))
-    with pytest.raises(sp.SceneError, match="sensors"):
-        sp.load_scene(path)
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
