@@ -90,7 +90,7 @@ def frequency(youngs: float, poisson: float, size: float, dt: float, exact: floa
 
 def row(found: list[Found | None]) -> list[Any]:
     """Errors of the cases that converged, substeps, softened cases and those that were left out."""
-    run = [each for each in found if each is not None]
+    run = [item for item in found if item is not None]
     good = np.array([abs(error) for status, _, error in run if status == "converged"])
     soft = np.array([abs(error) for status, _, error in run if status == "softened"])
     counts = [count for status, count, _ in run if status == "converged"]

@@ -119,7 +119,7 @@ def main(counts: Sequence[int] = COUNTS) -> dict[str, Any]:
         times.append([(seconds, seconds / newton) for seconds, _, newton, _ in found["steps"]])
     if len(counts) > 1:
         growth = np.polyfit(np.log(counts), np.log(times).reshape(len(counts), -1), 1)[0].reshape(STEPS, 2)
-        said = [f"step {k + 1} {whole:.2f}, an iteration of it {each:.2f}" for k, (whole, each) in enumerate(growth)]
+        said = [f"step {k + 1} {whole:.2f}, an iteration of it {item:.2f}" for k, (whole, item) in enumerate(growth)]
         table.note(f"Exponents of growth in the number of bears: {'; '.join(said)} (target of an iteration: 1.15).")
     return table.figures()
 

@@ -57,7 +57,7 @@ def measured(package: Path, substeps: int, frames: int) -> tuple[float, int, flo
     mesh, scene = gummy_bear(height=HEIGHT, edge_length=0.009), BEARS.scene()
     system = build_system(replace(scene, bodies=[replace(body, mesh=mesh) for body in scene.bodies]))
     check = SurfaceCheck(system, XPBD().contact, mean_edge_length(system))
-    crossed = sum(crossings(check.find(np.ascontiguousarray(each), k * BEARS.dt)) > 0 for k, each in enumerate(x))
+    crossed = sum(crossings(check.find(np.ascontiguousarray(item), k * BEARS.dt)) > 0 for k, item in enumerate(x))
     return seconds, crossed, J
 
 

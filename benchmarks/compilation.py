@@ -76,7 +76,7 @@ def report(name: str, rows: int | None) -> None:
     event.register("numba:run_pass", passes)
     first_frame(name)
     seconds = time.process_time()
-    kernels = sum(len(each) for each in compilations.signatures.values())
+    kernels = sum(len(item) for item in compilations.signatures.values())
     total = sum(compilations.count.values())
     print(f"{name}: {seconds:.1f} s of the processor; {total} compilations, {kernels} of them kernels", flush=True)
     print("\n   own  with what it calls  times")
@@ -87,7 +87,7 @@ def report(name: str, rows: int | None) -> None:
     for key, seconds in whole.most_common(rows):
         print(f"{seconds:6.2f} {len(compilations.signatures[key]):3}  {key}")
         if rows is None and len(compilations.signatures[key]) > 1:
-            print("\n".join(f"           {each}" for each in compilations.signatures[key]))
+            print("\n".join(f"           {item}" for item in compilations.signatures[key]))
     print("\nPasses")
     for key, seconds in passes.own.most_common(12):
         print(f"{seconds:6.2f}  {key}")
@@ -95,7 +95,7 @@ def report(name: str, rows: int | None) -> None:
 
 def main() -> None:
     """Run in a fresh interpreter with an empty cache."""
-    names = [each for each in sys.argv[1:] if not each.startswith("--")] or ["snippet", "implicit", "bears"]
+    names = [item for item in sys.argv[1:] if not item.startswith("--")] or ["snippet", "implicit", "bears"]
     if "--here" in sys.argv:
         report(names[0], None if "--all" in sys.argv else ROWS)
         return

@@ -49,10 +49,10 @@ def measured(given: sp.Scene, frames: int, skipped: int) -> dict[str, Any]:
     steps: list[float] = []
     parts: dict[str, list[float]] = {name: [] for name in FIELDS}
     substeps = []
-    each = sp.simulate(given, sp.XPBD(threads=1), 1 / 60, skipped + frames)
+    item = sp.simulate(given, sp.XPBD(threads=1), 1 / 60, skipped + frames)
     for _ in range(skipped + frames):
         began = time.process_time()
-        frame = next(each)
+        frame = next(item)
         steps.append(time.process_time() - began)
         if frame.report.status != "converged":
             raise RuntimeError(frame.report.message)
@@ -100,9 +100,9 @@ def main(chambers: int = 3, frames: int = 40, skipped: int = 20) -> dict[str, An
     for name, milliseconds in figures["fields"].items():
         print(f"{name:32}{milliseconds:9.2f} ms")
     print(f"{'all fields':32}{figures['ms_of_reading']:9.2f} ms, {100 * share:.1f} % of a step")
-    for each in rates:
-        name = f"{threads} threads, {each['youngs']:g} Pa"
-        print(f"{name:32}{each['frames_a_second']:9.1f} frames/s, {each['substeps']} substeps")
+    for item in rates:
+        name = f"{threads} threads, {item['youngs']:g} Pa"
+        print(f"{name:32}{item['frames_a_second']:9.1f} frames/s, {item['substeps']} substeps")
     return {**at_start, "tets": tets, "share": share, **figures, **live}
 
 

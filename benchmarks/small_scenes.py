@@ -156,8 +156,8 @@ if __name__ == "__main__":
     parser.add_argument("--profile", action="store_true", help="of Python, in this process")
     given = parser.parse_args()
     if given.profile:
-        for each in given.scenes or CASES:
-            measured(each, profile=True)
+        for item in given.scenes or CASES:
+            measured(item, profile=True)
     elif given == parser.parse_args([]):
         run()
     else:

@@ -65,7 +65,7 @@ def a_ball_falls_on_the_floor_and_a_lift():
     # Once more: the cache is replaced, and the simulation starts from the shape itself.
     scene.supple.floor_height = 0.05
     assert bpy.ops.supple.simulate() == {"FINISHED"}
-    assert [each.type for each in ball.modifiers] == ["MESH_CACHE"]
+    assert [item.type for item in ball.modifiers] == ["MESH_CACHE"]
     assert 0.048 < world_vertices(ball, FRAMES + 1)[:, 2].min() < 0.07
     bpy.ops.object.select_all(action="SELECT")
     assert bpy.ops.supple.clear() == {"FINISHED"}
@@ -122,7 +122,7 @@ def an_armature_drives_pins():
     assert np.abs(driven[FRAMES + 1] - driven[1]).max() > 0.05
     assert bpy.ops.supple.simulate() == {"FINISHED"}
     bpy.context.scene.frame_set(FRAMES + 1)
-    assert [each.type for each in bar.modifiers] == ["ARMATURE", "MESH_CACHE", "SUBSURF"]
+    assert [item.type for item in bar.modifiers] == ["ARMATURE", "MESH_CACHE", "SUBSURF"]
     smooth.show_viewport = False
     for frame, expected in driven.items():
         assert np.abs(world_vertices(bar, frame)[held] - expected).max() < 1e-4, frame

@@ -73,7 +73,7 @@ def test_the_live_ball_is_simulated_with_and_without_its_page(capsys):
 
     figures = live.main(rounds=1, frames=6, edge_length=0.25, seconds=0.2)
     assert list(figures["ways"]) == ["headless", "engine", "page"]
-    assert all(each["best"] == each["median"] > 0.0 for each in figures["ways"].values())
+    assert all(item["best"] == item["median"] > 0.0 for item in figures["ways"].values())
     assert "of real time" in capsys.readouterr().out
 
 
@@ -145,7 +145,7 @@ def test_plates_that_are_bodies_are_compared_with_obstacles(capsys):
     assert list(figures["solvers"]) == ["Implicit", "XPBD"]
     for plates in figures["solvers"].values():
         assert list(plates) == ["obstacles", "scripted bodies", "free bodies"]
-        assert all(each["ms_per_step"] > 0.0 for each in plates.values())
+        assert all(item["ms_per_step"] > 0.0 for item in plates.values())
     assert "between two plates" in capsys.readouterr().out
 
 

@@ -123,8 +123,8 @@ class TestPins:
         np.testing.assert_allclose(turned, [2, 2, 0] + CUBE[[0, 3]] * [-1, 1, -1], atol=1e-15)
 
     def test_targets_follow_a_function_for_all_or_for_each(self):
-        each = build_system(self.scene(lambda t: [[t, 0, 0], [0, t, 0]]))
-        np.testing.assert_allclose(each.pin_targets(3.0) - each.pin_targets(0.0), [[3, 0, 0], [0, 3, 0]])
+        item = build_system(self.scene(lambda t: [[t, 0, 0], [0, t, 0]]))
+        np.testing.assert_allclose(item.pin_targets(3.0) - item.pin_targets(0.0), [[3, 0, 0], [0, 3, 0]])
 
     @pytest.mark.parametrize(
         ("motion", "words"),

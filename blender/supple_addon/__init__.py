@@ -211,8 +211,8 @@ CLASSES = (
 
 
 def register():
-    for each in CLASSES:
-        bpy.utils.register_class(each)
+    for item in CLASSES:
+        bpy.utils.register_class(item)
     bpy.types.Object.supple = PointerProperty(type=SuppleObject)
     bpy.types.Scene.supple = PointerProperty(type=SuppleScene)
 
@@ -220,5 +220,5 @@ def register():
 def unregister():
     del bpy.types.Scene.supple
     del bpy.types.Object.supple
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
+    for item in reversed(CLASSES):
+        bpy.utils.unregister_class(item)

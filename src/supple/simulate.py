@@ -132,7 +132,7 @@ def simulate(
         first, workspace = _prepared(scene, start, solver)
     else:
         choices = solver.choices(first_frame(scene, start).system, dt)
-        before = getattr(start, "solver", None)  # a run that goes on keeps its solver
+        before = getattr(start, "solver", None)  # a run that resumes keeps its solver
         first, workspace = _first_able(scene, start, sorted(choices, key=lambda choice: choice != before))
     shown = [supplied("progress")()] if progress else []
     return _steps(first, dt, steps, workspace, control, [*sinks, *shown], strict)

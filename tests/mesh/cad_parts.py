@@ -8,9 +8,9 @@ from supple.mesh.surface import SurfaceMesh
 
 def joined(*surfaces):
     """Several surfaces as one."""
-    starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])
-    triangles = [each.triangles + start for each, start in zip(surfaces, starts, strict=False)]
-    return SurfaceMesh(np.concatenate([each.vertices for each in surfaces]), np.concatenate(triangles))
+    starts = np.cumsum([0, *(len(item.vertices) for item in surfaces)])
+    triangles = [item.triangles + start for item, start in zip(surfaces, starts, strict=False)]
+    return SurfaceMesh(np.concatenate([item.vertices for item in surfaces]), np.concatenate(triangles))
 
 
 def loops(rings):

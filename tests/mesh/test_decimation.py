@@ -87,7 +87,7 @@ def test_a_knot_is_reduced_without_folds():
     across = np.cross(ahead, side)
     across /= np.linalg.norm(across, axis=1)[:, None]
     ring = np.cos(turn)[None, :, None] * side[:, None] + np.sin(turn)[None, :, None] * across[:, None]
-    i, j = (each.ravel() for each in np.meshgrid(np.arange(240), np.arange(16), indexing="ij"))
+    i, j = (item.ravel() for item in np.meshgrid(np.arange(240), np.arange(16), indexing="ij"))
     a, b, c, d = ((i + p) % 240 * 16 + (j + q) % 16 for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
     triangles = np.concatenate([np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)])
     knot = sp.SurfaceMesh((center[:, None] + 0.588 * ring).reshape(-1, 3) / 30.0, triangles)

@@ -36,12 +36,12 @@ def pairs_of(nodes, labels, order, label_of, same, out):
 @pytest.mark.parametrize("same", [True, False])
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 64, 65, 300])
 def test_pairs_of_one_set_are_found_once_and_labels_leave_branches_out(count, same):
-    each = boxes(count, 3)
+    item = boxes(count, 3)
     labels = (np.arange(count) // 37).astype(np.int32)
-    tree = BoxTree.over(each, labels)
+    tree = BoxTree.over(item, labels)
     out = np.empty((100_000, 2), dtype=np.int64)
     found = out[: pairs_of(tree.nodes, tree.labels, tree.order, labels, same, out)]
-    wanted = np.triu(overlaps(each, each), 1) & ((labels[:, None] == labels) == same)
+    wanted = np.triu(overlaps(item, item), 1) & ((labels[:, None] == labels) == same)
     assert sorted(map(tuple, found.tolist())) == list(map(tuple, np.argwhere(wanted).tolist()))
     assert len(found) > 40 or count < 300
 

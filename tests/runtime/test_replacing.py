@@ -68,18 +68,18 @@ def test_the_next_writer_deletes_what_killed_writers_left(tmp_path):
 
 def test_files_of_running_writers_and_of_other_machines_stay(tmp_path, monkeypatch):
     path = tmp_path / "plot.png"
-    mine = temporary_name(path)
-    mine.write_text("half")
+    own = temporary_name(path)
+    own.write_text("half")
     monkeypatch.setattr(replacing, "_machine", lambda: "elsewhere")
     elsewhere = temporary_name(path)
     elsewhere.write_text("half")
     monkeypatch.undo()
     remove_abandoned(path)
-    assert {p.name for p in tmp_path.iterdir()} == {mine.name, elsewhere.name}
+    assert {p.name for p in tmp_path.iterdir()} == {own.name, elsewhere.name}
     a_week_ago = time.time() - 7 * 86_400
     os.utime(elsewhere, (a_week_ago, a_week_ago))
     remove_abandoned(path)
-    assert {p.name for p in tmp_path.iterdir()} == {mine.name}
+    assert {p.name for p in tmp_path.iterdir()} == {own.name}
 
 
 def test_the_bytes_are_on_the_disk_before_the_name_changes(tmp_path, monkeypatch):

@@ -105,7 +105,7 @@ def test_a_part_that_stands_on_the_floor_is_simulated_with_the_solver_that_start
     lifted = {"part": frame.positions["part"] + [0, 0.1, 0]}
     higher = replace(frame, state=replace(frame.state, positions=lifted["part"]))
     (after,) = sp.simulate(higher.system.scene, dt=1 / 60, steps=1, start=higher)
-    assert after.solver == frame.solver  # a run that goes on keeps its solver
+    assert after.solver == frame.solver  # a run that resumes keeps its solver
     with pytest.raises(sp.SceneError, match="touches"):
         sp.simulate(sp.Scene([resting], [FLOOR]), sp.Implicit(), 1 / 60, 1)
 

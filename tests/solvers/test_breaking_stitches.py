@@ -100,7 +100,7 @@ def test_a_zip_opens_one_after_another(tmp_path, solver):
     path = tmp_path / "r.vtkhdf"
     frames = list(sp.simulate(strips(0.15), solver, DT, 15, sinks=[sp.Recorder(path)]))
     x = {k: frames[0].system.scene.bodies[1].mesh.vertices[k, 0] for k in range(36)}
-    places = [[x[int(pair[0])] for pair in pairs] for each in broken(frames).values() for pairs in each.values()]
+    places = [[x[int(pair[0])] for pair in pairs] for item in broken(frames).values() for pairs in item.values()]
     assert len(places) >= 3  # frames in which one or more break
     assert all(max(before) <= min(after) + 1e-9 for before, after in pairwise(places))
     assert 4 <= len(frames[7].state.broken_stitches) <= 10  # of 18

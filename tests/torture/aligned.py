@@ -27,7 +27,7 @@ def scene(cells: int) -> Scene:
 class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
         names = list(self.first.positions)
-        each = SPEED * np.sqrt(3.0) * mass(self.first, names[0])
+        item = SPEED * np.sqrt(3.0) * mass(self.first, names[0])
         total = float(np.linalg.norm(self.last.report.linear_momentum))
         away = min(float(center(self.last, n) @ center(self.first, n)) for n in names)
         spread = float(np.mean([np.linalg.norm(center(self.last, n)) for n in names]))
@@ -40,8 +40,8 @@ class _Measurement(ContactMeasurement):
             ),
             Claim(
                 "the total momentum stays zero, to 1e-9 of one cube's",
-                f"{total / each:.1e} of it",
-                total <= 1e-9 * each,
+                f"{total / item:.1e} of it",
+                total <= 1e-9 * item,
             ),
             Claim("the energy does not grow", f"{before:.4g} J before, {after:.4g} J after", after <= before),
         ]

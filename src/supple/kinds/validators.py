@@ -103,10 +103,10 @@ class NumberPerTet(Validator):
             # The first that is not finite, or the smallest and the largest, decide.
             unlike = np.flatnonzero(~np.isfinite(values.ravel()))
             for tet in unlike[:1] if len(unlike) else (int(values.argmin()), int(values.argmax())):
-                each = float(values.ravel()[tet])
-                if not self.bounds.allows(each):
+                entry = float(values.ravel()[tet])
+                if not self.bounds.allows(entry):
                     where = f" (tet {tet})" if values.ndim else ""
-                    raise SceneError(f"{what} is {each:g}{where}; it must be {self.bounds.needed(each)}")
+                    raise SceneError(f"{what} is {entry:g}{where}; it must be {self.bounds.needed(entry)}")
         return value
 
 

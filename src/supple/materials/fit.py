@@ -49,7 +49,7 @@ def draw_fit(
 Source = str | Path | ArrayLike
 # Bulk modulus over shear modulus where none is given: Poisson's ratio .499.
 _BULK_RATIO = 500.0
-# Evaluations of a fit from each start; the best one goes on.
+# Evaluations of a fit from each start; the best one continues.
 _ROUGH = 200
 
 

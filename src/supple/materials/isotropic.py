@@ -218,9 +218,9 @@ class KernelOfKinds:
         if not len(kind):
             return
         low, high = int(kind.min()), int(kind.max())
-        for each in [low] if low == high else np.unique(kind).tolist():
-            if each >= 0 or each == low:
-                self.of[max(each, UNKNOWN)](*arguments)
+        for law in [low] if low == high else np.unique(kind).tolist():
+            if law >= 0 or law == low:
+                self.of[max(law, UNKNOWN)](*arguments)
 
 
 def kernel_of_kinds(**options: Any) -> Callable[[FunctionType], KernelOfKinds]:

@@ -120,8 +120,8 @@ class TetMesh(Showable):
     def to_order(self, order: int) -> TetMesh:
         """The mesh with linear or quadratic tets; `self` where it has these.
 
-        From 1 to 2 a node is added in the middle of each edge, after the present vertices. From 2 to 1 only the corners
-        are kept, in their order, so that curved sides become straight.
+        From 1 to 2 a node is added in the middle of each edge, after the vertices that exist. From 2 to 1 only the
+        corners are kept, in their order, so that curved sides become straight.
 
         Raises
         ------

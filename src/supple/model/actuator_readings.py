@@ -46,8 +46,8 @@ class CableReading:
 
 def cavity_readings(details: SolverDetails) -> dict[str, CavityReading]:
     """By name, those of a solver's details."""
-    each = details.cavity_pressure
-    found = {n: CavityReading(each[n], details.cavity_volume[n], details.cavity_work[n]) for n in each}
+    pressures = details.cavity_pressure
+    found = {n: CavityReading(pressures[n], details.cavity_volume[n], details.cavity_work[n]) for n in pressures}
     return Named("cavity", found)
 
 
@@ -63,8 +63,8 @@ def cable_readings(details: SolverDetails) -> dict[str, CableReading]:
 def start_of(system: System) -> list[list[NDArray[np.float64]]]:
     """Forces, coordinates and work of all actuators before any step: no force, and no work."""
     x = system.start_states[-1].positions
-    parts = [each.parts(x) for each in system.actuators]
-    zero = [np.zeros_like(each) for each in parts]
+    parts = [actuator.parts(x) for actuator in system.actuators]
+    zero = [np.zeros_like(part) for part in parts]
     return [zero, parts, zero]
 
 
@@ -80,12 +80,12 @@ def actuator_fields(
     """
     names = ("cavity_pressure", "cavity_volume", "cavity_work", "cable_tension", "cable_length", "cable_work")
     found: dict[str, dict[str, float]] = {name: {} for name in names}
-    for each, Q, s, work in zip(system.actuators, forces, parts, works, strict=True):
-        if each.kind == "cavity":
-            found["cavity_pressure"][each.name] = float(Q[0])
-            found["cavity_volume"][each.name] = float(s[0])
+    for actuator, Q, s, work in zip(system.actuators, forces, parts, works, strict=True):
+        if actuator.kind == "cavity":
+            found["cavity_pressure"][actuator.name] = float(Q[0])
+            found["cavity_volume"][actuator.name] = float(s[0])
         else:
-            found["cable_tension"] |= {f"{each.name}.{k}": max(-float(value), 0.0) for k, value in enumerate(Q)}
-            found["cable_length"][each.name] = float(s.sum())
-        found[f"{each.kind}_work"][each.name] = float(work.sum())
+            found["cable_tension"] |= {f"{actuator.name}.{k}": max(-float(value), 0.0) for k, value in enumerate(Q)}
+            found["cable_length"][actuator.name] = float(s.sum())
+        found[f"{actuator.kind}_work"][actuator.name] = float(work.sum())
     return found

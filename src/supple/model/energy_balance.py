@@ -35,7 +35,7 @@ def no_works(system: System) -> dict[str, float]:
     names = ["pins"] if system.pins else []
     names += [load.work for load in system.loads]
     names += ["soft_targets"] if system.soft_targets else []
-    names += [each.work for each in system.actuators]
+    names += [actuator.work for actuator in system.actuators]
     names += ["joints"] if system.scene.joints else []
     names += ["anchors"] if len(system.stitching.anchors) else []
     names += [BREAKING] if system.scene.stitching.names.breakable else []
@@ -53,8 +53,8 @@ def add_works(works: dict[str, float], more: Mapping[str, float]) -> None:
 def works_of_actuators(system: System, works: Sequence[NDArray[np.float64]]) -> dict[str, float]:
     """By name [J], of the work (p,) on the parts of each actuator's coordinate."""
     named: dict[str, float] = {}
-    for each, work in zip(system.actuators, works, strict=True):
-        add_works(named, {each.work: float(work.sum())})
+    for actuator, work in zip(system.actuators, works, strict=True):
+        add_works(named, {actuator.work: float(work.sum())})
     return named
 
 

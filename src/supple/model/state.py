@@ -26,7 +26,7 @@ class Status(StrEnum):
     ITERATION_LIMIT, LINE_SEARCH_FAILED, BLOCKED : how Newton's method ended (`Implicit`)
     NOT_FINITE : a position or velocity is lost
     INVERTED : a tet is inside out that was not at the start (`XPBD`, as the following)
-    INTERSECTING : surfaces are through each other, or vertices deep inside of an obstacle
+    INTERSECTING : surfaces penetrate each other, or vertices an obstacle by more than a tolerance
     HELD_BACK : in too many substeps the motion of bodies was shortened to keep tets positive and surfaces apart, or
         works leave energy open for that
     ENERGY_GAINED : more energy than the scene and what drives it had (also `Implicit` with "newmark")
@@ -265,10 +265,10 @@ class Problems:
 
     Attributes
     ----------
-    frames : number of frames; bad : how many of them did not converge although the solver could go on
+    frames : number of frames; bad : how many of them did not converge although the solver could continue
     first : by status, the text of its first frame
     latest : text of the last frame; "" where it converged
-    stopped : whether the solver could not go on from the last frame
+    stopped : whether the solver could not continue from the last frame
     """
 
     def __init__(self, last: int) -> None:

@@ -43,8 +43,8 @@ def with_rows(more: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.f
 
 def stitched_state(system: System, state: State) -> State:
     """A state of n vertices with those of `with_stitched_points`; where it has none, the given one."""
-    mine = system.stitching.rigid
-    if not len(mine):
+    own = system.stitching.rigid
+    if not len(own):
         return state
-    x, v = (with_rows(mine.positions(values), values) for values in (state.positions, state.velocities))
+    x, v = (with_rows(own.positions(values), values) for values in (state.positions, state.velocities))
     return replace(state, positions=x, velocities=v)

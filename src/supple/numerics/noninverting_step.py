@@ -185,7 +185,7 @@ def largest_noninverting_step(
     vertices : (n, 3) positions [m]
     direction : (n, 3) change of the positions over a full step [m]
     tets : (m, 4) indices, positive volume at `vertices`
-    keep : the share of its present volume that a tet may fall to, above 0 and below 1
+    keep : the share of its current volume that a tet may fall to, above 0 and below 1
     ignore : tets without a limit, such as those that are inverted at the start
 
     Returns

@@ -178,7 +178,7 @@ def _panels(recording: Recording) -> list[Callable[[Any, Recording], None]]:
         if name in mappings:
             panels.append(partial(_mapping, name=name, label=label))
     given = [sensor for sensor in recording.sensors if sensor.kind != "driven"]
-    panels += [partial(_sensors, quantity=each) for each in dict.fromkeys(s.reading.quantity for s in given)]
+    panels += [partial(_sensors, quantity=item) for item in dict.fromkeys(s.reading.quantity for s in given)]
     return [*panels, _strokes] if any(_has_stroke(recording, sensor) for sensor in recording.sensors) else panels
 
 

@@ -102,9 +102,9 @@ class ProgressBar:
 
     def _summary(self) -> str:
         frames = len(self._seconds)
-        each = f", {1e3 * sum(self._seconds) / frames:.1f} ms each in the solver" if frames else ""
+        rate = f", {1e3 * sum(self._seconds) / frames:.1f} ms each in the solver" if frames else ""
         seconds = time.perf_counter() - self._start
-        return f"{frames} of {self._steps} frames in {seconds:.1f} s{each}; {self._status}"
+        return f"{frames} of {self._steps} frames in {seconds:.1f} s{rate}; {self._status}"
 
 
 def _write_over(text: str, end: str = "") -> None:

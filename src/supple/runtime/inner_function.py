@@ -83,7 +83,7 @@ def _known_operations(context: Any) -> Iterator[None]:
     resolve = context.resolve_function_type
 
     def resolve_once(function: Any, args: Any, kws: Any) -> Any:
-        numbers = all(isinstance(each, (types.Number, types.Boolean)) for each in args)
+        numbers = all(isinstance(entry, (types.Number, types.Boolean)) for entry in args)
         if kws or not numbers or function.__class__ is not types.Function:
             return resolve(function, args, kws)
         flags = ConfigStack().top()
@@ -128,8 +128,8 @@ def inlined_size(function: FunctionType) -> int:
     called = (
         function.__globals__.get(step.argval) for step in dis.get_instructions(function) if step.opname == "LOAD_GLOBAL"
     )
-    inlined = [each for each in called if isinstance(each, InnerFunction) and each.targetoptions["forceinline"]]
-    return len(function.__code__.co_code) + sum(inlined_size(each.py_func) for each in inlined)
+    inlined = [entry for entry in called if isinstance(entry, InnerFunction) and entry.targetoptions["forceinline"]]
+    return len(function.__code__.co_code) + sum(inlined_size(entry.py_func) for entry in inlined)
 
 
 class InnerFunction(CPUDispatcher):

@@ -72,7 +72,7 @@ def _has_rows(arguments: tuple[Any, ...], least: int) -> bool:
 
 
 class _Threads:
-    """Whether Numba's threads can be used by the present call."""
+    """Whether Numba's threads can be used by the current call."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()

@@ -77,7 +77,7 @@ def _constant(value: Any) -> Any:
 
 @cache
 def _names(code: CodeType) -> tuple[str, ...]:
-    inner = (name for each in code.co_consts if isinstance(each, CodeType) for name in _names(each))
+    inner = (name for item in code.co_consts if isinstance(item, CodeType) for name in _names(item))
     return tuple(dict.fromkeys([*code.co_names, *inner]))
 
 

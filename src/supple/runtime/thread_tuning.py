@@ -21,7 +21,7 @@ from supple.runtime.threads import numba_threads, one_thread
 SHORTEST_INTERVAL, LARGEST_MULTIPLE = 400, 32
 # A mode is as fast as the median of its latest tasks: one of them may include a compilation, or have been interrupted.
 SAMPLES = 3
-# The present mode is changed where it becomes slower than the latest tasks of the other mode by this factor.
+# The current mode is changed where it becomes slower than the latest tasks of the other mode by this factor.
 TOLERATED_SLOWDOWN = 1.2
 
 
@@ -35,7 +35,7 @@ class ThreadTuner:
 
     Attributes
     ----------
-    untimed : seconds of the present task that do not count, since that part of the work varies from task to task
+    untimed : seconds of the current task that do not count, since that part of the work varies from task to task
     """
 
     def __init__(self, choice: bool, parallel: bool, interval: int = SHORTEST_INTERVAL) -> None:

@@ -48,7 +48,7 @@ class ContactPair(Kind):
         first and one of the second. `*` matches any letters, `?` any one letter. A body paired with itself is its
         contact with itself.
     friction : Coulomb coefficient of these pairs, instead of those of the bodies and obstacles.
-    collide : if False, these pairs pass through each other.
+    collide : if False, these pairs may penetrate.
 
     Raises
     ------

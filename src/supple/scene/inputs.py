@@ -48,7 +48,7 @@ class Input(ABC):
 
     Attributes
     ----------
-    ramp : the values in the present frame; a new object for each frame
+    ramp : the values in the current frame; a new object for each frame
 
     Raises
     ------

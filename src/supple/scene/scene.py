@@ -60,7 +60,7 @@ class Scene(Showable, metaclass=Described):
     sensors : of contact, angles and distances; no two have the same name.
     cavities : closed inner surfaces filled with gas or liquid; cables : through points of bodies. No two cavities and
         no two cables have the same name.
-    contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
+    contact_pairs : friction of some pairs of bodies and obstacles, and which of them may penetrate.
     joints : of rigid bodies with each other, with obstacles and with the world; no two have the same name.
     welds : vertices of soft bodies that are points of rigid ones; no two have the same name.
 

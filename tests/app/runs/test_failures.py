@@ -160,7 +160,7 @@ def test_nan_within_a_solver_is_a_status_and_the_last_good_state_is_kept(out, mo
     assert last_state(out).positions.tobytes() == good.state.positions.tobytes()
     session = read_journal(RunPaths(out).journal).sessions[-1]
     assert (session.outcome, session.message.split(":")[0]) == ("stopped", "not_finite")
-    assert all(map(same_bits, healthy[3:], sp.resume(out, scene, solver))), "without the fault it goes on"
+    assert all(map(same_bits, healthy[3:], sp.resume(out, scene, solver))), "without the fault it resumes"
 
 
 @pytest.mark.parametrize("kind", ["pcg", "auto"])

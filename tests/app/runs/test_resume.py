@@ -1,4 +1,4 @@
-"""A run that goes on equals the one that was never interrupted, bit by bit."""
+"""A resumed run equals the one that was never interrupted, bit by bit."""
 
 import json
 import logging

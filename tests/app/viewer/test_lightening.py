@@ -1,4 +1,4 @@
-"""Scenes that are slower than real time get lighter meshes, or another solver, on a page."""
+"""Scenes that are slower than real time get coarser meshes, or another solver, on a page."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.engine.scene.lightening import lighter, linearized
+from supple.app.viewer.engine.scene.lightening import coarsened, linearized
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_process import _in_time
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -30,7 +30,7 @@ def slow() -> LiveScene:
 
 
 def test_bodies_of_a_slow_scene_get_fewer_tets_and_keep_their_surface(slow):
-    source, line = lighter(slow)
+    source, line = coarsened(slow)
     before, after = slow.source.scene.bodies[0], source.scene.bodies[0]
     assert len(after.mesh.tets) < 0.8 * len(before.mesh.tets)
     np.testing.assert_allclose(after.skin.volume, before.mesh.surface.volume, rtol=1e-12)
@@ -42,13 +42,13 @@ def test_bodies_of_a_slow_scene_get_fewer_tets_and_keep_their_surface(slow):
 def test_a_scene_that_keeps_up_with_time_stays_as_it_is(slow):
     slow.source, source = replace(slow.source, dt=10.0), slow.source
     try:
-        assert lighter(slow) is None
+        assert coarsened(slow) is None
     finally:
         slow.source = source
 
 
 def test_bodies_that_something_refers_to_keep_their_meshes():
-    source, _ = lighter(stepped(pins=[sp.Pin("ball 0", vertices=[0])]))
+    source, _ = coarsened(stepped(pins=[sp.Pin("ball 0", vertices=[0])]))
     pinned, free = source.scene.bodies
     assert pinned.skin is None
     assert len(free.mesh.tets) < len(pinned.mesh.tets)

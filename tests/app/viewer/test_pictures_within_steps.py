@@ -123,7 +123,7 @@ def test_the_present_state_of_xpbd_is_that_of_the_frame_at_its_end():
     weld = sp.Weld("beam", "cube", np.flatnonzero(beam.vertices[:, 0] < -0.199), name="weld")
     live = LiveScene(LiveSource("welded", sp.Scene([soft, cube], welds=[weld]), sp.XPBD(substeps=8), 1 / 60))
     assert live.step().status.can_go_on
-    present, end = live.workspace.present(), live.state
-    assert present.time == pytest.approx(end.time)
-    assert present.positions == pytest.approx(end.positions, abs=1e-12)
-    assert present.velocities == pytest.approx(end.velocities, abs=1e-12)
+    current, end = live.workspace.present(), live.state
+    assert current.time == pytest.approx(end.time)
+    assert current.positions == pytest.approx(end.positions, abs=1e-12)
+    assert current.velocities == pytest.approx(end.velocities, abs=1e-12)

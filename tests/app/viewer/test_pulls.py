@@ -18,7 +18,7 @@ from .conftest import corner_grab, free_source
 
 
 class TestPulls:
-    """A pull acts as soon as it can: in the present step of XPBD, otherwise in a step that begins at once."""
+    """A pull acts as soon as it can: in the current step of XPBD, otherwise in a step that begins at once."""
 
     def held(self, loop):
         loop.execute(corner_grab((-0.2, 0.3, -0.2)))

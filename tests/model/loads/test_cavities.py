@@ -192,7 +192,7 @@ def test_voids_are_found_by_size_and_chosen_by_triangles():
         sp.Cavity("shell", pressure=1.0, void=1, name="again"),
         sp.Cavity("shell", pressure=1.0),
     ]
-    starts = [build_system(sp.Scene([body], cavities=[each])).actuators[0].start for each in cavities]
+    starts = [build_system(sp.Scene([body], cavities=[item])).actuators[0].start for item in cavities]
     assert starts[0] == starts[1] < 0.01 * starts[2]
 
 

@@ -38,7 +38,7 @@ def test_free_growth_has_no_stress(solver):
     assert np.abs(frame.stress["bar"]).max() < 0.005 * E
     np.testing.assert_allclose(frame.principal_stretches["bar"], [[1.2, 1.2, 1.08]] * len(BAR.tets), atol=5e-3)
     assert frame.report.min_det_F == pytest.approx(0.9 * 1.2**3, rel=5e-3)
-    work = {name: sum(each.report.work[name] for each in frames) for name in frame.report.work}
+    work = {name: sum(item.report.work[name] for item in frames) for name in frame.report.work}
     assert work["growth"] > 0.0
     assert work["damping"] < 0.0
     assert abs(sum(work.values())) < 0.01 * work["growth"]

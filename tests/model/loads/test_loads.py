@@ -54,8 +54,8 @@ def test_gradients_and_hessians_have_slope_two(load):
     assert finer_force < 0.3 * force or finer_force < 1e-9
     # Where a step begins, the potential has the forces of the load.
     forces = np.zeros_like(start)
-    for each in system.loads:
-        each.add_forces(start, 0.0, forces)
+    for item in system.loads:
+        item.add_forces(start, 0.0, forces)
     np.testing.assert_allclose(gradient_of(potential, start), -forces, atol=1e-12 * np.abs(forces).max() + 1e-15)
 
 

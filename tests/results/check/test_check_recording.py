@@ -155,11 +155,11 @@ def test_the_checker_shares_no_code_with_the_solvers():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
     assert done.stdout.strip() == "[]", done
-    mine = Path(check_package.__file__).parent
+    own = Path(check_package.__file__).parent
     known = re.compile(
         r"supple\.(results|errors|model\.state|materials|kinds|runtime|scene|mesh\.(io|topology|skin))\b"
     )
-    for path in mine.rglob("*.py"):
+    for path in own.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"\.(records|source|recording)\.system\b", text), f"{path.name} reads a solver's arrays"
         for name in re.findall(r"^\s*(?:from|import) (supple[\w.]*)", text, flags=re.M):

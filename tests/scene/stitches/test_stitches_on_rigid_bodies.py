@@ -125,7 +125,7 @@ def test_a_spinning_pair_keeps_its_momenta_and_gains_no_energy(solver, rate, los
     frames = sp.simulate(scene, solver, 1 / rate, rate // 4, initial_velocities=velocities)
     reports = [frame.report for frame in frames]
     assert {str(report.status) for report in reports} == {"converged"}
-    energies = [each.kinetic_energy + each.elastic_energy + each.stitch_energy for each in reports]
+    energies = [item.kinetic_energy + item.elastic_energy + item.stitch_energy for item in reports]
     assert max(energies) < 1.02 * energies[0]
     for key, least in (("linear_momentum", 1e-9), ("angular_momentum", lost)):
         began, ended = getattr(reports[0], key), getattr(reports[-1], key)

@@ -89,8 +89,8 @@ def test_laws_act_at_the_points_of_quadratic_tets():
         corners = linear.rest_positions * [1.2, 0.95, 0.9]
         # The straight tets have another volume than the curved ones; the energy density is the same everywhere.
         densities = [
-            elasticity_of(each).value(y) / each.laws.volumes.sum()
-            for each, y in ((system, stretched), (linear, corners))
+            elasticity_of(item).value(y) / item.laws.volumes.sum()
+            for item, y in ((system, stretched), (linear, corners))
         ]
         assert densities[0] == pytest.approx(densities[1], rel=1e-9)
 

@@ -92,7 +92,7 @@ def test_a_sliding_cylinder_begins_to_roll():
     poses = [frame.poses["prism"] for frame in frames_of(scene, dt, 0.16)]
     inertia, times = spin_inertia(body), dt * np.arange(1, len(poses) + 1)
     v, rim = (
-        np.array(each) for each in zip(*((p.velocity[0], -RADIUS * p.angular_velocity[2]) for p in poses), strict=True)
+        np.array(item) for item in zip(*((p.velocity[0], -RADIUS * p.angular_velocity[2]) for p in poses), strict=True)
     )
     begins = 1.0 / (mu * G * (1.0 + 1.0 / inertia))
     slides = (times > 0.01) & (times < 0.8 * begins)

@@ -25,7 +25,7 @@ def rigidity(frames, name="rigid", shape=CUBE):
     """The largest error of a distance between two vertices of the surface [m]."""
     sides = np.linalg.norm(shape.vertices[:, None] - shape.vertices, axis=2)
     found = (np.linalg.norm(f.positions[name][:, None] - f.positions[name], axis=2) for f in frames)
-    return max(np.abs(each - sides).max() for each in found)
+    return max(np.abs(item - sides).max() for item in found)
 
 
 def test_a_free_body_keeps_its_momenta_and_its_energy_over_10000_substeps():
@@ -55,7 +55,7 @@ def wheel(count, radius, half=0.02):
     ring = [np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(count, z)]) for z in (-half, half)]
     j, low, high = (i + 1) % count, np.full(count, 2 * count), np.full(count, 2 * count + 1)
     corners = [(i, j, count + j), (i, count + j, count + i), (low, j, i), (high, count + i, count + j)]
-    triangles = np.concatenate([np.column_stack(each) for each in corners])
+    triangles = np.concatenate([np.column_stack(item) for item in corners])
     return sp.SurfaceMesh(np.concatenate([*ring, [[0, 0, -half], [0, 0, half]]]), triangles)
 
 

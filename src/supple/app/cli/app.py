@@ -21,7 +21,7 @@ app = App(
     name="supple",
     help="Tetrahedral soft bodies: a surface mesh goes in, a simulation that can be trusted comes out.",
     help_epilogue="Exit codes: 0 done, 1 a check, a claim or a --strict run failed, 2 the input or an option cannot "
-    "be used, 3 the solver could not go on.",
+    "be used, 3 the solver could not continue.",
     version=__version__,
     console=ShellConsole(),
     suppress_keyboard_interrupt=False,

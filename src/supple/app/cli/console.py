@@ -26,7 +26,7 @@ class ExitCode(IntEnum):
     INPUT = 2
     """The input, the options or the place for the output cannot be used: one line on stderr gives the reason."""
     SOLVER = 3
-    """The solver could not go on. The recording up to there is complete."""
+    """The solver could not continue. The recording up to there is complete."""
     INTERRUPTED = 130
     """Ctrl-C, or the request of a system to end. The recording up to there is complete."""
     BROKEN_PIPE = 141
@@ -79,7 +79,7 @@ _ANNOUNCED = ("supple.mesh.meshing", "supple.app.scene_file")
 
 
 class _Handler(logging.StreamHandler):
-    """Writes to the present stderr, which a progress line replaces so that lines appear above it."""
+    """Writes to the current stderr, which a progress line replaces so that lines appear above it."""
 
     def __init__(self) -> None:
         logging.Handler.__init__(self)
@@ -117,7 +117,7 @@ def reading(yes: bool = False, what: str = "reading the scene and making its mes
         if yes or not (console.is_terminal and sys.stdin is not None and sys.stdin.isatty()):
             return yes
         status.stop()
-        answer = console.input(escape(f"{one_line(question)}. Go on? [y/N] "))
+        answer = console.input(escape(f"{one_line(question)}. Continue? [y/N] "))
         status.start()
         return answer.strip().lower() in ("y", "yes")
 

@@ -11,7 +11,7 @@ from supple.runtime.lock import is_locked
 
 
 def run_rows(folder: Path) -> list[tuple[str, str]]:
-    """Names and values: the run, each process that worked on it, and how to go on.
+    """Names and values: the run, each process that worked on it, and how to resume.
 
     Raises
     ------

@@ -152,7 +152,7 @@ def run_session(
 def resume_session(
     scene: Scene | None, solver: Solver | Auto | None, steps: int | None, *, products: Products
 ) -> Outcome:
-    """Go on with the run in a folder, and print a summary; see `resume`.
+    """Resume the run in a folder, and print a summary; see `resume`.
 
     Raises
     ------

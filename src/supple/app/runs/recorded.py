@@ -20,7 +20,7 @@ logger = logging.getLogger(__name__)
 
 
 class CheckpointSink:
-    """Keeps the latest frame that a run may go on from, at most once in this many seconds.
+    """Keeps the latest frame that a run may resume from, at most once in this many seconds.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class CheckpointSink:
 def simulate_recorded(run: Run, recording: Path, checkpoint: Path, checkpoint_seconds: float) -> tuple[int, str]:
     """Simulate and record a run; the number of frames, and why it stopped early.
 
-    Where an earlier process was killed, the run goes on from the checkpoint; that changes no bit of the recording.
+    Where an earlier process was killed, the run resumes from the checkpoint; that changes no bit of the recording.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def simulate_recorded(run: Run, recording: Path, checkpoint: Path, checkpoint_se
 
 
 def _interrupted(run: Run, recording: Path, path: Path) -> Frame | None:
-    """The frame to go on from; None where the run has to begin."""
+    """The frame to resume from; None where the run has to begin."""
     if not path.exists() or not recording.exists():
         return None
     try:

@@ -1,4 +1,4 @@
-"""Going on with a run that was interrupted, killed, or finished with too few frames."""
+"""Resuming a run that was interrupted, killed, or finished with too few frames."""
 
 from __future__ import annotations
 
@@ -65,10 +65,10 @@ def resume(
     control: Control | None = None,
     sinks: Sequence[Sink] = (),
 ) -> Frames:
-    """Go on with a run from its last checkpoint, in the same folder; yields the frames after it.
+    """Resume a run from its last checkpoint, in the same folder; yields the frames after it.
 
     They have the bits that an uninterrupted run would have given, with the same versions of all packages on the same
-    machine. The recording goes on; its frames after the checkpoint are computed again, and stay where they are equal.
+    machine. The recording continues; its frames after the checkpoint are computed again, and stay where they are equal.
 
     Parameters
     ----------

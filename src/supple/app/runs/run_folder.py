@@ -69,7 +69,7 @@ class FolderSink:
 
 
 class RunFolder(FolderSink):
-    """Keeps a run: `simulate(scene, solver, dt, steps, sinks=[RunFolder("out")])`. `resume` goes on with it.
+    """Keeps a run: `simulate(scene, solver, dt, steps, sinks=[RunFolder("out")])`. `resume` continues it.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ class RunWriter:
     Parameters
     ----------
     paths : in the folder; recorder : of the recording in it; journal : of the run so far
-    checkpointed : index of the checkpoint that the run goes on from, or -1
+    checkpointed : index of the checkpoint that the run resumes from, or -1
     """
 
     def __init__(self, paths: RunPaths, recorder: Recorder, journal: Journal, checkpointed: int = -1) -> None:

@@ -188,8 +188,8 @@ def sweep(
 ) -> StudyTable:
     """Simulate every case of a study, and return the table of results, which is also in `folder/table.csv`.
 
-    A case that has ended is not simulated again, so that an interrupted study goes on where it was. A case that fails
-    is in the table with its reason. A case whose process is lost goes on in another one, from its last checkpoint.
+    A case that has ended is not simulated again, so that an interrupted study resumes where it was. A case that fails
+    is in the table with its reason. A case whose process is lost resumes in another one, from its last checkpoint.
 
     Parameters
     ----------

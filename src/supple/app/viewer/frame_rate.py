@@ -39,7 +39,7 @@ class FrameRate:
 
     @property
     def interval(self) -> float:
-        """Present time between two pictures [s]."""
+        """Current time between two pictures [s]."""
         return min(SLOWEST, max(FASTEST, median(self._costs) / _SHARE))
 
     @contextmanager

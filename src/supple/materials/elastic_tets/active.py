@@ -54,19 +54,19 @@ class Growth:
     @classmethod
     def of(cls, active: Sequence[ActiveTets], m: int) -> Growth | None:
         """None where nothing grows."""
-        growths = [each for each in active if each.kind == GROWTH]
+        growths = [load for load in active if load.kind == GROWTH]
         if not growths:
             return None
         inverses, ratios = np.tile(np.eye(3), (m, 1, 1)), np.ones(m)
-        for each in growths:
-            s, d = each.value, each.directions
+        for load in growths:
+            s, d = load.value, load.directions
             if len(d):
                 own = np.eye(3) + (1.0 / s - 1.0) * d[:, :, None] * d[:, None, :]
-                inverses[each.rows] = own @ inverses[each.rows]
-                ratios[each.rows] *= s
+                inverses[load.rows] = own @ inverses[load.rows]
+                ratios[load.rows] *= s
             else:
-                inverses[each.rows] /= s
-                ratios[each.rows] *= s**3
+                inverses[load.rows] /= s
+                ratios[load.rows] *= s**3
         return cls(inverses, ratios)
 
     def equals(self, other: Growth | None) -> bool:
@@ -89,9 +89,9 @@ class Growth:
 
 def add_active_piolas(active: Sequence[ActiveTets], F: Floats, out: Floats) -> None:
     """Add a S f(s) (F d / s) d^T of all fibres to `out` (m, 3, 3) [Pa], with s = |F d|; F (m, 3, 3)."""
-    for each in active:
-        if each.kind == MUSCLE:
-            ways = np.einsum("kij,kj->ki", F[each.rows], each.directions)
+    for load in active:
+        if load.kind == MUSCLE:
+            ways = np.einsum("kij,kj->ki", F[load.rows], load.directions)
             s = np.linalg.norm(ways, axis=1)
-            pull = each.value * each.strength * np.interp(s, *each.curve.T) / np.where(s > 0.0, s, np.inf)
-            out[each.rows] += pull[:, None, None] * ways[:, :, None] * each.directions[:, None, :]
+            pull = load.value * load.strength * np.interp(s, *load.curve.T) / np.where(s > 0.0, s, np.inf)
+            out[load.rows] += pull[:, None, None] * ways[:, :, None] * load.directions[:, None, :]

@@ -133,11 +133,11 @@ def joined_materials(parts: list[TetMaterial]) -> TetMaterial:
 
 def of_points(material: TetMaterial, rows: NDArray[np.int64], points: int) -> TetMaterial:
     """The material of each of `points` points in each of the tets `rows` (k,), tet after tet."""
-    each = np.repeat(rows, points)
+    owners = np.repeat(rows, points)
     place = np.full(len(material.kind), -1, dtype=np.int64)
     place[rows] = np.arange(len(rows))
     values = {field.name: getattr(material, field.name) for field in fields(material)}
-    taken = {name: np.ascontiguousarray(of[each]) for name, of in values.items() if isinstance(of, np.ndarray)}
+    taken = {name: np.ascontiguousarray(of[owners]) for name, of in values.items() if isinstance(of, np.ndarray)}
     laws = []
     for part in material.laws:
         own = place[part.rows] >= 0

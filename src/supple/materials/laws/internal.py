@@ -45,14 +45,14 @@ def checked(material: TetMaterial, internal: NDArray[np.float64]) -> NDArray[np.
 
 def tets_of(material: TetMaterial) -> NDArray[np.int64]:
     """(k,) the tet of every row."""
-    each = (np.repeat(tets.rows, tets.points) for tets, _ in material.flowing_laws)
-    return np.concatenate([np.zeros(0, dtype=np.int64), *each])
+    column = (np.repeat(tets.rows, tets.points) for tets, _ in material.flowing_laws)
+    return np.concatenate([np.zeros(0, dtype=np.int64), *column])
 
 
 def rows_of_points(material: TetMaterial) -> NDArray[np.int64]:
     """(k,) the rows that belong to points of quadratic tets, in their order."""
-    each = (np.arange(rows.start, rows.stop) for tets, rows in material.flowing_laws if tets.points > 1)
-    return np.concatenate([np.zeros(0, dtype=np.int64), *each])
+    column = (np.arange(rows.start, rows.stop) for tets, rows in material.flowing_laws if tets.points > 1)
+    return np.concatenate([np.zeros(0, dtype=np.int64), *column])
 
 
 def inverse_flow(internal: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -75,10 +75,10 @@ def derivatives(expression: Any, of: str, names: tuple[str, ...]) -> Any:
     symbols = symbols_of(of, names)
     variables, values = ([symbols[name] for name in group] for group in (VARIABLES[of], names))
     if of == "invariants":
-        first = [sympy.diff(expression, each) for each in variables]
+        first = [sympy.diff(expression, symbol) for symbol in variables]
         second = [sympy.diff(first[i], variables[j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))]
     else:
-        first = [each * sympy.diff(expression, each) for each in variables]
+        first = [symbol * sympy.diff(expression, symbol) for symbol in variables]
         second = [
             variables[j] * sympy.diff(first[i], variables[j])
             for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))

@@ -114,7 +114,7 @@ class EnergyMaterial(ByLaw):
             raise SceneError("EnergyMaterial: psi or a derivative of it is not finite near rest") from None
         if not np.isfinite([stress, *rest]).all():
             raise SceneError("EnergyMaterial: psi or a derivative of it is not finite near rest")
-        if abs(stress) > 1e-9 * max(abs(float(each)) for each in rest[1:]):
+        if abs(stress) > 1e-9 * max(abs(float(item)) for item in rest[1:]):
             raise SceneError(
                 f"EnergyMaterial: psi has a stress of {stress:g} Pa at rest; add a term that cancels it, such as a "
                 "multiple of log(J)"

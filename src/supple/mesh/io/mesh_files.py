@@ -124,7 +124,7 @@ def read_contents(path: str | Path, *, keep_axes: bool = False) -> Contents:
     reader = READERS[extension]
     told = next((READERS[own] for sign, own in _SIGNS.items() if re.match(sign, begin)), reader)
     if told is not reader:
-        kinds = [own for own, each in READERS.items() if each is told]
+        kinds = [own for own, item in READERS.items() if item is told]
         logger.warning("%s: it is a %s file by what it holds, and read as that", path, " or ".join(kinds))
     try:
         found = told(data, path) if told in _WITH_FILES else told(data)

@@ -12,7 +12,8 @@ _ASK: ContextVar[tuple[Callable[[str], bool], str] | None] = ContextVar("ask", d
 
 @contextmanager
 def asking(ask: Callable[[str], bool], beforehand: str) -> Iterator[None]:
-    """Meshing inside puts its questions to `ask`, which returns whether to go on; an option says yes `beforehand`."""
+    """Meshing inside puts its questions to `ask`, which returns whether to continue; an option says yes
+    `beforehand`."""
     token = _ASK.set((ask, beforehand))
     try:
         yield

@@ -169,7 +169,7 @@ def _used(mesher: str, result: MesherResult) -> TetMesh:
     try:
         return TetMesh.dropping_unused(result.vertices, result.elements)
     except MeshError as error:
-        # As a failure of the mesher, so that "auto" goes on with stuffing.
+        # As a failure of the mesher, so that "auto" continues with stuffing.
         raise MesherFailure(
             "failed",
             f"{mesher} returned an unusable mesh: {str(error).removeprefix('TetMesh: ')}; the surface has triangles "

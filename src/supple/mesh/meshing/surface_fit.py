@@ -100,8 +100,8 @@ def _least_heights(x: NDArray[np.float64], tets: NDArray[np.integer]) -> NDArray
 def _spread(surface: SurfaceMesh, count: int) -> NDArray[np.float64]:
     """About `count` points (k, 3), evenly over the surface, the same at each call."""
     areas = np.linalg.norm(surface.area_vectors, axis=1)
-    each = np.ceil(areas / areas.sum() * count).astype(np.int64)
-    rows = np.repeat(np.arange(len(areas)), each)
+    shares = np.ceil(areas / areas.sum() * count).astype(np.int64)
+    rows = np.repeat(np.arange(len(areas)), shares)
     # The additive sequence of the plastic number is even in the square; the square is folded onto the triangle.
     k = np.arange(1, len(rows) + 1)
     u, v = np.modf(0.7548776662466927 * k)[0], np.modf(0.5698402909980532 * k)[0]

@@ -63,7 +63,7 @@ def condition(function: int, k: float, value: float = 0.0, low: float = -np.inf,
     return Law(function, k, low, high, least=value, most=value)
 
 
-# One law in an array: its g0 and its lambda in the present step stand at the end.
+# One law in an array: its g0 and its lambda in the current step stand at the end.
 LAW = np.dtype(
     [
         ("function", np.int64),

@@ -176,8 +176,8 @@ def two_level(pattern: BlockRows, points: NDArray[np.float64], group_start: NDAr
         offset = points[rows] - points[rows].mean(axis=0)
         size = np.sqrt((offset**2).sum(axis=1).mean())
         fields[rows, 1:] = offset / size if size > 0.0 else 0.0
-    each = np.arange(len(points), dtype=np.int32)
-    return TwoLevel.of(pattern, np.ascontiguousarray(group_start), fields, each, np.zeros((groups, groups, 12, 12)))
+    numbers = np.arange(len(points), dtype=np.int32)
+    return TwoLevel.of(pattern, np.ascontiguousarray(group_start), fields, numbers, np.zeros((groups, groups, 12, 12)))
 
 
 @njit(cache=True)

@@ -36,9 +36,9 @@ def elastic_energy(at: Frame) -> float | None:
         kind, mu, lam = of.material.kind[rows], of.material.mu[rows], of.material.lam[rows]
         # (k,) the part of the first Lamé parameter of which a quadratic tet takes its mean J (docs/theory/locking.md)
         share, psi = _mean_share(of.material)[rows] * (F.shape[1] > 1), np.zeros(volumes.shape)
-        each = (np.repeat(law, F.shape[1]) for law in (kind, mu, lam - share))
+        column = (np.repeat(law, F.shape[1]) for law in (kind, mu, lam - share))
         flat = psi.ravel()
-        densities(np.ascontiguousarray(F.reshape(-1, 3, 3)), *each, flat)
+        densities(np.ascontiguousarray(F.reshape(-1, 3, 3)), *column, flat)
         psi = np.where(kind[:, None] < 0, 0.0, flat.reshape(volumes.shape))
         begin = 0
         for part in of.material.laws:

@@ -51,7 +51,7 @@ class CheckSettings:
         radians [-]. None: 1e-6 for recordings of `Implicit`, 1e-3 for others.
     max_energy_gain : how far the energy may exceed that at the start and the works, as a share of the energy in motion;
         also how large the sum of residuals may be.
-    max_momentum_change : how far momenta may change without a force, as a share of the momentum present.
+    max_momentum_change : how far momenta may change without a force, as a share of the momentum that there is.
 
     Raises
     ------

@@ -103,7 +103,7 @@ class Surfaces:
         Parameters
         ----------
         tree : over the triangles; with the boxes of x0, where nothing moves
-        x0, x1 : (n, 3) all points; with x1, the pairs that pass through each other between them
+        x0, x1 : (n, 3) all points; with x1, the pairs that penetrate each other between them
         allowed : (p, p) of which owners, instead of all that must stay apart
         """
         out, surface = np.zeros((_MOST_PAIRS, 2), dtype=np.int64), self.looked_at(allowed)

@@ -1,4 +1,4 @@
-"""A checkpoint: everything that a run needs to go on with the bits of an uninterrupted one, in one file.
+"""A checkpoint: everything that a run needs to resume with the bits of an uninterrupted one, in one file.
 
 The file is a line that names the format, the SHA-256 of all that follows in hexadecimal digits, a line of JSON, and the
 bytes of all arrays. It is written under a temporary name, brought to the disk, and renamed.

@@ -225,7 +225,7 @@ def placed(film: Film, view: View, points: _Vector, share: float) -> tuple[_Vect
 
 
 def _share(color: Color) -> list[float]:
-    return [each / 255.0 for each in color]
+    return [channel / 255.0 for channel in color]
 
 
 def _phong(look: Look) -> dict[str, Any]:

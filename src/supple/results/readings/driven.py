@@ -23,7 +23,7 @@ def driven_names(scene: Scene) -> list[str]:
     """The names of obstacles, then of pins, which are "BODY.pin" where they have none; repeated ones get a number."""
     counts = Counter(sensor.name for sensor in scene.sensors)
     names = []
-    for name in [str(each.name) for each in scene.obstacles] + [pin.name or f"{pin.body}.pin" for pin in scene.pins]:
+    for name in [str(item.name) for item in scene.obstacles] + [pin.name or f"{pin.body}.pin" for pin in scene.pins]:
         counts[name] += 1
         names.append(name if counts[name] == 1 else f"{name} {counts[name]}")
     return names

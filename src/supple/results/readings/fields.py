@@ -83,9 +83,9 @@ def checked_fields(names: Iterable[str]) -> tuple[Field, ...]:
 def cost(fields: Iterable[Field], vertices: int, tets: int, frames: int) -> str:
     """What fields take in a recording of this many frames, as a line of text."""
     chosen = list(fields)
-    each = sum(field.frame_bytes(vertices, tets) for field in chosen)
+    frame_size = sum(field.frame_bytes(vertices, tets) for field in chosen)
     names = ", ".join(field.name for field in chosen)
-    return f"{names}: {_size(each)} for each frame, {_size(each * frames)} for {frames} frames"
+    return f"{names}: {_size(frame_size)} for each frame, {_size(frame_size * frames)} for {frames} frames"
 
 
 def _size(count: int) -> str:

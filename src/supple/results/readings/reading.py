@@ -104,7 +104,7 @@ class TaxelReading(Reading):
     Attributes
     ----------
     normal : (rows, columns) how hard each cell is pushed along the inward normal of the surface [N]
-    shear : (rows, columns, 2) the force along the surface, in the present direction of the grid's first side and across
+    shear : (rows, columns, 2) the force along the surface, in the current direction of the grid's first side and across
         it, towards the second side [N]
     """
 

@@ -19,7 +19,7 @@ logger = logging.getLogger(__name__)
 
 
 class ContinuedRecorder(Recorder):
-    """Goes on with a recording from one of its frames, which the simulation starts with.
+    """Continues a recording from one of its frames, which the simulation starts with.
 
     Frames after it that are computed again are compared with the recorded ones, which stay. From the first one that
     differs, the recorded ones are replaced.

@@ -145,4 +145,4 @@ def recorded_sensors(scene: Scene) -> tuple[RecordedSensor, ...]:
     """The sensors of a scene, then its obstacles and pins."""
     given = [(sensor.name, sensor.kind, READINGS[sensor.kind].shape_of(sensor)) for sensor in scene.sensors]
     driven = [(name, "driven", READINGS["driven"].shape) for name in driven_names(scene)]
-    return tuple(RecordedSensor(k, *each) for k, each in enumerate([*given, *driven]))
+    return tuple(RecordedSensor(k, *item) for k, item in enumerate([*given, *driven]))

@@ -60,7 +60,7 @@ class Gate:
 
     def holds_token(self, path: str) -> bool:
         """Whether the address contains the token."""
-        return any(self._is_token(each) for each in parse_qs(urlsplit(path).query).get("token", []))
+        return any(self._is_token(item) for item in parse_qs(urlsplit(path).query).get("token", []))
 
     def answering(self, process_request: Any) -> Callable[[Any, Any], Any]:
         """The answer of the server to HTTP requests, after the check."""

@@ -39,7 +39,7 @@ def occlusion(surfaces: Surfaces, bodies: int) -> list[NDArray[np.float64]]:
     margin = int(np.ceil((3.0 + _ABOVE) * _BLUR)) + 1
     origin = low - margin * cell
     grid = np.zeros(tuple(np.ceil((high - low) / cell).astype(int) + 2 * margin + 1))
-    longest = [_collect(np.ascontiguousarray(own), each, origin, 1.0 / cell, grid) for own, each, _ in surfaces]
+    longest = [_collect(np.ascontiguousarray(own), item, origin, 1.0 / cell, grid) for own, item, _ in surfaces]
     # Of the area [cells^2] in a cell, blurred: at a plane, that of a Gaussian across it.
     density = gaussian_filter(grid, _BLUR, mode="constant", truncate=3.0)
     plane = np.exp(-0.5 * _ABOVE**2) / (np.sqrt(2.0 * np.pi) * _BLUR)

@@ -19,7 +19,7 @@ class ViewOptions:
     surface : one of SURFACES
     color_by : COLOR_BY_BODY, or the name of one of the fields
     ends : of the color scale
-    explode : distance by which tets are pulled apart; cut_axis : "x", "y" or "z"; cut_place : from 0 to 1
+    explode : distance by which tets are exploded; cut_axis : "x", "y" or "z"; cut_place : from 0 to 1
     velocities, contacts, stitches : whether they are drawn
     dark : whether the background is dark
     """

@@ -50,7 +50,7 @@ class Stage:
 
     @property
     def model(self) -> Model:
-        """The model of the present moment."""
+        """The model of the current moment."""
         return self.moment.model
 
     @property

@@ -91,9 +91,9 @@ class Cavity(Kind):
 
     def check(self, bodies: Sequence[PlacedBody], others: Sequence[Cavity]) -> None:
         """Raise `SceneError` where it has no surface, or shares one with another cavity; see `surface`."""
-        mine = set(map(tuple, self.surface(bodies).tolist()))
+        own = set(map(tuple, self.surface(bodies).tolist()))
         for other in others:
-            if other.body == self.body and not mine.isdisjoint(map(tuple, other.surface(bodies).tolist())):
+            if other.body == self.body and not own.isdisjoint(map(tuple, other.surface(bodies).tolist())):
                 raise SceneError(f"{self.label}: {other.label} has the same triangles; give each surface one cavity")
 
     def surface(self, bodies: Sequence[PlacedBody]) -> NDArray[np.int32]:

@@ -41,7 +41,7 @@ class Traction(OnSurface):
 
 @dataclass(frozen=True, eq=False)
 class Pressure(OnSurface):
-    """A force per present area along the inward normal, which follows the surface.
+    """A force per current area along the inward normal, which follows the surface.
 
     Parameters
     ----------

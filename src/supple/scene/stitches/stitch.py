@@ -49,10 +49,10 @@ class PerPair(Validator):
         values = float_array(value, what, "give a number, or one for each pair")
         if values.ndim > 1 or values.size == 0:
             raise SceneError(f"{what} has shape {values.shape}; give a number, or one for each pair")
-        for each in values.ravel():
-            if not np.isfinite(each):
-                raise SceneError(f"{what} is {each:g}; it must be finite and {self.bounds.bounds}")
-            self.bounds.check_bounds(float(each), what)
+        for item in values.ravel():
+            if not np.isfinite(item):
+                raise SceneError(f"{what} is {item:g}; it must be finite and {self.bounds.bounds}")
+            self.bounds.check_bounds(float(item), what)
         return values
 
 

@@ -83,8 +83,8 @@ class Anchors:
         out = self.points.copy()
         for k in np.unique(self.owner):
             R, t = self.obstacles[k].pose(time)
-            mine = self.owner == k
-            out[mine] = self.points[mine] @ R.T + t
+            own_rows = self.owner == k
+            out[own_rows] = self.points[own_rows] @ R.T + t
         return out
 
 

@@ -31,8 +31,8 @@ def page(look):
 
     def received(kind):
         """Wait for a command of this kind."""
-        screen.wait(lambda: any(isinstance(each, kind) for each in fake.received), kind.__name__)
-        found = next(each for each in fake.received if isinstance(each, kind))
+        screen.wait(lambda: any(isinstance(item, kind) for item in fake.received), kind.__name__)
+        found = next(item for item in fake.received if isinstance(item, kind))
         fake.received.clear()
         return found
 
@@ -189,7 +189,7 @@ def test_a_cut_has_a_plane_section_in_the_picture(fresh):
 
 @pytest.mark.parametrize("count", [12, pytest.param(250, marks=pytest.mark.slow)])
 def test_random_events(fresh, count):
-    """Keys, moves, clicks and drags anywhere, while the simulation changes: no exception, and the page goes on.
+    """Keys, moves, clicks and drags anywhere, while the simulation changes: no exception, and the page continues.
 
     Without a browser, tests/app/viewer/page/controls/test_random_events.py sends a thousand.
     """
@@ -212,5 +212,5 @@ def test_random_events(fresh, count):
             fresh.fake.show(time=0.01 * k, paused=bool(k % 2))
     tab.mouse.up()
     fresh.fake.show(time=77.0)
-    fresh.screen.wait(lambda: fresh.live.controller.snapshot.time == 77.0, "the page to go on")
+    fresh.screen.wait(lambda: fresh.live.controller.snapshot.time == 77.0, "the page to continue")
     assert fresh.screen.errors == []

@@ -73,7 +73,7 @@ def plays_alone(browser, pixels, file):
     assert places, "the body was never drawn"
     assert max(places) - min(places) > 40
     # What the page has made itself is not asked of anybody.
-    assert [each for each in asked if not each.startswith("blob:")] == [file.as_uri()]
+    assert [item for item in asked if not item.startswith("blob:")] == [file.as_uri()]
 
 
 def test_stitches_of_recordings_are_drawn(server, tmp_path):

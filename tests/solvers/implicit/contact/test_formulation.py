@@ -362,9 +362,9 @@ def test_a_vertex_on_a_diagonal_counts_once_whatever_the_round_off():
         moved[vertex, 2] += rng.choice([0.0, 1e-17, -1e-17, 1e-16])
         model.collisions.forget_weights()
         contacts = model.collisions.at(moved)
-        mine = contacts.points[:, 0] == vertex
-        assert contacts.weights[mine].sum() == pytest.approx(0.5 * model.mesh.areas[vertex])
-        assert contacts.distances[mine] == pytest.approx(gap)
+        own = contacts.points[:, 0] == vertex
+        assert contacts.weights[own].sum() == pytest.approx(0.5 * model.mesh.areas[vertex])
+        assert contacts.distances[own] == pytest.approx(gap)
 
 
 def test_edges_in_a_crease_repel_each_other_where_their_surface_comes_nearer_beside_them():

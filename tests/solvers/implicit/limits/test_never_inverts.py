@@ -237,7 +237,7 @@ def test_the_trace_has_a_row_for_every_iteration():
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, pull)])
     frames = list(follow(scene, Implicit(contact=None), 1 / 60, 3))
     details = [frame.report.details for frame in frames if isinstance(frame.report.details, ImplicitDetails)]
-    rows = [row for each in details for row in each.newton]
+    rows = [row for item in details for row in item.newton]
     assert len(rows) == sum(d.newton_iterations + d.extension_iterations for d in details)
     assert {row.kind for row in rows} == {"newton", "extension"}
     assert all(0.0 < row.filter <= 1.0 and 0.0 < row.step <= 1.0 for row in rows)
@@ -246,4 +246,4 @@ def test_the_trace_has_a_row_for_every_iteration():
     energies = [(a.energy, b.energy) for a, b in pairwise(newton) if b.iteration == a.iteration + 1]
     assert len(energies) > 1
     assert all(after <= before + 1e-9 * abs(before) for before, after in energies)
-    assert [frame.report.iterations for frame in frames] == [each.newton_iterations for each in details]
+    assert [frame.report.iterations for frame in frames] == [item.newton_iterations for item in details]

@@ -51,7 +51,7 @@ def test_beams_at_automatic_substeps_hang_as_low_as_the_accuracy_says(poisson):
     system, start, static = at_rest(scene)
     *_, (state, report) = hanging(system, static, XPBD(contact=None))
     tip = start.positions[:, 0] > 0.199
-    fall = [(each.positions - start.positions)[tip, 1].mean() for each in (state, static)]
+    fall = [(item.positions - start.positions)[tip, 1].mean() for item in (state, static)]
     found = fall[0] / fall[1] - 1.0
     assert report.status == "converged"
     assert -0.002 < found < 1 / 0.98 - 1  # two percent of the stiffness
@@ -90,7 +90,7 @@ def test_what_is_measured_bounds_the_error_of_the_work_of_the_weight(divisions, 
     fine = 40 if divisions[0] == 32 else 20
     for substeps in (fine, 2 * fine):
         *_, (state, report) = hanging(system, static, XPBD(substeps=substeps, contact=None))
-        fall = [float(system.masses @ (each.positions - start.positions)[:, 1]) for each in (state, static)]
+        fall = [float(system.masses @ (item.positions - start.positions)[:, 1]) for item in (state, static)]
         share = details(report).softening["beam"]
         assert -1e-3 < fall[0] / fall[1] - 1.0 < 1.02 * share / (1.0 - share)
     # Where tensile and shear stresses cancel between tets, the estimate is too high by far.
@@ -102,7 +102,7 @@ def test_a_slender_beam_that_slowly_gives_way_is_not_called_converged():
     scene = beam((32, 5, 5), 0.3)
     system, start, static = at_rest(scene)
     frames = list(hanging(system, static, XPBD(substeps=20, contact=None), frames=60))
-    fall = [(each.positions - start.positions)[:, 1].min() for each in (frames[-1][0], static)]
+    fall = [(item.positions - start.positions)[:, 1].min() for item in (frames[-1][0], static)]
     assert fall[0] / fall[1] > 1.03
     assert all(report.status != "converged" for _, report in frames)
 
@@ -111,7 +111,7 @@ def test_a_slender_beam_that_slowly_gives_way_is_not_called_converged():
 def test_measured_bodies_take_fewer_substeps_and_stay_within_the_accuracy(divisions, poisson, ratio):
     system, start, static = at_rest(beam(divisions, poisson))
     frames = list(hanging(system, static, XPBD(accuracy=0.005, contact=None)))
-    fall = [float(system.masses @ (each.positions - start.positions)[:, 1]) for each in (frames[-1][0], static)]
+    fall = [float(system.masses @ (item.positions - start.positions)[:, 1]) for item in (frames[-1][0], static)]
     assert abs(fall[0] / fall[1] - 1.0) < 0.005
     assert all(report.status == "converged" and not details(report).repeats for _, report in frames)
     assert frames[-1][1].iterations <= ratio * frames[0][1].iterations
@@ -129,7 +129,7 @@ def test_the_sag_of_a_stretched_beam_is_within_the_accuracy_although_stretching_
     still = State(2.0, static.positions, np.zeros_like(static.positions))
     *_, (state, report) = hanging(build_system(scenes[1]), still, XPBD(contact=None), frames=150)
     lowest = np.abs(static.positions - level.positions)[:, 1].argmax()
-    fall = [(each.positions - level.positions)[lowest, 1] for each in (state, static)]
+    fall = [(item.positions - level.positions)[lowest, 1] for item in (state, static)]
     assert report.status == "converged"
     assert abs(fall[0] / fall[1] - 1.0) < 0.02
 

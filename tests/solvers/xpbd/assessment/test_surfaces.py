@@ -1,4 +1,4 @@
-"""Surfaces through each other at the end of a frame are found and named, and only those that must stay apart."""
+"""Surfaces that penetrate at the end of a frame are found and named, and only those that must stay apart."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ PLATE = sp.SurfaceMesh([[-2, 0.1, -2], [2, 0.1, -2], [0, 0.1, 3]], [[0, 1, 2]])
 
 def found(scene, settings=None, x=None):
     check = SurfaceCheck(build_system(scene), settings or XPBDContact(), 0.5)
-    return [str(each) for each in check.find(initial_state(scene).positions if x is None else x, 0.0)]
+    return [str(item) for item in check.find(initial_state(scene).positions if x is None else x, 0.0)]
 
 
 def cubes(**more):

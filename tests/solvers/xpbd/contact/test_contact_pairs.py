@@ -1,4 +1,4 @@
-"""Contact pairs of a scene in XPBD: excluded pairs pass through each other, and a pair's own friction is used."""
+"""Contact pairs of a scene in XPBD: excluded pairs penetrate, and a pair's own friction is used."""
 
 import numpy as np
 import pytest

@@ -115,7 +115,7 @@ class Watch:
             substep(ws, damping, targets, end, h, last)
             asleep = np.zeros(len(ws.system.bodies), dtype=np.bool_)
             found = ws.assessment.surfaces.find(np.ascontiguousarray(ws.points[:, :3] + ws.origins), end, asleep)
-            self.crossing.append(sum(each.pairs for each in found))
+            self.crossing.append(sum(item.pairs for item in found))
             edges = ws.points[ws.system.tets[:, 1:], :3] - ws.points[ws.system.tets[:, :1], :3]
             self.least.append(float((np.linalg.det(edges) / (6.0 * ws.system.rest_volumes)).min()))
             counts = ws.contact.counts

@@ -28,7 +28,7 @@ def pile():
 
 
 def folded_strip():
-    """A flat U of soft material whose thin legs are driven through each other's surface within the first frames."""
+    """A flat U of soft material whose thin legs are driven through the other's surface within the first frames."""
     mesh = sp.shapes.box((0.3, 0.012, 0.05), (24, 1, 2))
     x = mesh.vertices
     radius = 0.3 / (2 * np.pi) * 1.1

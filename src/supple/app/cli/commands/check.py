@@ -108,8 +108,8 @@ def check(
     CheckSettings(**settings)
     for output in (json, picture):
         if output is not None:
-            for each in (path, *more):
-                refuse_to_replace(each, output)
+            for item in (path, *more):
+                refuse_to_replace(item, output)
     report = _report((path, *more), given, settings)
     if json is not None:
         report.save(json)

@@ -193,9 +193,9 @@ def _described(system: System, points: Mapping[str, np.ndarray]) -> list[tuple[s
     for body in scene.bodies:
         rows += [(f"place of {body.name}", _place(points[body.name])), (f"body {body.name}", body.facts(scene))]
         rows += _locking_rows(body)
-    for each in system.actuators:
-        unit = "m^3" if each.kind == "cavity" else "m"
-        rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} {unit} at the start"))
+    for part in system.actuators:
+        unit = "m^3" if part.kind == "cavity" else "m"
+        rows.append((f"{part.kind} {part.name}", f"{part.start:.6g} {unit} at the start"))
     things = (thing for key in PARTS if key != "bodies" for thing in getattr(scene, key))
     return rows + [(thing.label, facts) for thing in things if (facts := thing.facts(scene))]
 

@@ -66,7 +66,7 @@ def mesh(
     repair
         Repair a surface that is not clean first, and list the changes. Where that fails, it is filled as it is.
     yes
-        Go on without a question where more than 10 times the tets are needed.
+        Continue without a question where more than 10 times the tets are needed.
     time_limit
         Time limit of the mesher [s].
     memory_limit

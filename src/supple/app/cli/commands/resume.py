@@ -17,7 +17,7 @@ def resume(
     steps: Steps = None,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> int:
-    """Go on with a run that was interrupted or killed, or add frames to one.
+    """Resume a run that was interrupted or killed, or add frames to one.
 
     It continues from its last checkpoint, in the same recording. The frames have the bits of a run that was never
     interrupted.

@@ -36,7 +36,7 @@ def run(
     """Simulate a scene file into a run folder.
 
     The recording is written while the scene runs, and is always readable up to the last complete frame. After Ctrl-C or
-    a kill, `supple resume` goes on.
+    a kill, `supple resume` continues.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def run(
     overwrite
         Replace an earlier run in the folder.
     yes
-        Go on without a question where a mesh needs more than 10 times the tets that were asked for.
+        Continue without a question where a mesh needs more than 10 times the tets that were asked for.
     quiet
         Print neither progress nor summary.
     """

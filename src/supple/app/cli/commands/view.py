@@ -58,7 +58,7 @@ def view(
     confine
         Read meshes from the folder of the scene file, and folders below, only.
     yes
-        Go on without a question where a mesh needs more than 10 times the tets that were asked for.
+        Continue without a question where a mesh needs more than 10 times the tets that were asked for.
     """
     from supple.app.cli.console import reading
 

@@ -33,7 +33,7 @@ class Simulation(Protocol):
 
     @property
     def progress(self) -> Progress | None:
-        """Of the present step, where it takes long."""
+        """Of the current step, where it takes long."""
         ...
 
     @property

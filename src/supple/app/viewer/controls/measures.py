@@ -146,8 +146,8 @@ class Sensors:
 
     def note(self, snapshot: Snapshot) -> None:
         """Store the values for the plots."""
-        names = tuple((each.unit, each.name) for each in snapshot.readings)
-        row = snapshot.time, *(each.value for each in snapshot.readings)
+        names = tuple((entry.unit, entry.name) for entry in snapshot.readings)
+        row = snapshot.time, *(entry.value for entry in snapshot.readings)
         with self._lock:
             if names != self._names or (self._rows and snapshot.time < self._rows[-1][0]):
                 self._rows.clear()
@@ -175,4 +175,4 @@ class Sensors:
 
 
 def _labels_of(handle: Any) -> tuple[str, ...]:
-    return tuple(each["label"] for each in handle.series[1:])
+    return tuple(entry["label"] for entry in handle.series[1:])

@@ -14,7 +14,7 @@ _KINDS = ("xpbd", "implicit")
 
 
 class SolverControls:
-    """The folder "Solver". Its inputs are the parameters of the present solver."""
+    """The folder "Solver". Its inputs are the parameters of the current solver."""
 
     def __init__(self, gui: Any, controller: Controller) -> None:
         self._gui, self._controller = gui, controller

@@ -69,7 +69,7 @@ def _material_values(material: Any) -> dict[str, Value]:
 
 
 def measures(live: LiveScene) -> Measures:
-    """The numbers of the present state, and of the last step."""
+    """The numbers of the current state, and of the last step."""
     report, details = live.report, live.report.details
     return Measures(
         **vars(measure(live.system, live.state)),

@@ -39,7 +39,7 @@ class Engine:
     ----------
     starts : how often it was started
     error : why the simulation ended, where it was not closed; otherwise None
-    progress : of the present step, where it takes long; heard_at : when the last message came [s of time.monotonic]
+    progress : of the current step, where it takes long; heard_at : when the last message came [s of time.monotonic]
 
     Raises
     ------
@@ -117,7 +117,7 @@ class Engine:
             raise
 
     def reload(self) -> None:
-        """Read the source again, and start from it. What runs goes on where it cannot be read.
+        """Read the source again, and start from it. What runs continues where it cannot be read.
 
         Raises
         ------

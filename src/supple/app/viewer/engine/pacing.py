@@ -27,7 +27,7 @@ def between(before: State, after: State, share: float) -> State:
 
 
 def within_step(live: LiveScene, last: Snapshot, shown: float) -> Snapshot | None:
-    """The last snapshot with the positions after the latest substep of the present step.
+    """The last snapshot with the positions after the latest substep of the current step.
 
     None where that is not later than `shown` [s], as at the start of a step or in its repetition, and for a solver
     that has no state within a step. What is measured, colors included, is that of the last whole step.

@@ -55,7 +55,7 @@ class SimulationLoop:
             limits.LONGEST_STEP, lambda: inbox.holds(commands.Pause, commands.Reset), limits.LONGEST_STEP_WHEN_ASKED
         )
         self.applied = 0
-        self._shown = 0.0  # time of the newest picture within the present step [s]
+        self._shown = 0.0  # time of the newest picture within the current step [s]
         self._pulled = False  # whether a body was pulled since the last step
         self.notices: deque[Notice] = deque(maxlen=NOTICES_KEPT)
         self._before: State = live.state
@@ -164,7 +164,7 @@ class SimulationLoop:
             self._publish_within_step()
 
     def _publish_within_step(self) -> None:
-        """Send a picture of the present step, where it is of the scene that the page knows."""
+        """Send a picture of the current step, where it is of the scene that the page knows."""
         last = self._last if self._described == self.live.revision else None
         picture = None if last is None else within_step(self.live, last, self._shown)
         if picture is not None:
@@ -201,7 +201,7 @@ class SimulationLoop:
         self.outbox.put_snapshot(self._last)
 
     def snapshot(self, now: float) -> Snapshot:
-        """The present state; in slow motion, a state between the last two. `Engine` adds the description."""
+        """The current state; in slow motion, a state between the last two. `Engine` adds the description."""
         live = self.live
         state = self._displayed_state(now)
         system, setup = live.system, live.setup

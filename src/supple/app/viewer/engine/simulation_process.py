@@ -72,13 +72,13 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection, ap
 
 def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
     """The live scene, or where it is slower than real time, by counts, one that is faster; and what was chosen."""
-    from supple.app.viewer.engine.scene.lightening import lighter, linearized
+    from supple.app.viewer.engine.scene.lightening import coarsened, linearized
     from supple.app.viewer.engine.scene.live_scene import LiveScene
 
     if not live.source.real_time:
         return live, ""
     chosen = []
-    for choice in (linearized, lighter):
+    for choice in (linearized, coarsened):
         found = choice(live)
         if found is None:
             continue

@@ -88,14 +88,14 @@ class StepWatch:
 
     @property
     def progress(self) -> Progress | None:
-        """Of the present computation; None where none exists. Another thread may ask."""
+        """Of the current computation; None where none exists. Another thread may ask."""
         running = self._began is not None
         kernels = self._kernels.numbers() if self._kernels.compiling else None
         return Progress(self.seconds, self._rounds, kernels) if running else None
 
     @property
     def seconds(self) -> float:
-        """Of the present computation so far [s]; 0 where none exists."""
+        """Of the current computation so far [s]; 0 where none exists."""
         began = self._began
         return 0.0 if began is None else time.monotonic() - began
 

@@ -93,7 +93,7 @@ class Watch(Command):
 
 @dataclass(frozen=True)
 class SetSolver(Command):
-    """Continue from the present state with another solver: "xpbd" or "implicit"."""
+    """Continue from the current state with another solver: "xpbd" or "implicit"."""
 
     kind: str
 
@@ -192,7 +192,7 @@ class ReleaseGrab(Command):
 
 @dataclass(frozen=True)
 class Pin(Command):
-    """Hold a vertex at its present position."""
+    """Hold a vertex at its current position."""
 
     body: str
     vertex: int

@@ -21,7 +21,7 @@ MOST_STEPS = 1_000  # of one Step command
 LONGEST_STEP, LONGEST_STEP_WHEN_ASKED = 20.0, 1.0
 FRAMES_PER_SECOND = 60.0  # snapshots that the simulation sends
 
-# Squash and stretch, as a factor of the present height.
+# Squash and stretch, as a factor of the current height.
 FLATTEST, TALLEST = 0.2, 3.0
 
 # Stiffness of the spring of a grab, as a factor of its default.

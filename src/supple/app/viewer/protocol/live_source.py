@@ -21,7 +21,7 @@ class LiveSource:
     title : of the page
     dt : [s]
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
-    real_time : whether bodies may get lighter meshes, or the scene another solver, to keep up with real time
+    real_time : whether bodies may get coarser meshes, or the scene another solver, to keep up with real time
     solver_given : whether it stays with its solver
     """
 

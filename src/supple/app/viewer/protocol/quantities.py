@@ -21,7 +21,7 @@ def written(value: float, unit: str = "", digits: int = 4) -> str:
     factor, prefix = 1.0, ""
     if unit in WITH_PREFIX and value != 0.0:
         size = float(f"{abs(value):.{digits - 1}e}")  # 999.99 Pa is written as 1 kPa
-        factor, prefix = next((each for each in _WRITTEN if size >= each[0]), _WRITTEN[-1])
+        factor, prefix = next((entry for entry in _WRITTEN if size >= entry[0]), _WRITTEN[-1])
     number = f"{value / factor:.{digits}g}"
     if "e" in number and 1e-3 <= abs(value / factor) < 1e6:
         number = f"{float(number):g}"

@@ -146,7 +146,7 @@ class Progress:
     Attributes
     ----------
     seconds : since it began; rounds : substeps or Newton iterations so far
-    kernels : where kernels are compiled now, the number of the present one, and how many there will be
+    kernels : where kernels are compiled now, the number of the current one, and how many there will be
     """
 
     seconds: float

@@ -42,7 +42,7 @@ def whole(value: object, what: str, low: int, high: int) -> int:
 
 def checked_point(value: object, what: str) -> Point:
     values = checked_items(value, what, 3, 3)
-    x, y, z = (number(each, what, -limits.FARTHEST, limits.FARTHEST) for each in values)
+    x, y, z = (number(item, what, -limits.FARTHEST, limits.FARTHEST) for item in values)
     return x, y, z
 
 
@@ -55,18 +55,18 @@ def checked_items(value: object, what: str, least: int, most: int) -> list[objec
 
 
 def checked_vertices(value: object) -> tuple[int, ...]:
-    vertices = tuple(whole(each, "vertices", 0, 2**31 - 1) for each in checked_items(value, "vertices", 1, 4))
+    vertices = tuple(whole(item, "vertices", 0, 2**31 - 1) for item in checked_items(value, "vertices", 1, 4))
     if len(set(vertices)) != len(vertices):
         raise CommandError(f"vertices {list(vertices)} contains a vertex twice; give each once")
     return vertices
 
 
 def checked_weights(value: object, count: int) -> tuple[float, ...]:
-    weights = [number(each, "weights", -1e3, 1e3) for each in checked_items(value, "weights", count, count)]
+    weights = [number(item, "weights", -1e3, 1e3) for item in checked_items(value, "weights", count, count)]
     total = sum(weights)
     if total < 1e-3:
         raise CommandError(f"weights {weights} sum to {total:g}; give barycentric coordinates")
-    return tuple(each / total for each in weights)
+    return tuple(item / total for item in weights)
 
 
 def checked_index(value: object, what: str) -> int:

@@ -80,15 +80,15 @@ def blocks(data: bytes, path: Path, with_data: frozenset[str]) -> Iterator[Block
     for place, line in lines.of(decoded(data), ""):
         stripped = joined + line
         joined = ""
-        if stripped.startswith("*") and stripped.endswith(","):  # a keyword line goes on in the next one
+        if stripped.startswith("*") and stripped.endswith(","):  # a keyword line continues in the next one
             joined = stripped
         elif stripped.startswith("*"):
             yield block
             keyword, options = _keyword(stripped)
             block = Block(keyword, options, [], place)
             if keyword in with_data and options.get("INPUT"):
-                more = (_data(*each) for each in lines.included(options["INPUT"], place))
-                block.lines.extend(each for each in more if each.words)
+                more = (_data(*item) for item in lines.included(options["INPUT"], place))
+                block.lines.extend(item for item in more if item.words)
         elif block.keyword in with_data:
             own = _data(place, stripped)
             if own.words or block.keyword in _PLACED:

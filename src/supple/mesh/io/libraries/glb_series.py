@@ -31,7 +31,7 @@ def read_series(path: Path, out: Path) -> Facts:
     meshes = list(glb.placed())
     if not meshes:
         raise FormatError("its scene has no triangles")
-    times = np.unique(np.concatenate([np.zeros(0), *(glb.accessor(each["input"])[:, 0] for each in glb.samplers)]))
+    times = np.unique(np.concatenate([np.zeros(0), *(glb.accessor(entry["input"])[:, 0] for entry in glb.samplers)]))
     parts, triangles, count = [], [np.zeros((0, 3), dtype=np.int64)], 0
     for k, mesh in enumerate(meshes):
         triangles.append(mesh.triangles + count)
@@ -159,14 +159,14 @@ class _Glb:
             base.append(x)
             triangles.append(rows.astype(np.int64).reshape(-1, 3) + count)
             targets.append(
-                [self.accessor(each["POSITION"]) for each in primitive.get("targets", []) if "POSITION" in each]
+                [self.accessor(entry["POSITION"]) for entry in primitive.get("targets", []) if "POSITION" in entry]
             )
             count += len(x)
         if not base:
             return None
         if len({len(own) for own in targets}) > 1:
             raise FormatError("the primitives of a mesh have different numbers of morph targets")
-        joined = [np.concatenate(each) for each in zip(*targets, strict=True)]
+        joined = [np.concatenate(entry) for entry in zip(*targets, strict=True)]
         weights = node.get("weights") or mesh.get("weights") or [0.0] * len(joined)
         name = str(node.get("name") or mesh.get("name") or "")
         return _Placed(name, way, np.concatenate(base), np.concatenate(triangles), joined, weights)

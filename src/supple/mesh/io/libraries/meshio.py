@@ -85,7 +85,7 @@ def read_file(path: Path) -> MeshFile:
     node_sets: dict[str, NDArray[np.int64]] = {}
     cell_sets: dict[str, NDArray[np.int64]] = {}
     for name, (number, dimension) in _groups(mesh).items():
-        rows = _rows_of(mesh, name, number, [each == dimension for each in dimensions])
+        rows = _rows_of(mesh, name, number, [size == dimension for size in dimensions])
         members = [np.asarray(block.data)[own].ravel() for block, own in zip(mesh.cells, rows, strict=True)]
         nodes = np.unique(np.concatenate(members)).astype(np.int64)
         if len(nodes):

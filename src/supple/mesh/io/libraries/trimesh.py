@@ -119,7 +119,7 @@ def _refuse_what_is_skipped(data: bytes) -> None:
     needed = document.get("extensionsRequired")
     if needed:
         raise FormatError(f"it needs the extension {str(needed[0])[:60]!r}; export it without")
-    modes = [each.get("mode") for mesh in document.get("meshes", []) for each in mesh.get("primitives", [])]
+    modes = [node.get("mode") for mesh in document.get("meshes", []) for node in mesh.get("primitives", [])]
     if _FAN in modes:
         raise FormatError("it has fans of triangles; export it with triangles")
 
@@ -162,7 +162,7 @@ def _triangles(primitive: Any) -> Any:
 def _left_out(document: Any) -> list[str]:
     """What of a document pycollada has not read."""
     notes = []
-    skins = sum(str(each.tag).endswith("}instance_controller") for each in document.xmlnode.iter())
+    skins = sum(str(node.tag).endswith("}instance_controller") for node in document.xmlnode.iter())
     if skins:
         notes.append(f"its {skins} surfaces with skins or morphs were left out; export it without")
     if document.errors:

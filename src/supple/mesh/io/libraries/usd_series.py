@@ -104,4 +104,4 @@ def _has_other_cells(prim: Any) -> bool:
 
 
 def _cell_numbers(prim: Any, code: Any) -> NDArray[np.int64]:
-    return np.concatenate([np.asarray(each.Get(code) or [], dtype=np.int64).ravel() for each in _indices(prim)])
+    return np.concatenate([np.asarray(item.Get(code) or [], dtype=np.int64).ravel() for item in _indices(prim)])

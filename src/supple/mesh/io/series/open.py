@@ -184,7 +184,7 @@ def _pvd_entries(path: Path) -> list[tuple[float, str, str]]:
         root = ElementTree.fromstring(file_contents(path))
         sets = list(root.iter("DataSet"))
         return [
-            (float(each.get("timestep", k)), each.get("part", "0"), each.get("file", "")) for k, each in enumerate(sets)
+            (float(one.get("timestep", k)), one.get("part", "0"), one.get("file", "")) for k, one in enumerate(sets)
         ]
     except (ElementTree.ParseError, ValueError, LookupError):
         raise MeshError(
@@ -195,6 +195,6 @@ def _pvd_entries(path: Path) -> list[tuple[float, str, str]]:
 def _json_entries(path: Path) -> list[tuple[float, str, str]]:
     try:
         files = json.loads(file_contents(path))["files"]
-        return [(float(each["time"]), "0", str(each["name"])) for each in files]
+        return [(float(entry["time"]), "0", str(entry["name"])) for entry in files]
     except (ValueError, LookupError, TypeError, RecursionError):
         raise MeshError(f"{path}: it is not a list of a series: JSON with a name and a time for each file") from None

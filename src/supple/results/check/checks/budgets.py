@@ -154,8 +154,8 @@ class Energy(EnergyCheck):
     def judge(self, rows: NDArray[np.int64], energy: Floats, scale: float) -> None:
         works = self._works or {}
         work, driving = (
-            np.cumsum(sum(each, np.zeros(len(self.of))))[rows]
-            for each in (works.values(), (one for name, one in works.items() if name not in _PASSIVE))
+            np.cumsum(sum(terms, np.zeros(len(self.of))))[rows]
+            for terms in (works.values(), (one for name, one in works.items() if name not in _PASSIVE))
         )
         scale += float(np.abs(work).max())
         # A step whose energy falls gains nothing. Where a body turns far in one step while contact stops it, what the
@@ -189,8 +189,8 @@ class Balance(EnergyCheck):
 
     def judge(self, rows: NDArray[np.int64], energy: Floats, scale: float) -> None:
         residual = self.of.records.frame_values("details/energy_residual")
-        each = np.array([*self._works.values(), residual])
-        sums, sizes = np.cumsum(each.sum(axis=0))[rows], np.cumsum(np.abs(each).sum(axis=0))[rows]
+        terms = np.array([*self._works.values(), residual])
+        sums, sizes = np.cumsum(terms.sum(axis=0))[rows], np.cumsum(np.abs(terms).sum(axis=0))[rows]
         scales = scale + sizes
         miss = np.abs(energy - energy[0] - (sums - sums[0]))
         self.see_all(rows, np.maximum(miss - self.of.floors.sums, 0.0) / scales, CLOSED)

@@ -1,4 +1,4 @@
-"""The check of what happens between frames: surfaces that pass through each other."""
+"""The check of what happens between frames: surfaces that penetrate each other."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _PIECES = 8
 # When a path has its kink, as shares of the time between the frames.
 _KINKS = (0.25, 0.5, 0.75)
 
-# What goes on with more of its velocity along the normal of a meeting was not touched. Fast soft balls that meet at 30
-# degrees to the normal keep up to half. Those that meet at more than 45 degrees keep most of it, and are not judged.
+# What continues with more of its velocity along the normal of a meeting was not touched. Fast soft balls that meet at
+# 30 degrees to the normal keep up to half. Those that meet at more than 45 degrees keep most of it, and are not judged.
 _GOES_ON, _FRONTAL = 0.8, 0.7
 # Of the time between two frames, to find the moment of a meeting.
 _HALVINGS = 12
@@ -55,7 +55,7 @@ def paths(before: Floats | None, first: Floats, last: Floats, after: Floats | No
 
 
 class Tunnelling(FrameCheck):
-    """Surfaces that pass through each other between two frames, in both of which they are apart.
+    """Surfaces that penetrate each other between two frames, in both of which they are apart.
 
     Exact for straight paths. A body that turns moves on arcs, of which straight paths cut off a part, and one that hits
     another moves on a path with a kink: it fails where two bodies pass on all of these paths.
@@ -65,7 +65,7 @@ class Tunnelling(FrameCheck):
     needs = frozenset({"files"})
     unit = "pairs"
     good = "nothing passes through anything between frames"
-    bad = "triangles pass through each other between frames: {worst}"
+    bad = "triangles penetrate each other between frames: {worst}"
     nothing = "there is one frame only"
     in_order = "what happens between frames is known"
 
@@ -102,7 +102,7 @@ class Tunnelling(FrameCheck):
             self._cut = b.number if self._cut is None else self._cut
 
     def _passing_on_all(self, pairs: NDArray[np.int64], following: Snapshot | None) -> NDArray[np.int64]:
-        """The pairs of straight paths whose owners pass through each other on every other path as well."""
+        """The pairs of straight paths whose owners penetrate each other on every other path as well."""
         owners = self.of.surfaces.owners
         *before, first, last = [frame.points for frame in self._frames]
         tree, after = self._frames[-2].tree, None if following is None else following.points
@@ -123,11 +123,11 @@ class Tunnelling(FrameCheck):
 
 
 class GoingOn(FrameCheck):
-    """Things that are through each other on the straight way between two frames of a recording, and go on.
+    """Things that penetrate each other on the straight path between two frames of a recording, and continue.
 
     Contact bends paths within a frame, so straight ones alone show nothing. But where things meet, it takes their
-    approach, and the velocities of both frames are recorded: it fails where two things that go on with their velocity
-    would meet front to front, and in the next frame still have most of their approach along the normal of that
+    approach, and the velocities of both frames are recorded: it fails where two things that continue with their
+    velocity would meet front to front, and in the next frame still have most of their approach along the normal of that
     meeting. Only things are looked at that move farther in the frame than one of them is thick.
     """
 
@@ -135,7 +135,7 @@ class GoingOn(FrameCheck):
     needs = frozenset({"recording"})
     unit = "pairs"
     good = "nothing passes through anything between frames"
-    bad = "things pass through each other between frames and go on: {worst}"
+    bad = "things penetrate each other between frames and continue: {worst}"
     in_order = "what happens between frames is known"
 
     def see(self, at: Snapshot) -> None:

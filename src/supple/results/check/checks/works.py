@@ -188,7 +188,7 @@ class Works(EnergyCheck):
         kinetic = 0.5 * float(m @ (speeds[1] - speeds[0]))
         # Until its end, the step had the stitches that broke then.
         whole = replace(at, broken=last.broken) if len(at.latest) else at
-        before, after = (_slope(each, along) for each in (last, whole))
+        before, after = (_slope(item, along) for item in (last, whole))
         work = 0.5 * (before + after) + kinetic - float(m @ moved[rows] @ self.of.gravity)
         # An implicit step takes m (v' - v) v', which differs from the change of kinetic energy by the second term.
         change = at.velocities[rows] - last.velocities[rows]
@@ -214,13 +214,13 @@ class Works(EnergyCheck):
         dissipated = abs(self._works["damping"][at.number]) if "damping" in self._works else 0.0
         if dissipated == 0.0:
             return 0.0
-        before, after = (_slope(each, moved) for each in (last, at))
+        before, after = (_slope(item, moved) for item in (last, at))
         return dissipated * max(1.0, abs(on_pins / (after - before)) if after != before else 1.0)
 
     def judge(self, rows: NDArray[np.int64], energy: Floats, scale: float) -> None:
         for k, name in enumerate(self._parts):
             names = ("contact", "friction") if name == "contact" else (name,)
-            recorded = sum((self._works[each] for each in names if each in self._works), np.zeros(len(self.of)))
+            recorded = sum((self._works[item] for item in names if item in self._works), np.zeros(len(self.of)))
             work, left_open = np.array([found[k] for found in self.frames]).T
             known = np.isfinite(left_open)
             work, left_open = np.where(known, work, 0.0), np.where(known, left_open, 0.0)
@@ -236,5 +236,5 @@ class Works(EnergyCheck):
 def _slope(at: Snapshot, along: Floats) -> float:
     """The derivative of the elastic and stitch energy along a motion (n, 3) of the vertices [J]."""
     there = replace(at, positions=at.positions + _STEP * along)
-    energies = [(each.elastic_energy or 0.0) + each.stitch_energy for each in (at, there)]
+    energies = [(item.elastic_energy or 0.0) + item.stitch_energy for item in (at, there)]
     return (energies[1] - energies[0]) / _STEP

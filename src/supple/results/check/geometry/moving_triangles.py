@@ -1,4 +1,4 @@
-"""Whether two triangles whose corners move on straight paths pass through each other on the way.
+"""Whether two triangles whose corners move on straight paths penetrate each other.
 
 A corner and a triangle, or two sides, meet where four points are in one plane, at a root of a cubic polynomial of time,
 and the place is in the triangle, or on both sides. These are signs of polynomials: in the basis of Bernstein, a
@@ -168,7 +168,7 @@ def _corners_or_sides_pass(x0, x1, s, t):
 
 @njit(forceinline=False)
 def triangles_pass(x0, x1, s, t):
-    """Whether two triangles, three rows each, pass through each other between x0 and x1, where they do not meet."""
+    """Whether two triangles, three rows each, penetrate each other between x0 and x1, where they do not meet."""
     if not _corners_or_sides_pass(x0, x1, s, t):
         return False
     return not triangles_meet(x0, s, t) and not triangles_meet(x1, s, t)

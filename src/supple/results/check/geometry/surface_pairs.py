@@ -1,4 +1,4 @@
-"""All pairs of triangles that meet, or pass through each other, and the closest pair of others: over trees of boxes."""
+"""All pairs of triangles that meet, or penetrate each other, and the closest pair of others: over trees of boxes."""
 
 from typing import NamedTuple
 
@@ -65,13 +65,13 @@ def _push_children(stack, top, nodes, i, j):
 
 @njit(cache=True)
 def touching_pairs(surface, x0, x1, tree, later, moving, out):
-    """How many pairs of triangles meet, or pass through each other between x0 and x1; the first are in out (k, 2).
+    """How many pairs of triangles meet, or penetrate each other between x0 and x1; the first are in out (k, 2).
 
     Parameters
     ----------
     surface : `Triangles`; x0, x1 : (n, 3) points, the same where nothing moves
     tree, later : the tree over the triangles, with the boxes of x0 and with those of x1
-    moving : whether pairs that pass through each other are wanted
+    moving : whether pairs that penetrate each other are wanted
     """
     found, nodes, order = 0, tree.nodes, tree.order
     stack, top = np.zeros((256, 2), dtype=np.int64), 1

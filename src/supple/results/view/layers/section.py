@@ -68,10 +68,10 @@ def surface(model: Model, cut: Cut | None) -> Triangles:
     # A plane exactly through vertices would have sections of no area.
     height = np.where(np.abs(height) < 1e-9 * np.ptp(height), -1e-9 * np.ptp(height), height)
     parts = [*_clipped(triangles, owner, height), *_sections(model.tets.astype(np.int64), height)]
-    start, end, owner = (np.concatenate(each) for each in zip(*parts, strict=True))
+    start, end, owner = (np.concatenate(column) for column in zip(*parts, strict=True))
     share = np.where(start == end, 0.0, height[start] / np.where(start == end, 1.0, height[start] - height[end]))
     made = Triangles(start, end, share, owner)
-    return _facing(made, model, cut.axis, sum(len(each[2]) for each in parts[:3]))
+    return _facing(made, model, cut.axis, sum(len(column[2]) for column in parts[:3]))
 
 
 _Part = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
@@ -122,5 +122,5 @@ def _facing(made: Triangles, model: Model, axis: int, begin: int) -> Triangles:
     turned = np.cross(b - a, c - a)[:, axis] < 0.0
     turned[:begin] = False
     order = np.where(turned[:, None], [0, 2, 1], [0, 1, 2])
-    start, end = (np.take_along_axis(each, order, axis=1) for each in (made.start, made.end))
+    start, end = (np.take_along_axis(column, order, axis=1) for column in (made.start, made.end))
     return Triangles(start, end, np.take_along_axis(made.share, order, axis=1), made.owner)

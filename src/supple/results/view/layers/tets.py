@@ -1,4 +1,4 @@
-"""Bodies as tets: colored by a field, pulled apart, or cut.
+"""Bodies as tets: colored by a field, exploded, or cut.
 
 A mesh of the page has one color, so that the triangles are sorted into one mesh for each color.
 """
@@ -49,14 +49,14 @@ class ColoredTriangles:
         order = np.argsort(color, kind="stable")
         ends = np.searchsorted(color[order], np.arange(len(self.handles) + 1))
         for i, handle in enumerate(self.handles):
-            mine = corners[order[ends[i] : ends[i + 1]]]
-            if len(mine) == 0:
+            own_rows = corners[order[ends[i] : ends[i + 1]]]
+            if len(own_rows) == 0:
                 handle.visible = False
                 continue
             # The capacity is a power of two: the browser creates new buffers only where it changes.
-            capacity = max(_LEAST, 1 << (len(mine) - 1).bit_length())
-            points = np.repeat(mine[:1, :1], 3 * capacity, axis=0).reshape(-1, 3)
-            points[: 3 * len(mine)] = mine.reshape(-1, 3)
+            capacity = max(_LEAST, 1 << (len(own_rows) - 1).bit_length())
+            points = np.repeat(own_rows[:1, :1], 3 * capacity, axis=0).reshape(-1, 3)
+            points[: 3 * len(own_rows)] = own_rows.reshape(-1, 3)
             handle.vertices = single(points)
             if capacity != self._capacity[i]:
                 handle.faces = _faces(capacity)

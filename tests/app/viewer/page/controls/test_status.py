@@ -115,7 +115,7 @@ def test_sensors_cavities_and_cables_are_plots(live, fake, until):
         snapshot = fake.show(time=0.1 * k, readings=fingers)
         until(lambda: live.controller.snapshot is snapshot)  # noqa: B023
     until(lambda: set(plots) == {"N", "Pa"} and len(plots["N"].data[0]) >= 5, what="both plots")
-    assert [each["label"] for each in plots["N"].series] == ["t [s]", "left", "right"]
+    assert [item["label"] for item in plots["N"].series] == ["t [s]", "left", "right"]
     np.testing.assert_allclose(plots["N"].data[1][-5:], [1.0, 2.0, 3.0, 4.0, 5.0])
     np.testing.assert_allclose(plots["N"].data[2][-5:], [0.0, 2.0, 4.0, 6.0, 8.0])
     np.testing.assert_allclose(plots["Pa"].data[1][-5:], 1e3)

@@ -130,11 +130,11 @@ def test_a_cut_is_a_closed_surface_with_a_plane_section(fake, axis, place):
     np.testing.assert_allclose(area.sum(axis=0), 0.0, atol=1e-9)  # closed
     assert np.einsum("ij,ij->i", a, area).sum() / 3.0 == pytest.approx(2.0 * place)  # the volume of two unit cubes
     for body in model.bodies:
-        mine = (drawn.owner >= body.tets.start) & (drawn.owner < body.tets.stop)
+        own = (drawn.owner >= body.tets.start) & (drawn.owner < body.tets.stop)
         along = model.rest_positions[body.vertices, axis]
         plane = along.min() + place * np.ptp(along)
-        assert corners[mine][..., axis].max() <= plane + 1e-8
-        on_plane = mine & (np.abs(corners[..., axis] - plane).max(axis=1) < 1e-8)
+        assert corners[own][..., axis].max() <= plane + 1e-8
+        on_plane = own & (np.abs(corners[..., axis] - plane).max(axis=1) < 1e-8)
         assert area[on_plane, axis].sum() == pytest.approx(1.0)  # the whole section
     # The section follows the motion of its tets.
     moved = 2.0 * model.rest_positions + np.array([1.0, 2.0, 3.0])

@@ -80,10 +80,10 @@ class ColorRange:
 
     def _chosen(self, event: Any) -> None:
         if event.client is not None:
-            present, field = self._stage.color_range, self._stage.field
-            if self.kind.value == _FIXED and present is not None and field is not None:
-                self._fixed = present
-                for end, name, value in zip((self.low, self.high), ("From", "To"), present, strict=True):
+            current, field = self._stage.color_range, self._stage.field
+            if self.kind.value == _FIXED and current is not None and field is not None:
+                self._fixed = current
+                for end, name, value in zip((self.low, self.high), ("From", "To"), current, strict=True):
                     end.label, end.value = f"{name} [{field.unit}]" if field.unit else name, float(f"{value:.6g}")
             self._changed()
 

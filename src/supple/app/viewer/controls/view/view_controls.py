@@ -113,7 +113,7 @@ class ViewControls:
             )
             self.range = ColorRange(gui, stage, self.apply)
             self.explode = gui.add_slider(
-                "Apart", 0.05, 1.5, 0.05, initial_value=options.explode, visible=False, hint="Distance between tets"
+                "Explode", 0.05, 1.5, 0.05, initial_value=options.explode, visible=False, hint="Distance between tets"
             )
             self.cut_axis = gui.add_dropdown(
                 "Cut across", _AXES, initial_value=options.cut_axis, visible=False, hint="Axis across the section"

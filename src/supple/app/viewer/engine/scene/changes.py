@@ -123,7 +123,7 @@ def _with_value(body: PlacedBody, name: str, value: Value) -> PlacedBody | None:
 
 def _material_with_value(material: Material, name: str, value: float) -> Material | None:
     if isinstance(material, Regions):
-        materials = [_material_with_value(each, name, value) or each for each in material.materials]
+        materials = [_material_with_value(item, name, value) or item for item in material.materials]
         return replace(material, materials=materials)
     if isinstance(material, Viscoelastic):
         inner = _material_with_value(material.material, name, value)
@@ -193,8 +193,8 @@ def _remove_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
         return
     keep = (held.vertices != row) & (not part.rigid)  # a rigid body is held as a whole
     pins = [pin for pin in live.setup.scene.pins if pin is not held.pin]
-    anchors = {each.pin: each.anchors for each in live.system.pins}
-    anchors |= {each.target: each.anchors for each in live.system.soft_targets}
+    anchors = {item.pin: item.anchors for item in live.system.pins}
+    anchors |= {item.target: item.anchors for item in live.system.soft_targets}
     if keep.any():
         rest = replace(held.pin, vertices=held.vertices[keep] - part.vertices.start)
         pins.append(rest)
@@ -317,7 +317,7 @@ def _pairs_among(things: Sequence[str | None], pairs: Sequence[ContactPair]) -> 
 
     def known(names: str | Sequence[str]) -> list[str]:
         patterns = {name: name.replace("[", "[[]") for name in names}  # only `*` and `?` are special
-        return [name for name, pattern in patterns.items() if any(fnmatchcase(str(each), pattern) for each in things)]
+        return [name for name, pattern in patterns.items() if any(fnmatchcase(str(item), pattern) for item in things)]
 
     sides = [(pair, known(pair.first), known(pair.second)) for pair in pairs]
     return [replace(pair, first=first, second=second) for pair, first, second in sides if first and second]

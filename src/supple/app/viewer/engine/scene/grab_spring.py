@@ -40,7 +40,7 @@ class GrabSpring(ABC):
 
     Attributes
     ----------
-    command : the command that created it; target : (3,) its present target [m]
+    command : the command that created it; target : (3,) its current target [m]
     stiffness : k [N/m]; longest : largest distance over which it pulls [m]
     load : what it is in the scene
     """

@@ -43,8 +43,8 @@ def linearized(live: LiveScene) -> tuple[LiveSource, str] | None:
     return None
 
 
-def lighter(live: LiveScene) -> tuple[LiveSource, str] | None:
-    """The source with fewer tets where it is too slow, and what the page does then; None where no mesh is lighter.
+def coarsened(live: LiveScene) -> tuple[LiveSource, str] | None:
+    """The source with fewer tets where it is too slow, and what the page does then; None where no mesh is coarser.
 
     Bodies that something refers to, such as a pin or a stitch, keep their meshes, and so do bodies with several
     materials, with quadratic tets or with a deformed start. Skins stay; a body without one is drawn with its surface.

@@ -82,7 +82,7 @@ class LiveScene:
     Attributes
     ----------
     setup, state : see `Setup` and `State`; frame : number of steps since the start
-    system, workspace : of the present setup
+    system, workspace : of the current setup
     solvers : by kind, with the settings used last
     starts : by body name, (n, 3) of bodies with deformed initial positions; pins : those of the source
     report : of the last step
@@ -109,11 +109,11 @@ class LiveScene:
         self._keep_start()
 
     def adopt(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
-        """Continue with another setup. The memory of the present state is kept: a solver ignores that of another one.
+        """Continue with another setup. The memory of the current state is kept: a solver ignores that of another one.
 
         Parameters
         ----------
-        state : to continue from, where it is not the present one.
+        state : to continue from, where it is not the current one.
         anchors : positions at which pins and soft targets hold, for those that are kept; None keeps all.
 
         Raises
@@ -218,7 +218,7 @@ class LiveScene:
             self._aim(spring)
 
     def _aim(self, spring: GrabSpring) -> None:
-        """Set what a grab does in the present step."""
+        """Set what a grab does in the current step."""
         anchors = self._anchors[spring.load] if isinstance(spring.load, SoftTarget) else None
         spring.begin_step(self.system, self.state, self.setup.dt, anchors)
 
@@ -244,7 +244,7 @@ class LiveScene:
         return without_long_repetitions(setup.solver, self.system, setup.dt, self._usual[1])
 
     def reset(self) -> None:
-        """Return to the start, with the present bodies, parameters and solver.
+        """Return to the start, with the current bodies, parameters and solver.
 
         Added bodies return to where they were added. Where another body starts there, they are placed above all bodies.
         """
@@ -266,12 +266,12 @@ class LiveScene:
         self._anchors = _anchors_of(start.system)
 
     def _keep_start(self) -> None:
-        """Keep the present state for later resets. Only a workspace of XPBD does not depend on earlier steps."""
+        """Keep the current state for later resets. Only a workspace of XPBD does not depend on earlier steps."""
         if isinstance(self.workspace, XPBDWorkspace):
             self._start = Start(self.setup, self.state, self.system, self.workspace)
 
     def _restart(self) -> None:
-        """Compute the start of the present bodies, parameters and solver."""
+        """Compute the start of the current bodies, parameters and solver."""
         names = {body.name for body in self.setup.scene.bodies}
         scene = replace(self.setup.scene, pins=tuple(pin for pin in self.pins if pin.body in names))
         starts = {name: start for name, start in self.starts.items() if name in names}
@@ -288,7 +288,7 @@ class LiveScene:
         for part in parts:
             if part.name == name:
                 return part
-        raise CommandError(f"body {name!r} does not exist; there are {', '.join(repr(each.name) for each in parts)}")
+        raise CommandError(f"body {name!r} does not exist; there are {', '.join(repr(item.name) for item in parts)}")
 
     def body_positions(self, name: str) -> NDArray[np.float64]:
         """(n, 3) of one body [m]."""
