@@ -23,7 +23,7 @@ _MOST_TRIANGLES = 30_000
 _RED = (0.85, 0.1, 0.12)
 # How far around what is at fault the second view reaches, in its sizes; at least this share of everything.
 _AROUND, _LEAST = 1.8, 0.04
-_LIGHT = np.array([0.35, 0.25, 0.9])
+_ELEVATION, _AZIMUTH = 22.0, 35.0  # from where it is seen [degrees]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,55 +89,34 @@ def draw(place: Place, output: Path) -> Path:
         for k, (points, factor) in enumerate(views):
             low, high = points.min(axis=0), points.max(axis=0)
             reach = 0.5 * factor * max(float((high - low).max()), _LEAST * whole if k else 0.0)
-            axes = figure.add_subplot(1, len(views), k + 1)
+            axes = figure.add_subplot(1, len(views), k + 1, projection="3d", computed_zorder=False)
             _view(axes, place, 0.5 * (low + high), reach, bool(k))
         figure.suptitle(fill(place.title, 110), fontsize=10)
     return output
 
 
 def _view(axes: Any, place: Place, center: NDArray[np.float64], reach: float, close: bool) -> None:
-    from matplotlib.collections import PolyCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    flat = _projected(place.points - center, place.up)
-    shown = place.triangles
-    middles = place.points[shown].mean(axis=1)
+    axes.set_proj_type("ortho")
+    axes.view_init(_ELEVATION, _AZIMUTH, vertical_axis="xyz"[place.up])
+    middles = place.points[place.triangles].mean(axis=1)
     near = (np.abs(middles - center) <= 1.5 * reach).all(axis=1)
-    # Without those in front of the place, which would hide it.
-    if close:
-        depth = flat[shown, 2].mean(axis=1)
-        near &= depth <= flat[place.marked.ravel(), 2].max() + 0.1 * reach
+    if close:  # without those in front of the place, which would hide it
+        a, b = np.radians([_ELEVATION, _AZIMUTH])
+        towards = np.roll([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)], place.up - 2)
+        near &= middles @ towards <= (place.points[place.marked.ravel()] @ towards).max() + 0.1 * reach
     rows = np.flatnonzero(near)
     rows = rows[:: max(1, len(rows) // _MOST_TRIANGLES)]
-    triangles = np.concatenate([shown[rows], place.marked])
-    is_marked = np.arange(len(triangles)) >= len(rows)
-    corner, first, second = flat[triangles].transpose(1, 0, 2)
-    normals = np.cross(first - corner, second - corner)
-    lengths = np.linalg.norm(normals, axis=1)
-    light = np.abs(normals @ (_LIGHT / np.linalg.norm(_LIGHT))) / np.where(lengths > 0.0, lengths, 1.0)
-    owners = np.concatenate([place.owners[rows], np.zeros(len(place.marked), dtype=np.int64)])
-    base = np.array([body_color(int(k)) for k in range(int(owners.max(initial=0)) + 1)])[owners] / 255.0
-    base[is_marked] = _RED
-    colors = np.column_stack([base * (0.55 + 0.45 * light)[:, None], np.where(is_marked, 1.0, 0.55 if close else 0.8)])
-    order = np.lexsort([flat[triangles, 2].mean(axis=1), is_marked])
-    edges = np.where(is_marked, "#5a0008", "#00000030")[order] if len(order) < 4000 else "none"
-    axes.add_collection(
-        PolyCollection(list(flat[triangles[order], :2]), facecolors=colors[order], edgecolors=edges, linewidths=0.4)
-    )
-    seen = np.array([[-reach, -reach], [reach, reach]]) if close else flat[np.unique(shown), :2]
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    middle, width = 0.5 * (low + high), 0.55 * float((high - low).max())
-    axes.set_xlim(middle[0] - width, middle[0] + width)
-    axes.set_ylim(middle[1] - width, middle[1] + width)
-    axes.set_aspect("equal")
+    base = np.array([body_color(int(k)) for k in range(int(place.owners.max(initial=0)) + 1)]) / 255.0
+    colors = np.column_stack([base[place.owners[rows]], np.full(len(rows), 0.55 if close else 0.8)])
+    lines: dict[str, Any] = {"edgecolors": "#00000030" if len(rows) < 4000 else "none", "linewidths": 0.4}
+    axes.add_collection3d(Poly3DCollection(place.points[place.triangles[rows]], facecolors=colors, shade=True, **lines))
+    if len(place.marked):
+        marked: dict[str, Any] = {"facecolors": _RED, "edgecolors": "#5a0008", "linewidths": 0.4, "zorder": 9}
+        axes.add_collection3d(Poly3DCollection(place.points[place.marked], **marked))
+    for set_limits, middle in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), center, strict=True):
+        set_limits(middle - reach, middle + reach)
+    axes.set_box_aspect((1, 1, 1), zoom=1.5)
     axes.set_axis_off()
     axes.set_title("the place" if close else f"frame {place.frame}", fontsize=10)
-
-
-def _projected(x: NDArray[np.float64], up: int) -> NDArray[np.float64]:
-    """(n, 3) across, above and towards the viewer, who looks down on a corner."""
-    turned = x[:, [(up + 1) % 3, (up + 2) % 3, up]]
-    a, b = np.radians(35.0), np.radians(22.0)
-    across = np.cos(a) * turned[:, 0] + np.sin(a) * turned[:, 1]
-    ahead = -np.sin(a) * turned[:, 0] + np.cos(a) * turned[:, 1]
-    above = np.cos(b) * turned[:, 2] + np.sin(b) * ahead
-    return np.column_stack([across, above, np.sin(b) * turned[:, 2] - np.cos(b) * ahead])
