@@ -289,8 +289,7 @@ def _determinants(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDA
 
 
 def _width(tets: ArrayLike) -> int:
-    shape = np.shape(tets)
-    return 10 if len(shape) == 2 and shape[1] == 10 else 4
+    return 10 if np.shape(tets)[1:] == (10,) else 4
 
 
 def _negative_winding(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.bool_]:

@@ -229,8 +229,7 @@ def _share(color: Color) -> list[float]:
 
 
 def _phong(look: Look) -> dict[str, Any]:
-    of = {"ambient": look.ambient, "diffuse": look.diffuse}
-    return of | {"specular": look.specular, "specular_power": look.power}
+    return {"ambient": look.ambient, "diffuse": look.diffuse, "specular": look.specular, "specular_power": look.power}
 
 
 def _texture(image: NDArray[np.uint8]) -> Any:
@@ -293,11 +292,8 @@ def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, f
 
     pages = [Image.fromarray(image) for image in images]
     page_columns, page_rows = pages[0].size
-    some = [pages[i] for i in evenly(len(pages), 6)]
-    sheet = Image.new("RGB", (some[0].width, some[0].height * len(some)))
-    for k, page in enumerate(some):
-        sheet.paste(page, (0, k * page.height))
-    palette = palette_of(sheet, film.dark)
+    sheet = np.concatenate([np.asarray(pages[i]) for i in evenly(len(pages), 6)])
+    palette = palette_of(Image.fromarray(sheet), film.dark)
     # A pattern that stands still hides the steps between colors; errors that spread would flicker.
     pattern = np.tile(_PATTERN, (page_rows // 4 + 1, page_columns // 4 + 1))[:page_rows, :page_columns, None]
     drawn = []
@@ -337,20 +333,17 @@ def _write_mp4(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, s
         raise OSError(errno.EIO, f"ffmpeg wrote {written} of {sent} frames; is there room?")
 
 
-def _fail(reason: str) -> int:
-    print(f"video: {' '.join(reason.split())}", file=sys.stderr)
-    return 2
-
-
 def main(arguments: list[str]) -> int:
     source, output, film = arguments
     try:
         write(Path(source), Path(output), Film(**json.loads(film)))
+        return 0
     except SuppleError as error:
-        return _fail(str(error))
+        reason = str(error)
     except OSError as error:
-        return _fail(f"cannot be written: {error.strerror or error}; choose another place or make room there")
-    return 0
+        reason = f"cannot be written: {error.strerror or error}; choose another place or make room there"
+    print(f"video: {' '.join(reason.split())}", file=sys.stderr)
+    return 2
 
 
 if __name__ == "__main__":
