@@ -139,7 +139,7 @@ def mistakes_are_named():
     plane.supple.role = "SOFT"
     expect("sheet: ")
     plane.supple.pinned = "nothing"
-    expect("sheet: there is no vertex group 'nothing'")
+    expect("sheet: the vertex group 'nothing' does not exist")
     plane.supple.role = "OBSTACLE"
     expect("no object is a soft body")
 

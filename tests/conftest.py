@@ -63,7 +63,7 @@ def browser() -> Iterator:
     if found is None:
         if os.environ.get("CI"):
             pytest.fail("CI needs chromium: apt install chromium")
-        pytest.skip("there is no chromium here; apt install chromium")
+        pytest.skip("chromium is missing; apt install chromium")
     with sync_api.sync_playwright() as playwright:
         started = playwright.chromium.launch(executable_path=found, args=_FLAGS.split())
         yield started

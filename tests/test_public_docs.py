@@ -71,5 +71,5 @@ def test_a_public_name_is_documented(name):
     if (inspect.isfunction(thing) or "Parameters\n---" in all_docs) and (
         "Raises\n---" not in all_docs and name not in _NEVER_RAISE
     ):
-        problems.append("there is no section Raises")
+        problems.append("the section Raises is missing")
     assert not problems, "; ".join(problems)

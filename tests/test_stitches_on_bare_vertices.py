@@ -65,7 +65,7 @@ def by_newton(system, x, h=0.05, steps=200):
     linear = LinearSolver.of(system, "direct")
     hessian = HessianBlocks.zeros(0, len(x), len(system.stitching))
     tools = Tools(linear, hessian, system.pinned_vertices, FreeMotion.of(system))
-    # There is no tet to guard: stitch tets are not.
+    # Nothing is guarded: stitch tets are not.
     limits = StepLimits(InversionGuard(system, np.zeros(0, dtype=np.bool_), complete=True), None, tools.clock)
     stitches = StitchEnergy.of(system.stitching, 0.0)
     v = np.zeros_like(x)

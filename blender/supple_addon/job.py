@@ -37,7 +37,9 @@ def write(context, folder):
         raise JobError("the scene has one frame only; set its end after its start")
     for thing in bodies:
         if thing.supple.pinned and thing.supple.pinned not in thing.vertex_groups:
-            raise JobError(f"{thing.name}: there is no vertex group {thing.supple.pinned!r}; choose another in Pinned")
+            raise JobError(
+                f"{thing.name}: the vertex group {thing.supple.pinned!r} does not exist; choose another in Pinned"
+            )
     paths, places = _motions(context, bodies, obstacles)
     described = []
     for k, thing in enumerate(bodies):

@@ -110,7 +110,7 @@ def simulate(
         step, by name, or None. Others stay as they are. `send` of the generator does the same.
     sinks : receive the start, every frame, and the end.
     progress : whether to show a bar, in a terminal or a notebook; see `ProgressBar`.
-    strict : raise `SolverError` at the first frame whose status is not `converged`, in place of yielding it. Sinks have
+    strict : raise `SolverError` at the first frame whose status is not `converged`, instead of yielding it. Sinks have
         received it.
 
     Raises
@@ -240,7 +240,7 @@ def prepared_after_breaks(
     if left is not system:
         try:
             workspace = solver.prepare(left)
-        except SolverError as error:  # nothing holds a body any more, and its equilibrium is asked for
+        except SolverError as error:  # nothing holds a body, and its equilibrium is asked for
             step = replace(step, status=Status.LINE_SEARCH_FAILED, message=str(error))
     return left, state, step, workspace
 

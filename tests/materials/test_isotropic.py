@@ -234,14 +234,14 @@ def test_element_kernels_are_contractions_of_the_batched_form(soup):
 def with_lame(cls, mu, lam):
     """A material of the class whose own density has exactly these parameters."""
 
-    class Given(cls):
+    class WithLame(cls):
         def lame_parameters(self):
             return mu, lam
 
         def per_tet(self, n_tets):
             return self._tet_material(n_tets, cls.energy_kind(), mu, lam)
 
-    return Given(youngs=1.0, poisson=0.0)
+    return WithLame(youngs=1.0, poisson=0.0)
 
 
 def test_compiled_kernels_come_from_the_cache_in_a_new_process(soup):

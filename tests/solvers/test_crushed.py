@@ -29,7 +29,7 @@ def test_a_stiffness_in_megapascals_is_told_at_the_start_and_in_each_crushed_fra
     assert "did you mean 0.05 MPa (youngs=5e+04)?" in caplog.text
     reports = [frame.report for frame in frames if frame.report.min_det_F < 0.25]
     assert reports
-    assert {str(report.status) for report in reports} <= {"crushed", "held_back", "intersecting"}
+    assert {str(report.status) for report in reports} <= {"crushed", "truncated", "intersecting"}
     assert any("body 'ball', tet" in report.message and "did you mean" in report.message for report in reports)
 
 

@@ -16,7 +16,7 @@ from supple.errors import SceneError
 class Status(StrEnum):
     """How a step ended. It equals its name as text: `report.status == "converged"`.
 
-    Where several hold for one step, the report has the first of: inverted, intersecting, energy_gained, held_back,
+    Where several hold for one step, the report has the first of: inverted, intersecting, energy_gained, truncated,
     crushed, softened.
 
     Attributes
@@ -27,7 +27,7 @@ class Status(StrEnum):
     NOT_FINITE : a position or velocity is lost
     INVERTED : a tet is inside out that was not at the start (`XPBD`, as the following)
     INTERSECTING : surfaces penetrate each other, or vertices an obstacle by more than a tolerance
-    HELD_BACK : in too many substeps the motion of bodies was shortened to keep tets positive and surfaces apart, or
+    TRUNCATED : in too many substeps the motion of bodies was shortened to keep tets positive and surfaces apart, or
         works leave energy open for that
     ENERGY_GAINED : more energy than the scene and what drives it had (also `Implicit` with "newmark")
     TIME_STEP : a step loses energy that permanent flow would have taken: the shape that is left depends on dt
@@ -48,7 +48,7 @@ class Status(StrEnum):
     ENERGY_GAINED = "energy_gained"
     SOFTENED = "softened"
     # Recordings store the number of a status in this list: a new one comes last.
-    HELD_BACK = "held_back"
+    TRUNCATED = "truncated"
     LINEARIZED = "linearized"
     TUNNELLED = "tunnelled"
     CRUSHED = "crushed"

@@ -76,7 +76,7 @@ def is_trusted(status: os.stat_result, like: os.stat_result | None = None) -> bo
     owners, others = {os.getuid(), 0}, stat.S_IWGRP | stat.S_IWOTH
     if like is not None:
         owners.add(like.st_uid)
-        # The group of another file is no matter where it is another group.
+        # That another file has another group does not matter.
         others &= ~(like.st_mode if like.st_gid == status.st_gid else like.st_mode & stat.S_IWOTH)
     return status.st_uid in owners and not status.st_mode & others
 

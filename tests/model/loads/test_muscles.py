@@ -76,7 +76,7 @@ def test_a_free_muscle_shortens_to_its_equilibrium_and_keeps_its_momentum(name):
         )
     )
     last = frames[-1]
-    # The elastic stress balances that of the fibres, in every tet alike: there is no stress in all.
+    # The elastic stress balances that of the fibres, in every tet alike: the stress in all is zero.
     np.testing.assert_allclose(last.first_piola["bar"][:, 0, 0], 0.0, atol=0.02 * strength)
     assert np.ptp(last.positions["bar"][:, 0]) < 0.9 * 0.4
     mass = last.system.masses.sum()

@@ -14,7 +14,7 @@ from supple.solvers.xpbd.solver import XPBD
 
 # Said after so many seconds of frames, and only where so many remain [s]; again where it has become so many times more.
 _AFTER, _LEAST, _AGAIN = 5.0, 30.0, 2.0
-# Of the cost by counts: what is not cheaper than this is no faster way.
+# Of the cost by counts: what is not cheaper than this is not suggested.
 _GAIN = 0.7
 _ROUGH = 0.1
 

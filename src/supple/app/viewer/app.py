@@ -46,7 +46,7 @@ def opened_page(
     Parameters
     ----------
     port : 0 takes any free port; None takes 8080, or the next free one
-    again : reads the source again, for the button *Reload*; without it, there is no such button
+    again : reads the source again, for the button *Reload*; without it, the page lacks that button
 
     Raises
     ------

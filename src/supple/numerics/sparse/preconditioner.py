@@ -9,7 +9,7 @@ is factorized.
 
 Measured on hanging, twisted and squeezed beams, Poisson's ratio .25 to .49, 8k to 60k tets (CG iterations to 1e-4),
 with Gauss-Seidel inside of groups alone: block Jacobi 62 to 331; groups with rigid modes 13 to 50, with affine fields
-11 to 30. Across groups, matrices of 20 bodies that press on each other take 192 and 58 iterations in place of 317 and
+11 to 30. Across groups, matrices of 20 bodies that press on each other take 192 and 58 iterations instead of 317 and
 113. Block incomplete Cholesky needs fewer iterations where it exists, but breaks down near incompressibility.
 
 Sources: Toselli, Widlund, "Domain Decomposition Methods" (2005), chapters 2 and 3; Saad, "Iterative Methods for Sparse

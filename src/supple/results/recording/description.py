@@ -32,7 +32,7 @@ from supple.scene.scene import Scene
 FORMAT_VERSION = 8
 _GROUP, _HEADER = "supple", "supple/header"
 _INLINE = 16  # entries of arrays that are in the tree: vectors and matrices
-# What is no part of a scene, such as solvers and studies.
+# What a scene does not contain, such as solvers and studies.
 _OF_PROGRAM = re.compile(r"supple\.(?!scene|materials)")
 VTK_TETRA, VTK_QUADRATIC_TETRA = 10, 24
 

@@ -28,7 +28,7 @@ class XPBDDetails(SolverDetails):
     weld_forces : of the rigid bodies on what is welded to them, by name of the weld, (3,) means over the frame [N]
     contact_forces, friction_forces : by name of the body or obstacle, (3,) means over the frame [N]; each sum to zero
     asleep : by body, whether it rests, so that no substep was taken for it (see `supple.solvers.xpbd.sleep`)
-    held_back : substeps in which motion was shortened by more than the error that contacts may leave, so that no tet
+    truncated : substeps in which motion was shortened by more than the error that contacts may leave, so that no tet
         inverts and nothing passes through anything
     contact_residual : largest change of a distance in the last sweep over contacts of a substep, as a share of the gap
         that surfaces keep
@@ -40,7 +40,7 @@ class XPBDDetails(SolverDetails):
     substeps_reason: str = field(default="", compare=False)
     softening: Mapping[str, float] = field(default_factory=dict)
     energy_gained: float = 0.0
-    held_back: int = 0
+    truncated: int = 0
     contact_residual: float = 0.0
     asleep: Mapping[str, bool] = field(default_factory=dict)
     weld_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)

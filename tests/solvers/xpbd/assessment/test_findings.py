@@ -34,12 +34,12 @@ def test_the_worst_gives_the_status_and_all_are_in_the_message():
     )
 
 
-def test_substeps_in_which_bodies_were_held_back_count_from_a_tenth_on():
+def test_substeps_in_which_motion_was_truncated_count_from_a_tenth_on():
     assert Findings(held=0.1).status is Status.CONVERGED
     findings = Findings(held=0.375, softened=[(0.1, "ball")])
-    assert findings.status is Status.HELD_BACK
+    assert findings.status is Status.TRUNCATED
     assert findings.status.can_go_on
-    assert findings.message(1.0, "").startswith("bodies were held back in 38 % of the substeps, ")
+    assert findings.message(1.0, "").startswith("motion was truncated in 38 % of the substeps, ")
 
 
 def test_energy_from_nowhere_counts_from_two_percent_on_and_is_named_before_what_held_bodies_back():

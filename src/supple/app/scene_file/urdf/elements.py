@@ -66,7 +66,7 @@ class Element:
         return value
 
     def numbers(self, key: str, count: int, default: float | None = None) -> tuple[float, ...]:
-        """The numbers of an attribute, of 1e90 at most; `default` where there is no attribute, unless it is None.
+        """The numbers of an attribute, of 1e90 at most; `default` where it is missing, unless it is None.
 
         Raises
         ------

@@ -18,7 +18,7 @@ _ROUND_OFF = 1e-9
 _THIN = 1e-4
 
 
-# A radius of gyration below a micrometre is none [m^2].
+# A radius of gyration below a micrometre counts as zero [m^2].
 _NO_SIZE = 1e-12
 DENSITY = 1000.0  # of what has no mass, or no inertia [kg/m^3]
 

@@ -127,7 +127,7 @@ class SetParameter(Command):
 
 @dataclass(frozen=True)
 class SetView(Command):
-    """The values that the page needs in addition to positions. The default is none, because each takes time.
+    """The values that the page needs in addition to positions. None by default, because each takes time.
 
     Parameters
     ----------

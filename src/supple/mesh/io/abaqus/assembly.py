@@ -103,7 +103,7 @@ class _Deck:
             raise FormatError(f"the instance '{shortened([name])}' is given twice", block.place)
         self._scope = Part(name, self.budget)
         used = self.parts[part.upper()]
-        if any(used is one.parts[0] for one in self.placed):  # the first one is no more than the deck itself
+        if any(used is one.parts[0] for one in self.placed):  # the first one is the deck itself
             self.budget.take(used.size, block.place)
         linear, shift = placement(block)
         self.placed.append(_Placed(name, (used, self._scope), linear, shift))

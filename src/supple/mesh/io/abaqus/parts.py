@@ -240,7 +240,9 @@ class Part:
             ends = [self.node_sets.existing(word, line.place) for word in line.words[:2]]
             count, step = line._replace(words=line.words[2:]).integers([None, 1], "*NFILL")
             if len(ends[0]) != len(ends[1]) or count < 1:
-                raise FormatError("the sets of *NFILL do not have as many nodes, or there is no interval", line.place)
+                raise FormatError(
+                    "the sets of *NFILL do not have as many nodes, or the interval is missing", line.place
+                )
             self._budget.take(4 * count * len(ends[0]), line.place)
             low, high = (self._at(own, line.place) for own in ends)
             for k in range(1, count):

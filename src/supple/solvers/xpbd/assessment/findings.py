@@ -65,10 +65,10 @@ class Findings:
             text = f"{_percent(self.gained)} of the energy has no source, most of it in body {self.gainer!r}"
             found.append((Status.ENERGY_GAINED, text))
         if self.held > HELD_TOLERANCE:
-            found.append((Status.HELD_BACK, f"bodies were held back in {_percent(self.held)} of the substeps"))
+            found.append((Status.TRUNCATED, f"motion was truncated in {_percent(self.held)} of the substeps"))
         if self.open > ENERGY_TOLERANCE:
             text = f"works leave {_percent(self.open)} of the energy open, as motion was shortened"
-            found.append((Status.HELD_BACK, text))
+            found.append((Status.TRUNCATED, text))
         for share, name in self.softened:
             found.append((Status.SOFTENED, f"body {name!r} about {_percent(share)} too soft"))
         for what, lacks in (("its size", self.apart), ("the way of its motor", self.stalled)):

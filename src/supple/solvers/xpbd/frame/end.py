@@ -106,7 +106,7 @@ def end_frame(
         substeps_reason=used.reason,
         softening=shares,
         energy_gained=findings.gained,
-        held_back=held_back,
+        truncated=held_back,
         contact_residual=ws.contact.counts.residual,
         asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
         contact_forces=pushes,

@@ -70,7 +70,7 @@ class Cameras:
             if self.follow.value == ALL:
                 if moment.springs:  # a camera that moves would move the mouse's target
                     return
-                way *= _SHARE if moment.time >= self._time else 1.0  # back at the start, nothing moves any more
+                way *= _SHARE if moment.time >= self._time else 1.0  # back at the start, nothing moves
             if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
                 return
             self._center, self._time = self._center + way, moment.time
