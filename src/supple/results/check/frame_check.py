@@ -8,7 +8,6 @@ from typing import ClassVar, NamedTuple
 from supple.results.check.report import CheckResult, Verdict
 from supple.results.check.settings import CheckSettings
 from supple.results.check.trajectory import Snapshot, Trajectory
-from supple.results.recording.frame import RecordedFrame
 
 # What a check may need, and what its result says where the files do not contain it and nobody gives it.
 UNKNOWN = {
@@ -51,9 +50,7 @@ class Tally:
         self._last_failure: int | None = None
         self._rank: tuple[bool, float] | None = None
 
-    def see(
-        self, at: Snapshot | RecordedFrame | At | None, value: float, failed: bool, where: str | Callable[[], str] = ""
-    ) -> None:
+    def see(self, at: Snapshot | At | None, value: float, failed: bool, where: str | Callable[[], str] = "") -> None:
         """Add a number of a frame, or of no frame (None). A frame may come several times in succession.
 
         Failures count as worse than other numbers.

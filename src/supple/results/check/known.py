@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from scipy.sparse import csr_array
 from supple.materials.elastic import EdgesAndVolume
 from supple.materials.laws.internal import NEVER_FLOWED
 from supple.materials.per_tet import TetMaterial
-from supple.mesh.skin import Skin
 from supple.model.state import SolverDetails
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.vectors import determinants, edge_vectors, inverses
@@ -36,24 +35,21 @@ Forces = Callable[[float, Floats, Floats], Floats]
 _NONE = np.zeros(0, dtype=np.int64)
 
 
-class Part(Protocol):
-    """A body, see `BodyRows`: its rows of the arrays of all, its boundary, and the skin that it carries or is."""
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A body of a series, as `BodyRows` of a recording: its rows of the arrays of all, and its boundary. No skin."""
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def vertices(self) -> slice: ...
-    @property
-    def tets(self) -> slice: ...
-    @property
-    def boundary(self) -> NDArray[np.int32]: ...
-    @property
-    def rigid(self) -> bool: ...
-    @property
-    def skin(self) -> Skin | None: ...
-    @property
-    def touching_skin(self) -> Skin | None: ...
-    def points(self, x: Floats) -> Floats: ...
+    name: str
+    vertices: slice
+    tets: slice
+    boundary: NDArray[np.int32]
+    rigid: bool = False
+    skin: None = None
+    touching_skin: None = None
+
+    def points(self, x: Floats) -> Floats:
+        """Positions (k, 3) of its points, of those of all vertices x (n, 3)."""
+        return x[self.vertices]
 
 
 class Weld(NamedTuple):
@@ -115,7 +111,7 @@ class Known(ABC):
     times: Floats
     dt: float
     gravity: Floats
-    bodies: Sequence[Part]
+    bodies: Sequence[Part | BodyRows]
     rest_positions: Floats
     masses: Floats
     tets: NDArray[np.int32]

@@ -17,6 +17,7 @@ from supple.materials.elastic import Elastic, FixedCorotated, NeoHookean, Stable
 from supple.materials.material import POISSON, NotRecorded
 from supple.materials.per_tet import TetMaterial
 from supple.mesh.io.series.series import OtherCells, Series
+from supple.results.check.known import Part
 from supple.results.check.series_parts import parts_of
 from supple.results.check.trajectory import Snapshot, Trajectory
 
@@ -59,22 +60,6 @@ class SeriesMetadata(Kind):
     law: Annotated[str, Choice(tuple(LAWS))] = "stable_neo_hookean"
 
 
-@dataclass(frozen=True, eq=False)
-class SeriesPart:
-    """A body without a skin; see `Part`."""
-
-    name: str
-    vertices: slice
-    tets: slice
-    boundary: NDArray[np.int32]
-    rigid: bool = False
-    skin: None = None
-    touching_skin: None = None
-
-    def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return x[self.vertices]
-
-
 class SeriesTrajectory(Trajectory):
     """The frames of another program."""
 
@@ -93,7 +78,7 @@ class SeriesTrajectory(Trajectory):
         starts = np.vstack([np.zeros((1, 3), dtype=np.int64), parts.ends])
         rows = [[slice(*map(int, ends)) for ends in zip(a, b, strict=True)] for a, b in pairwise(starts)]
         self.bodies = [
-            SeriesPart(name, vertices, tets, (parts.triangles[triangles] - vertices.start).astype(np.int32))
+            Part(name, vertices, tets, (parts.triangles[triangles] - vertices.start).astype(np.int32))
             for name, (vertices, tets, triangles) in zip(parts.names, rows, strict=True)
         ]
         step, solid = _step(series.times, given.dt), (self.rest_volumes > 0.0).all() and len(self.tets) > 0

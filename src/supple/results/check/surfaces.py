@@ -13,6 +13,7 @@ from supple.mesh.topology import graph_components
 from supple.results.check.geometry.box_tree import Tree, refitted, tree_of
 from supple.results.check.geometry.surface_pairs import Triangles, touching_pairs
 from supple.results.check.known import Floats, Ints, Known, Part
+from supple.scene.rows import BodyRows
 
 _MOST_PAIRS = 1000
 
@@ -52,7 +53,7 @@ class Surfaces:
         self.names = tuple(str(thing.name) for thing in (*of.bodies, *of.obstacles))
         triangles: list[Ints] = []
         self.fixed: list[tuple[int, Floats, int]] = []
-        self.skins: list[tuple[Part, Skin, int]] = []
+        self.skins: list[tuple[Part | BodyRows, Skin, int]] = []
         row = len(of.rest_positions)
         for body in of.bodies:
             skin = body.touching_skin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,10 +16,6 @@ if TYPE_CHECKING:
 
 Names = Annotated[list[str] | None, Parameter(negative="", consume_multiple=False)]
 Flag = Annotated[bool, Parameter(negative="")]
-_SETTINGS = (
-    "every", "only", "skip", "max_volume_change", "max_orthogonality_error", "max_energy_gain", "max_momentum_change",
-)  # fmt: skip
-_GIVEN = ("density", "youngs", "poisson", "law", "gravity", "dt", "free")
 
 
 def check(
@@ -95,6 +92,7 @@ def check(
         Print only failed checks.
     """
     from supple.errors import OutputError
+    from supple.results.check.series import SeriesMetadata
     from supple.results.check.settings import CheckSettings
     from supple.runtime.replacing import refuse_to_replace
 
@@ -103,8 +101,12 @@ def check(
         if dt is not None or not fps > 0.0:
             raise OutputError(f"check: fps is {fps}; give a number above zero, or dt, not both")
         values["dt"] = 1.0 / fps
-    settings = {key: values[key] for key in _SETTINGS if values[key] is not None}
-    given = {key: values[key] for key in _GIVEN if values[key]}
+    settings, given = (
+        {field.name: values[field.name] for field in fields(kind) if values.get(field.name) is not None}
+        for kind in (CheckSettings, SeriesMetadata)
+    )
+    if not free:
+        del given["free"]
     CheckSettings(**settings)
     for output in (json, picture):
         if output is not None:
