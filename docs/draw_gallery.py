@@ -23,7 +23,7 @@ import supple as sp
 from supple.app.demos.registry import DEMOS
 from supple.results.export.video import Film
 from supple.results.export.video_worker import Studio, palette_of
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.simulate import NullSink
 
 FOLDER = Path(__file__).parent
@@ -77,9 +77,9 @@ def draw(name: str, folder: Path) -> dict[str, object]:
     print(f"{name}: {time.perf_counter() - began:.0f} s", flush=True)
     with sp.read_recording(path) as recording:
         model = model_of_recording(recording)
-        moments = [moment_of_frame(model, recording[round(share * (len(recording) - 1))]) for share in SHARES]
-    studio = Studio(model, moments, Film(size=SIZE))
-    strip = np.concatenate([studio.picture(moment, 0.0) for moment in moments], axis=1)
+        render_frames = [render_frame_of(model, recording[round(share * (len(recording) - 1))]) for share in SHARES]
+    studio = Studio(model, render_frames, Film(size=SIZE))
+    strip = np.concatenate([studio.picture(render_frame, 0.0) for render_frame in render_frames], axis=1)
     picture = Image.fromarray(strip)
     image = picture.quantize(palette=palette_of(picture, dark=False), dither=Image.Dither.FLOYDSTEINBERG)
     PICTURES.mkdir(exist_ok=True)

@@ -14,7 +14,7 @@ from supple.results.recording.recorder import Recorder
 from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.camera import direction_of, fitted
 from supple.results.view.floor_shadow import FloorShadow
-from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame, view_of
+from supple.results.view.from_recording import evenly, model_of_recording, render_frame_of, view_of
 from supple.results.view.surfaces import body_surface, obstacle_surfaces, split_at_creases, surfaces_of, vertex_normals
 from supple.simulate import simulate
 
@@ -26,12 +26,12 @@ def model(recording):
 
 def test_bodies_are_drawn_by_their_skin_or_boundary(recording, model):
     cube, slab = (body_surface(model, body) for body in model.bodies)
-    first = moment_of_frame(model, recording[0])
+    first = render_frame_of(model, recording[0])
     assert len(cube.at(first)) == 6
     assert len(slab.at(first)) == 26  # all vertices of a 2 x 2 x 2 box but the one within
     for frame in (recording[0], recording[9]):
         stretch = (1.0 + 0.3 * np.sin(4.0 * frame.time)) if frame.index else 1.0
-        volume = SurfaceMesh(slab.at(moment_of_frame(model, frame)), slab.triangles).volume
+        volume = SurfaceMesh(slab.at(render_frame_of(model, frame)), slab.triangles).volume
         assert volume == pytest.approx(0.3 * stretch)
     assert cube.color != slab.color
     shown, same, *_ = surfaces_of(model, skins=False)
@@ -57,7 +57,7 @@ def test_obstacles_are_closed_and_face_outward(model):
 
 def test_moving_obstacles_follow_their_pose(recording, model):
     box = next(surface for surface in obstacle_surfaces(model) if surface.name.startswith("Box"))
-    first, last = (box.at(moment_of_frame(model, recording[k])) for k in (0, 24))
+    first, last = (box.at(render_frame_of(model, recording[k])) for k in (0, 24))
     np.testing.assert_allclose(last - first, np.tile([0, 0, 0.8], (8, 1)), atol=1e-12)
 
 

@@ -10,7 +10,7 @@ from supple.errors import OutputError
 from supple.results.export import glb as export_glb
 from supple.results.export.exporter import FORMATS, export
 from supple.results.recording.reader import read_recording
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.surfaces import body_surface, surfaces_of
 
 _TYPES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
@@ -79,7 +79,7 @@ def test_glb_plays_every_frame(tmp_path, recorded, recording, model):
         normals = glb.accessor(primitive["attributes"]["NORMAL"])
         for k, frame in enumerate(recording):
             shown = base + np.einsum("t,tvc->vc", weights[k], deltas)
-            np.testing.assert_allclose(shown, surface.at(moment_of_frame(model, frame)), atol=1e-5)
+            np.testing.assert_allclose(shown, surface.at(render_frame_of(model, frame)), atol=1e-5)
             lengths = np.linalg.norm(normals + np.einsum("t,tvc->vc", weights[k], turns), axis=1)
             np.testing.assert_allclose(lengths, 1.0, atol=1e-5)
 
@@ -115,8 +115,8 @@ def test_obj_folder_has_each_frame(tmp_path, recorded, recording, model):
     assert [f.name for f in files] == [f"frame_{k:05}.obj" for k in range(25)]
     mesh = meshio.read(files[20])
     drawn = surfaces_of(model)[:2]
-    moment = moment_of_frame(model, recording[20])
-    expected = np.concatenate([surface.at(moment) for surface in drawn])
+    render_frame = render_frame_of(model, recording[20])
+    expected = np.concatenate([surface.at(render_frame) for surface in drawn])
     np.testing.assert_allclose(mesh.points[: len(expected)], expected, atol=1e-8)
     faces = mesh.cells_dict["triangle"]
     np.testing.assert_array_equal(faces[: len(drawn[0].triangles)], drawn[0].triangles)
@@ -157,7 +157,7 @@ def test_usd_has_time_samples(tmp_path, recorded, recording, model):
         assert mesh.GetPointsAttr().GetNumTimeSamples() == 25
         for k in (0, 11, 24):
             np.testing.assert_allclose(
-                mesh.GetPointsAttr().Get(k), surface.at(moment_of_frame(model, recording[k])), atol=1e-5
+                mesh.GetPointsAttr().Get(k), surface.at(render_frame_of(model, recording[k])), atol=1e-5
             )
         np.testing.assert_array_equal(np.reshape(mesh.GetFaceVertexIndicesAttr().Get(), (-1, 3)), surface.triangles)
 

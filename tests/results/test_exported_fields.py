@@ -13,7 +13,7 @@ from supple.results.export.exporter import export
 from supple.results.export.video import Film
 from supple.results.export.video_worker import Studio, connections
 from supple.results.view.fields import nodal_values
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 
 FIELDS = ["von_mises", "stress", "contact_force"]
 MESH = sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1))
@@ -72,8 +72,8 @@ def test_glb_has_the_recorded_fields_of_every_frame(recorded, tmp_path):
     first, last = values(primitive["attributes"]["_VON_MISES"]), values(primitive["targets"][-1]["_VON_MISES"])
     with sp.read_recording(recorded) as recording:
         model = model_of_recording(recording)
-        moment = moment_of_frame(model, recording[-1])
-        nodal = nodal_values(moment, recording[-1].field("von_mises").values_of_all)
+        render_frame = render_frame_of(model, recording[-1])
+        nodal = nodal_values(render_frame, recording[-1].field("von_mises").values_of_all)
     assert (first + last).max() == pytest.approx(nodal[:8].max(), rel=1e-5)
     (rigid,) = [mesh for mesh in document["meshes"] if mesh["name"] == "bob"]
     assert rigid["primitives"][0]["attributes"].keys() == {"POSITION", "NORMAL"}
@@ -100,8 +100,8 @@ def test_usd_has_fields_materials_and_the_rate_of_the_recording(recorded, tmp_pa
 def test_films_draw_stitches_and_joints(recorded):
     with sp.read_recording(recorded) as recording:
         model = model_of_recording(recording)
-        moment = moment_of_frame(model, recording[-1])
-        lines = [(segments(moment), color) for segments, color in connections(model)]
+        render_frame = render_frame_of(model, recording[-1])
+        lines = [(segments(render_frame), color) for segments, color in connections(model)]
     (stitches, _), (joints, _) = lines
     assert stitches.shape == (4, 2, 3)
     assert np.abs(np.diff(stitches, axis=1)).max() < 0.01
@@ -112,12 +112,12 @@ def test_the_ends_of_a_scale_are_those_given_and_rigid_bodies_are_grey(recorded)
     pytest.importorskip("pyvista")
     with sp.read_recording(recorded) as recording:
         model = model_of_recording(recording)
-        moments = [moment_of_frame(model, recording[-1])]
+        render_frames = [render_frame_of(model, recording[-1])]
         try:
-            studio = Studio(model, moments, Film(color="von_mises", range=(0.0, 123.0), size=(160, 120)))
+            studio = Studio(model, render_frames, Film(color="von_mises", range=(0.0, 123.0), size=(160, 120)))
         except Exception as error:  # of drivers: another one on each machine
             pytest.skip(str(error))
-    assert studio._ends(moments) == (0.0, 123.0)
+    assert studio._ends(render_frames) == (0.0, 123.0)
     colors = {surface.name: surface.color for _, surface in studio._meshes}
     assert np.ptp(colors["bob"]) < 10
     assert np.ptp(colors["low"]) > 50

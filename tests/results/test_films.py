@@ -14,7 +14,7 @@ from supple.results.export import video
 from supple.results.export.exporter import export
 from supple.results.export.video_worker import Studio
 from supple.results.view.fields import nodal_values
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.surfaces import SoftSurface, body_surface, surfaces_of
 
 
@@ -135,8 +135,8 @@ def test_a_field_of_quadratic_tets_has_values_at_middle_nodes(tmp_path):
     list(sp.simulate(sp.Scene([body], gravity=(0, 0, 0)), sp.Implicit(), 0.01, 1, sinks=[sp.Recorder(path)]))
     with sp.read_recording(path) as recording:
         model = model_of_recording(recording)
-        moment = moment_of_frame(model, recording[-1])
-        values = np.repeat(nodal_values(moment, np.linspace(2.0, 3.0, len(model.tets)))[:, None], 3, axis=1)
+        render_frame = render_frame_of(model, recording[-1])
+        values = np.repeat(nodal_values(render_frame, np.linspace(2.0, 3.0, len(model.tets)))[:, None], 3, axis=1)
         surface = body_surface(model, model.bodies[0])
         assert isinstance(surface, SoftSurface)
         drawn = surface.of(values)
@@ -195,7 +195,7 @@ def test_a_crash_of_the_drawing_process_is_an_error_of_one_line(tmp_path, record
 
 def test_a_picture_is_drawn_again_only_where_something_has_moved(recording, monkeypatch):
     model = model_of_recording(recording)
-    first, later = (moment_of_frame(model, recording[k]) for k in (0, 9))
+    first, later = (render_frame_of(model, recording[k]) for k in (0, 9))
     studio = object.__new__(Studio)
     vars(studio).update(_meshes=[(None, one) for one in surfaces_of(model)], _bodies=2, _field=None)
     vars(studio).update(_image=None, _seen=[], _lines=[])

@@ -4,7 +4,7 @@ import numpy as np
 
 from supple.results.recording.reader import read_recording
 from supple.results.view import page as page_module
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.page import write_page
 
 
@@ -30,8 +30,8 @@ def test_vertices_are_rounded_by_less_than_a_pixel(recording):
     model = model_of_recording(recording)
     quantum = page_module.quantum_of(model.view)
     assert quantum < 2.0 * model.view.radius / 4000.0
-    moment = moment_of_frame(model, recording[5])
-    np.testing.assert_allclose(page_module._rounded(moment).positions, moment.positions, atol=0.51 * quantum)
+    frame = render_frame_of(model, recording[5])
+    np.testing.assert_allclose(page_module._rounded(frame).positions, frame.positions, atol=0.51 * quantum)
 
 
 def test_pages_of_open_recordings_leave_them_open(tmp_path, recorded):

@@ -9,7 +9,7 @@ from tests.recordings import set_in_scene
 
 import supple as sp
 from supple.results.export.exporter import export
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.surfaces import body_surface, split_at_creases
 
 FLOOR = sp.HalfSpace(friction=0.3, name="floor")
@@ -79,7 +79,7 @@ def test_the_surface_is_drawn(recorded):
     with sp.read_recording(path) as recording:
         model = model_of_recording(recording)
         surface = body_surface(model, model.bodies[1])
-        drawn = surface.at(moment_of_frame(model, recording[-1]))
+        drawn = surface.at(render_frame_of(model, recording[-1]))
         np.testing.assert_allclose(drawn, frames[-1].positions["palm"], rtol=0, atol=1e-13)
         np.testing.assert_array_equal(surface.triangles, frames[0].system.bodies[1].body.surface.triangles)
         highest = max(frame.positions["palm"][:, 1].max() for frame in recording)

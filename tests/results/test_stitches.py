@@ -8,7 +8,7 @@ from tests.recordings import set_in_scene
 import supple as sp
 from supple.model.system import initial_state
 from supple.results.plots import plot_recording
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.layers.connections import StitchView
 from supple.results.view.page import write_page
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
@@ -89,7 +89,7 @@ def test_broken_stitches_are_not_drawn(tmp_path):
     assert not broken[:4].any()
     with sp.read_recording(path) as recording:
         model = model_of_recording(recording)
-        first, end = (moment_of_frame(model, recording[k]).stitch_segments for k in (0, -1))
+        first, end = (render_frame_of(model, recording[k]).stitch_segments for k in (0, -1))
         lengths = [np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) for ends in (first, end)]
     assert first.shape == end.shape == (8, 2, 3)
     assert (lengths[0] > 0.0).all()
@@ -99,8 +99,8 @@ def test_broken_stitches_are_not_drawn(tmp_path):
 def test_the_page_draws_stitches_as_moving_segments(recorded, tmp_path, monkeypatch):
     drawn, update = [], StitchView.update
 
-    def spy(view, moment):
-        update(view, moment)
+    def spy(view, render_frame):
+        update(view, render_frame)
         drawn.extend(np.array(handle.points) for handle in view.nodes)
 
     monkeypatch.setattr(StitchView, "update", spy)

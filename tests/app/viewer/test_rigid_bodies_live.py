@@ -11,7 +11,7 @@ from supple.app.viewer.engine.describe import contact_points, describe, measures
 from supple.app.viewer.engine.scene.changes import change, without_body
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop
-from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.app.viewer.protocol import commands
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -75,7 +75,7 @@ def swinging():
 def moment_of(live):
     """What the page draws."""
     snapshot = SimulationLoop(live, CommandQueue(), None).snapshot(0.0)
-    return MomentBuilder().moment(replace(snapshot, description=describe(live))), snapshot
+    return RenderFrameBuilder().frame(replace(snapshot, description=describe(live))), snapshot
 
 
 def test_a_drag_pulls_at_the_point_under_the_mouse_and_a_throw_keeps_the_velocity(live):
@@ -116,11 +116,11 @@ def test_a_dragged_bar_turns_about_its_hinge_and_stops_at_the_limit():
         assert live.step().status.can_go_on
     reading = measures(live).joints["hinge"]
     assert reading.coordinate == pytest.approx(0.5, abs=1e-5)
-    moment, snapshot = moment_of(live)
+    frame, snapshot = moment_of(live)
     assert "hinge: at 0.5, force" in measures_text(replace(snapshot, description=describe(live)))
-    (joint,) = moment.model.joints
+    (joint,) = frame.model.joints
     assert joint.conditions.coordinate.limits == (-0.5, 0.5)
-    drawn.update(moment)
+    drawn.update(frame)
     lines = page.points
     assert lines.shape == before.shape
     np.testing.assert_allclose(lines[:3].mean(axis=1), np.zeros((3, 3)), atol=1e-6)  # the cross
@@ -160,8 +160,8 @@ class Page:
 
 
 def test_a_click_pins_the_whole_body_and_another_one_releases_it(live):
-    moment, _ = moment_of(live)
-    point = surface_point_on_ray(moment, (0.03, 1.0, 0.01), (0.0, -1.0, 0.0))
+    frame, _ = moment_of(live)
+    point = surface_point_on_ray(frame, (0.03, 1.0, 0.01), (0.0, -1.0, 0.0))
     assert (point.body.name, point.nearest_vertex, point.place[1]) == ("stone", 0, pytest.approx(0.102))
     change(commands.Pin("stone", point.nearest_vertex), live)
     assert len(live.system.pinned_vertices) == 4

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.surfaces import body_surface
 
 MESH = sp.shapes.box((1.0, 1.0, 1.0), (1, 1, 1))
@@ -22,9 +22,9 @@ def lowest(tmp_path, scale: float, height: float) -> float:
     list(sp.simulate(sp.Scene([body], [floor], gravity=(0, 0, 0)), sp.XPBD(substeps=1), 0.01, 1, sinks=[sink]))
     with sp.read_recording(sink.path) as recording:
         model = model_of_recording(recording)
-        moment = moment_of_frame(model, recording[0])
-        moment = replace(moment, positions=moment.positions + np.array([0.0, height - 1.0, 0.0]))
-        return float(body_surface(model, model.bodies[0]).at(moment)[:, 1].min())
+        frame = render_frame_of(model, recording[0])
+        frame = replace(frame, positions=frame.positions + np.array([0.0, height - 1.0, 0.0]))
+        return float(body_surface(model, model.bodies[0]).at(frame)[:, 1].min())
 
 
 @pytest.mark.parametrize(

@@ -6,18 +6,18 @@ import numpy as np
 
 from supple.app.viewer.protocol.snapshots import Snapshot
 from supple.results.view.bounds import box_corners, view_of_scene
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Model, RenderFrame
 
 
-class MomentBuilder:
-    """Converts snapshots to moments. Data that do not change are converted once."""
+class RenderFrameBuilder:
+    """Converts snapshots to frames. Data that do not change are converted once."""
 
     def __init__(self) -> None:
         self._generation: int | None = None
         self._model: Model | None = None
 
-    def moment(self, snapshot: Snapshot) -> Moment:
-        """The moment of a snapshot."""
+    def frame(self, snapshot: Snapshot) -> RenderFrame:
+        """The frame of a snapshot."""
         if self._model is None or snapshot.description.generation != self._generation:
             self._generation = snapshot.description.generation
             scene = snapshot.description
@@ -28,7 +28,7 @@ class MomentBuilder:
         values = {}
         if snapshot.tet_values is not None and snapshot.tet_quantity is not None:
             values[snapshot.tet_quantity] = snapshot.tet_values
-        return Moment(
+        return RenderFrame(
             self._model,
             snapshot.time,
             snapshot.positions,

@@ -9,7 +9,7 @@ from typing import Any
 
 from supple.app.viewer.controls.controller import Controller, Simulation
 from supple.app.viewer.frame_rate import FrameRate
-from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.app.viewer.panel import Panel
 from supple.app.viewer.protocol.commands import Watch
 from supple.app.viewer.protocol.snapshots import Progress, Snapshot
@@ -37,13 +37,13 @@ class LivePage:
 
     def __init__(self, server: Any, simulation: Simulation, first: Snapshot) -> None:
         self._simulation = simulation
-        self._moment_builder = MomentBuilder()
+        self._frame_builder = RenderFrameBuilder()
         self._displayed, self._starts = first, simulation.starts
         self._server, self._watched, self._seen_at = server, True, time.monotonic()
         self.controller = Controller(simulation, first)
         self.panel = Panel(server, self.controller)
-        moment = self._moment_builder.moment(first)
-        self.stage = Stage(server, moment, ViewOptions())
+        frame = self._frame_builder.frame(first)
+        self.stage = Stage(server, frame, ViewOptions())
         self.panel.attach(self.stage)
         self._frame_rate = FrameRate(server)
         self._end = threading.Event()
@@ -85,7 +85,7 @@ class LivePage:
             self.panel.time.show_error(error)
         elif self._simulation.starts != self._starts:
             self._starts = self._simulation.starts
-            self._moment_builder = MomentBuilder()
+            self._frame_builder = RenderFrameBuilder()
             self.panel.restarted()
         snapshot = self._simulation.latest()
         if snapshot is None or snapshot is self._displayed:
@@ -95,9 +95,9 @@ class LivePage:
         self.panel.time.go_on()
         with self._frame_rate.sending():
             self._displayed = snapshot
-            self.stage.show(self._moment_builder.moment(snapshot))
+            self.stage.show(self._frame_builder.frame(snapshot))
             self.panel.views.cameras.move()
-            self.panel.record.note(self.stage.moment)
+            self.panel.record.note(self.stage.frame)
             self.panel.show(snapshot)
 
     def _show_progress(self) -> None:

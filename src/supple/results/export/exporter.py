@@ -48,7 +48,7 @@ FORMATS = {
     "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
     "gif": Format("export.video:write_video", (".gif",), {"size": (640, 360), "rate": 20.0}),  # (extra: video)
     "mp4": Format("export.video:write_video", (".mp4",), {}),  # (extra: video)
-    "png": Format("export.video:write_video", (".png",), {}),  # one moment (extra: video)
+    "png": Format("export.video:write_video", (".png",), {}),  # one instant (extra: video)
     "csv": Format("export.table:write_csv", (".csv",)),  # the reports of all frames
     "html": Format("view.page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from supple.results.export.recorded_fields import fields_on
 from supple.results.recording.reader import Recording
-from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
-from supple.results.view.model import Moment
+from supple.results.view.from_recording import evenly, model_of_recording, render_frame_of
+from supple.results.view.model import RenderFrame
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 from supple.runtime.replacing import whole_file
 
@@ -38,13 +38,13 @@ def write_glb(recording: Recording, output: Path) -> None:
     if len(frames) < len(recording):
         logger.warning("%s: holds %d of %d frames, evenly spaced", output, len(frames), len(recording))
     model = model_of_recording(recording)
-    glb = _Glb([moment_of_frame(model, recording[k]) for k in frames])
+    glb = _Glb([render_frame_of(model, recording[k]) for k in frames])
     for plain in surfaces_of(model):
         surface = plain.creased(model)
         fields = []
         if isinstance(surface, SoftSurface) and recording.fields:
-            moments = zip(frames, glb.moments, strict=True)
-            fields = [fields_on(surface, recording, recording[k], moment) for k, moment in moments]
+            render_frames = zip(frames, glb.render_frames, strict=True)
+            fields = [fields_on(surface, recording, recording[k], render_frame) for k, render_frame in render_frames]
         glb.add(surface, fields)
     with whole_file(output) as fresh:
         fresh.write_bytes(glb.to_bytes())
@@ -53,8 +53,8 @@ def write_glb(recording: Recording, output: Path) -> None:
 class _Glb:
     """A glTF document and its one buffer, to which meshes are added."""
 
-    def __init__(self, moments: list[Moment]) -> None:
-        self.moments = moments
+    def __init__(self, render_frames: list[RenderFrame]) -> None:
+        self.render_frames = render_frames
         self.blob = bytearray()
         self.document: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": "Supple"},
@@ -64,7 +64,7 @@ class _Glb:
         }
         self.channels: list[dict[str, Any]] = []
         self.samplers: list[dict[str, Any]] = []
-        times = np.array([moment.time for moment in moments])
+        times = np.array([render_frame.time for render_frame in render_frames])
         self.times = self._accessor((times - times[0])[:, None], "SCALAR", bounds=True)
 
     def add(self, surface: SoftSurface | RigidSurface, fields: list[dict[str, NDArray]]) -> None:
@@ -77,13 +77,13 @@ class _Glb:
             x, normals = surface.vertices, vertex_normals(surface.vertices, triangles)
             material = self._material(surface, surface.opacity)
             node = self._mesh_node(surface.name, x, normals, triangles, material, [], {})
-            self._place(node, np.stack([surface.pose(moment) for moment in self.moments]))
+            self._place(node, np.stack([surface.pose(render_frame) for render_frame in self.render_frames]))
             return
-        x0 = surface.at(self.moments[0])
+        x0 = surface.at(self.render_frames[0])
         n0 = vertex_normals(x0, triangles)
         targets = []
-        for k, moment in enumerate(self.moments[1:], 1):
-            x = surface.at(moment)
+        for k, render_frame in enumerate(self.render_frames[1:], 1):
+            x = surface.at(render_frame)
             normals = vertex_normals(x, triangles)
             targets.append({"POSITION": self._vectors(x - x0, bounds=True), "NORMAL": self._vectors(normals - n0)})
             if fields:
@@ -108,7 +108,7 @@ class _Glb:
     @cached_property
     def _weights(self) -> int:
         """Target k has weight 1 in frame k and 0 in all others; the first frame is the mesh itself."""
-        k = len(self.moments)
+        k = len(self.render_frames)
         return self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
 
     def _attributes(self, fields: dict[str, NDArray]) -> dict[str, int]:

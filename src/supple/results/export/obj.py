@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from supple.results.recording.reader import Recording
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.surfaces import surfaces_of
 from supple.runtime.replacing import whole_folder
 
@@ -24,10 +24,10 @@ def write_obj_folder(recording: Recording, output: Path) -> None:
         start += len(surface.at_rest(model))
     with whole_folder(output) as folder:
         for k, frame in enumerate(recording):
-            moment, text = moment_of_frame(model, frame), io.StringIO()
+            render_frame, text = render_frame_of(model, frame), io.StringIO()
             text.write(f"# Supple: frame {frame.index}, t = {frame.time:.9g} s, metres, y up\n")
             for surface, face in zip(objects, faces, strict=True):
                 text.write(f"o {'_'.join(surface.name.split())}\n")
-                np.savetxt(text, surface.at(moment), fmt="v %.9g %.9g %.9g")
+                np.savetxt(text, surface.at(render_frame), fmt="v %.9g %.9g %.9g")
                 text.write(face)
             (folder / f"frame_{k:0{digits}}.obj").write_text(text.getvalue(), encoding="utf-8", newline="\n")

@@ -18,7 +18,7 @@ import numpy as np
 from supple.errors import OutputError
 from supple.results.export.recorded_fields import fields_on
 from supple.results.recording.reader import Recording
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.surfaces import RigidSurface, body_surface, obstacle_surfaces
 from supple.runtime.replacing import whole_file
 
@@ -62,14 +62,14 @@ def _write(recording: Recording, path: Path) -> None:
         for i, surface in enumerate(drawn):
             mesh = _define(stage, f"{folder}/{_identifier(surface.name, i)}", surface)
             _set_material(stage, f"/recording/materials/{_identifier(surface.name, i)}_{group}", mesh, surface)
-            moments = (moment_of_frame(model, frame) for frame in recording)
+            render_frames = (render_frame_of(model, frame) for frame in recording)
             if isinstance(surface, RigidSurface):
                 _set_points(mesh, surface.vertices, None)
-                _set_poses(mesh, [surface.pose(moment) for moment in moments], codes)
+                _set_poses(mesh, [surface.pose(render_frame) for render_frame in render_frames], codes)
             else:
-                for frame, moment, code in zip(recording, moments, codes, strict=True):
-                    _set_points(mesh, surface.at(moment), code)
-                    _set_fields(mesh, fields_on(surface, recording, frame, moment), code)
+                for frame, render_frame, code in zip(recording, render_frames, codes, strict=True):
+                    _set_points(mesh, surface.at(render_frame), code)
+                    _set_fields(mesh, fields_on(surface, recording, frame, render_frame), code)
     stage.GetRootLayer().Save()
 
 

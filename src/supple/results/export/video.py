@@ -122,7 +122,7 @@ _NEEDED = {"png": ("pyvista", "PIL"), "gif": ("pyvista", "PIL"), "mp4": ("pyvist
 
 
 def write_video(recording: Recording, output: Path, film: Film) -> None:
-    """Write a film (.mp4, which is H.264, or .gif), or a picture of one moment (.png)."""
+    """Write a film (.mp4, which is H.264, or .gif), or a picture of one instant (.png)."""
     kind = output.suffix[1:].lower()
     missing = [name for name in _NEEDED[kind] if find_spec(name) is None]
     if missing:

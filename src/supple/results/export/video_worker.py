@@ -21,11 +21,11 @@ from supple.results.view.bounds import View, box_corners
 from supple.results.view.camera import direction_of, fitted, upright
 from supple.results.view.fields import NOT_KNOWN_COLOR, Limits, Range, color_map, nodal_values
 from supple.results.view.floor_shadow import floor_shadow
-from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
+from supple.results.view.from_recording import evenly, model_of_recording, render_frame_of
 from supple.results.view.layers.connections import STITCH_COLOR
 from supple.results.view.layers.joints import JOINT_COLOR, joint_segments, lines_of_joints
 from supple.results.view.look import Color, Look, background, floor_disc, theme
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Model, RenderFrame
 from supple.results.view.occlusion import occlusion
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 
@@ -36,13 +36,13 @@ _LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4
 # Colors of a field must be found again in the legend: they have little shading.
 _FIELD: Any = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}
 _SHADOW_CELLS, _FLOOR_CELLS = 256, 512
-_SAMPLED = 24  # moments from which the ends of a color scale are found
+_SAMPLED = 24  # frames from which the ends of a color scale are found
 
 
 class Studio:
     """A scene of VTK with all surfaces of a recording, and its camera."""
 
-    def __init__(self, model: Model, moments: list[Moment], film: Film) -> None:
+    def __init__(self, model: Model, render_frames: list[RenderFrame], film: Film) -> None:
         import pyvista
 
         self._film, self._view, self._distance = film, model.view, 0.0
@@ -56,7 +56,7 @@ class Studio:
         self._field = COLORS.get(film.color)
         self._meshes: list[tuple[Any, SoftSurface | RigidSurface]] = []
         self._shaded = film.shadows
-        ends = self._ends(moments)
+        ends = self._ends(render_frames)
         self._legend = None if self._field is None or ends is None else legend(self._field, ends, film.size, shown)
         for number, flat in enumerate(surfaces_of(model, skins=film.surface == "skin", dark=film.dark)):
             if flat.is_floor:
@@ -64,7 +64,7 @@ class Studio:
             surface = flat.creased(model)
             if self._field is not None and number < len(model.bodies) and isinstance(surface, RigidSurface):
                 surface = replace(surface, color=NOT_KNOWN_COLOR)  # it has no such values
-            mesh = pyvista.PolyData.from_regular_faces(surface.at(moments[0]), surface.triangles)
+            mesh = pyvista.PolyData.from_regular_faces(surface.at(render_frames[0]), surface.triangles)
             look: dict[str, Any] = _phong(surface.look) | {"color": _share(surface.color)}
             if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
                 mesh.point_data["field"] = np.zeros(mesh.n_points)
@@ -81,7 +81,7 @@ class Studio:
             actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
             self._meshes.append((mesh, surface))
         self._lines = [
-            (self._add_lines(pyvista, segments(moments[0]), color), segments)
+            (self._add_lines(pyvista, segments(render_frames[0]), color), segments)
             for segments, color in (connections(model) if film.connections else [])
         ]
         self._bodies = len(model.bodies)
@@ -104,13 +104,13 @@ class Studio:
                 pyvista.Light(position=tuple(place), focal_point=tuple(center), color=color, intensity=strength)
             )
 
-    def _ends(self, moments: list[Moment]) -> tuple[float, float] | None:
+    def _ends(self, render_frames: list[RenderFrame]) -> tuple[float, float] | None:
         """Of the color scale, for the whole film."""
         if self._field is None:
             return None
-        chosen = [moments[i] for i in evenly(len(moments), _SAMPLED)]
+        chosen = [render_frames[i] for i in evenly(len(render_frames), _SAMPLED)]
         return Limits(self._field, Range(fixed=self._film.range)).follow(
-            np.concatenate([self._field.values(moment) for moment in chosen])
+            np.concatenate([self._field.values(render_frame) for render_frame in chosen])
         )
 
     def _add_picture(self, pyvista: Any, corners: NDArray[np.float64], image: NDArray[np.uint8]) -> Any:
@@ -125,12 +125,12 @@ class Studio:
         self._plotter.add_mesh(mesh, color=_share(color), line_width=width, lighting=False)
         return mesh
 
-    def picture(self, moment: Moment, share: float) -> NDArray[np.uint8]:
-        """(height, width, 3) of a moment, at a share of the film's length."""
-        points = [surface.at(moment) for _, surface in self._meshes]
-        nodal = None if self._field is None else nodal_values(moment, self._field.values(moment))
+    def picture(self, render_frame: RenderFrame, share: float) -> NDArray[np.uint8]:
+        """(height, width, 3) of a frame, at a share of the film's length."""
+        points = [surface.at(render_frame) for _, surface in self._meshes]
+        nodal = None if self._field is None else nodal_values(render_frame, self._field.values(render_frame))
         camera = self._aim(np.concatenate(points[: self._bodies]), share)
-        lines = [segments(moment).reshape(-1, 3) for _, segments in self._lines]
+        lines = [segments(render_frame).reshape(-1, 3) for _, segments in self._lines]
         seen = [*points, *lines, camera, np.zeros(0) if nodal is None else nodal]
         # Where everything rests, the picture stays.
         if self._image is None or not all(map(np.array_equal, seen, self._seen)):
@@ -184,14 +184,14 @@ class Studio:
         return np.array([*center, *away, self._distance])
 
 
-def connections(model: Model) -> list[tuple[Callable[[Moment], NDArray[np.float64]], Color]]:
-    """The lines (k, 2, 3) of stitches and of joints at a moment [m], and their colors."""
-    found: list[tuple[Callable[[Moment], NDArray[np.float64]], Color]] = []
+def connections(model: Model) -> list[tuple[Callable[[RenderFrame], NDArray[np.float64]], Color]]:
+    """The lines (k, 2, 3) of stitches and of joints at a frame [m], and their colors."""
+    found: list[tuple[Callable[[RenderFrame], NDArray[np.float64]], Color]] = []
     if len(model.stitches):
-        found.append((lambda moment: moment.stitch_segments, STITCH_COLOR))
+        found.append((lambda render_frame: render_frame.stitch_segments, STITCH_COLOR))
     if model.joints:
         lines = lines_of_joints(model)
-        found.append((lambda moment: joint_segments(moment, lines), JOINT_COLOR))
+        found.append((lambda render_frame: joint_segments(render_frame, lines), JOINT_COLOR))
     return found
 
 
@@ -241,14 +241,17 @@ def _texture(image: NDArray[np.uint8]) -> Any:
 
 
 def write(source: Path, output: Path, film: Film) -> None:
-    """Draw a recording to a file: .gif, .mp4, or .png of one moment."""
+    """Draw a recording to a file: .gif, .mp4, or .png of one instant."""
     kind = output.suffix[1:].lower()
     with read_recording(source) as recording:
         numbers, rate = _chosen(recording, film, kind)
         model = model_of_recording(recording)
-        moments = [moment_of_frame(model, recording[k]) for k in numbers]
-        studio = Studio(model, moments, film)
-        images = (studio.picture(moment, k / max(1, len(moments) - 1)) for k, moment in enumerate(moments))
+        render_frames = [render_frame_of(model, recording[k]) for k in numbers]
+        studio = Studio(model, render_frames, film)
+        images = (
+            studio.picture(render_frame, k / max(1, len(render_frames) - 1))
+            for k, render_frame in enumerate(render_frames)
+        )
         if kind == "png":
             from PIL import Image
 
@@ -287,7 +290,7 @@ def palette_of(image: Any, dark: bool) -> Any:
 
 
 def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, film: Film) -> None:
-    """One palette for all pages, from a page of several moments: one for each page would flicker."""
+    """One palette for all pages, from a page of several render_frames: one for each page would flicker."""
     from PIL import Image
 
     pages = [Image.fromarray(image) for image in images]

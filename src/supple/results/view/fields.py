@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from supple.numerics.deformation import determinants
 from supple.results.readings.tet_readings import tet_values
-from supple.results.view.model import Moment
+from supple.results.view.model import RenderFrame
 
 
 @dataclass(frozen=True)
@@ -29,34 +29,34 @@ class Field:
     name: str
     unit: str
     center: float | None
-    measure: Callable[[Moment], NDArray[np.float64]]
+    measure: Callable[[RenderFrame], NDArray[np.float64]]
 
-    def values(self, moment: Moment) -> NDArray[np.float64]:
+    def values(self, frame: RenderFrame) -> NDArray[np.float64]:
         """Values (m,), NaN where they are not known: from the simulation, otherwise computed here."""
-        known = moment.tet_values.get(self.key)
-        return self.measure(moment) if known is None else known
+        known = frame.tet_values.get(self.key)
+        return self.measure(frame) if known is None else known
 
 
-def volume_ratio(moment: Moment) -> NDArray[np.float64]:
+def volume_ratio(frame: RenderFrame) -> NDArray[np.float64]:
     """J = det F of every tet (m,)."""
-    return determinants(moment.deformation_gradients)
+    return determinants(frame.deformation_gradients)
 
 
-def von_mises_stress(moment: Moment) -> NDArray[np.float64]:
+def von_mises_stress(frame: RenderFrame) -> NDArray[np.float64]:
     """Von Mises stress of every tet (m,) [Pa]."""
-    return _of_laws(moment, "von_mises")
+    return _of_laws(frame, "von_mises")
 
 
-def energy_density(moment: Moment) -> NDArray[np.float64]:
+def energy_density(frame: RenderFrame) -> NDArray[np.float64]:
     """Elastic energy per rest volume of every tet (m,) [J/m^3]."""
-    return _of_laws(moment, "energy")
+    return _of_laws(frame, "energy")
 
 
-def _of_laws(moment: Moment, quantity: str) -> NDArray[np.float64]:
-    laws = moment.laws
+def _of_laws(frame: RenderFrame, quantity: str) -> NDArray[np.float64]:
+    laws = frame.laws
     if laws is None:
-        return np.full(len(moment.model.tets), np.nan)
-    return tet_values(laws, moment.positions, quantity, moment.internal)
+        return np.full(len(frame.model.tets), np.nan)
+    return tet_values(laws, frame.positions, quantity, frame.internal)
 
 
 FIELDS = {
@@ -97,12 +97,12 @@ def color_map(field: Field) -> str:
     return "RdBu" if field.center is not None else "viridis"
 
 
-def nodal_values(moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def nodal_values(frame: RenderFrame, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) the mean of the tets around each vertex; middle nodes have that of their neighbours."""
-    model = moment.model
+    model = frame.model
     known = np.asarray(np.isfinite(values))
     corners, own = model.tets[known].ravel(), np.repeat(values[known], 4)
-    n = len(moment.positions)
+    n = len(frame.positions)
     total, count = np.bincount(corners, own, minlength=n), np.bincount(corners, minlength=n)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     for body in model.bodies:  # a middle node is beside corners in the quarters of a side, but for the inner one

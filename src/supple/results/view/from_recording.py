@@ -7,7 +7,7 @@ import numpy as np
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
 from supple.results.view.bounds import View, box_corners, farthest, view_of_scene
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Model, RenderFrame
 
 
 def model_of_recording(recording: Recording) -> Model:
@@ -16,9 +16,9 @@ def model_of_recording(recording: Recording) -> Model:
     return Model(recording.bodies, recording.obstacles, view, recording.stitches, recording.joints)
 
 
-def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
+def render_frame_of(model: Model, frame: RecordedFrame) -> RenderFrame:
     """One frame of a recording."""
-    return Moment(
+    return RenderFrame(
         model,
         frame.time,
         frame.state.positions,

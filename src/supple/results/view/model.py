@@ -1,6 +1,7 @@
 """The data that the page draws, of a live simulation or of a recording.
 
-A `Model` contains what no frame changes; a `Moment` is one frame. Layers use only these two, neither engine nor file.
+A `Model` contains what no frame changes; a `RenderFrame` is one frame. Layers use only these two, neither engine nor
+file.
 """
 
 from __future__ import annotations
@@ -110,7 +111,7 @@ def facets_of(tets: NDArray[np.int32]) -> Facets:
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class RenderFrame:
     """One frame.
 
     Attributes

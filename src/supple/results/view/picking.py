@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Model, RenderFrame
 from supple.scene.rows import BodyRows
 
 
@@ -43,10 +43,10 @@ class _Triangles:
     body: NDArray[np.int64]
 
 
-def _triangles(moment: Moment) -> _Triangles:
+def _triangles(frame: RenderFrame) -> _Triangles:
     corners, vertices = [], []
-    for body in moment.model.bodies:
-        points, triangles = moment.finite_positions[body.vertices], body.boundary
+    for body in frame.model.bodies:
+        points, triangles = frame.finite_positions[body.vertices], body.boundary
         if body.rigid and body.skin is not None:
             points, triangles = body.skin.positions(points), body.skin.triangles
         corners.append(points[triangles])
@@ -55,25 +55,25 @@ def _triangles(moment: Moment) -> _Triangles:
     return _Triangles(np.concatenate(corners), np.concatenate(vertices), owners)
 
 
-def nearest_surface_point(moment: Moment, place: ArrayLike) -> SurfacePoint:
+def nearest_surface_point(frame: RenderFrame, place: ArrayLike) -> SurfacePoint:
     """The point on any boundary that is nearest to a point (3,) [m]."""
     from trimesh.triangles import closest_point
 
-    triangles = _triangles(moment)
+    triangles = _triangles(frame)
     query = np.asarray(place, dtype=np.float64)
     points = closest_point(triangles.corners, np.broadcast_to(query, (len(triangles.corners), 3)))
     nearest = int(np.argmin(np.linalg.norm(points - query, axis=1)))
-    return _on_triangle(moment.model, triangles, nearest, points[nearest])
+    return _on_triangle(frame.model, triangles, nearest, points[nearest])
 
 
-def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
+def surface_point_on_ray(frame: RenderFrame, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
     """The first intersection of a ray from `origin` (3,) in `direction` (3,) with any boundary, or None."""
-    triangles = _triangles(moment)
+    triangles = _triangles(frame)
     hit = first_hit(triangles.corners, origin, direction)
     if hit is None:
         return None
     place = np.asarray(origin, dtype=np.float64) + hit[1] * np.asarray(direction)
-    return _on_triangle(moment.model, triangles, hit[0], place)
+    return _on_triangle(frame.model, triangles, hit[0], place)
 
 
 def first_hit(corners: NDArray[np.float64], origin: ArrayLike, direction: ArrayLike) -> tuple[int, float] | None:

@@ -1,4 +1,4 @@
-"""The 3D picture of the page: layers, selected by the options and updated for every moment."""
+"""The 3D picture of the page: layers, selected by the options and updated for every frame."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from supple.results.view.layers.section import Cut
 from supple.results.view.layers.surfaces import ObstacleView, SkinView
 from supple.results.view.layers.tets import TetView
 from supple.results.view.look import background
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Model, RenderFrame
 from supple.results.view.options import COLOR_BY_BODY, ViewOptions
 
 _PIN_COLOR, _CONTACT_COLOR = (20, 20, 24), (220, 40, 110)
@@ -35,23 +35,23 @@ class Stage:
 
     Parameters
     ----------
-    server : of viser; moment : the first one; options : see `ViewOptions`
+    server : of viser; frame : the first one; options : see `ViewOptions`
     """
 
-    def __init__(self, server: Any, moment: Moment, options: ViewOptions) -> None:
+    def __init__(self, server: Any, frame: RenderFrame, options: ViewOptions) -> None:
         self._server, self._scene = server, server.scene
         self._prepares: list[Prepare] = []
-        # Options change in threads of the server; moments come from the drawing thread.
+        # Options change in threads of the server; frames come from the drawing thread.
         self._lock = threading.RLock()
-        self.options, self.moment = options, moment
+        self.options, self.frame = options, frame
         self._layers: list[Layer] = []
-        set_initial_camera(server, moment.model.view)
+        set_initial_camera(server, frame.model.view)
         self._build()
 
     @property
     def model(self) -> Model:
-        """The model of the current moment."""
-        return self.moment.model
+        """The model of the current frame."""
+        return self.frame.model
 
     @property
     def field(self) -> Field | None:
@@ -88,20 +88,20 @@ class Stage:
         """The meshes of the drawn bodies."""
         return self._bodies.nodes
 
-    def show(self, moment: Moment) -> None:
-        """Draw a moment; one of another model creates all layers again."""
+    def show(self, frame: RenderFrame) -> None:
+        """Draw a frame; one of another model creates all layers again."""
         with self._lock, self._server.atomic():
-            changed = moment.model is not self.moment.model
-            self.moment = moment
+            changed = frame.model is not self.frame.model
+            self.frame = frame
             if changed:
                 self._build()
                 return
             for layer in self._layers:
-                layer.update(moment)
+                layer.update(frame)
         self._server.flush()  # otherwise viser waits for more, up to a sixtieth of a second
 
     def apply(self, options: ViewOptions) -> None:
-        """Draw the same moment with other options."""
+        """Draw the same frame with other options."""
         with self._lock, self._server.atomic():
             if options != self.options:
                 self.options = options
@@ -110,43 +110,43 @@ class Stage:
     def _build(self) -> None:
         for layer in self._layers:
             layer.remove()
-        scene, moment, options = self._scene, self.moment, self.options
+        scene, frame, options = self._scene, self.frame, self.options
         self._bodies = self._make_bodies()
         scene.set_background_image(background(options.dark), format="png")
         self._layers = [
             self._bodies,
-            Ground(scene, moment, options.dark),
-            ObstacleView(scene, moment, options.dark),
-            SpringView(scene, moment),
+            Ground(scene, frame, options.dark),
+            ObstacleView(scene, frame, options.dark),
+            SpringView(scene, frame),
         ]
-        self._layers.append(ShadowView(scene, moment))
-        self._layers.append(Dots(scene, moment, "/pins", _PIN_COLOR, 0.04, _pins))
-        self._layers.append(JointView(scene, moment))
+        self._layers.append(ShadowView(scene, frame))
+        self._layers.append(Dots(scene, frame, "/pins", _PIN_COLOR, 0.04, _pins))
+        self._layers.append(JointView(scene, frame))
         if options.velocities:
-            self._layers.append(VelocityView(scene, moment))
-        self._forces = ForceView(scene, moment) if options.contacts else None
+            self._layers.append(VelocityView(scene, frame))
+        self._forces = ForceView(scene, frame) if options.contacts else None
         if self._forces is not None:
             self._layers.append(self._forces)
-            self._layers.append(Dots(scene, moment, "/contacts/points", _CONTACT_COLOR, 0.02, _contacts))
+            self._layers.append(Dots(scene, frame, "/contacts/points", _CONTACT_COLOR, 0.02, _contacts))
         if options.stitches:
-            self._layers.append(StitchView(scene, moment))
+            self._layers.append(StitchView(scene, frame))
         for prepare in self._prepares:
             prepare(self._bodies.nodes)
 
     def _make_bodies(self) -> Layer:
         options, field = self.options, self.field
         if options.surface == "wireframe":
-            return SkinView(self._scene, self.moment, lines=True)
+            return SkinView(self._scene, self.frame, lines=True)
         if options.surface == "skin" and field is None:
-            return SkinView(self._scene, self.moment)
+            return SkinView(self._scene, self.frame)
         explode = options.explode if options.surface == "exploded tets" else 0.0
         cut = Cut("xyz".index(options.cut_axis), options.cut_place) if options.surface == "cut" else None
-        return TetView(self._scene, self.moment, field, options.ends, explode, cut)
+        return TetView(self._scene, self.frame, field, options.ends, explode, cut)
 
 
-def _pins(moment: Moment) -> NDArray[np.float64]:
-    return moment.finite_positions[moment.pinned]
+def _pins(frame: RenderFrame) -> NDArray[np.float64]:
+    return frame.finite_positions[frame.pinned]
 
 
-def _contacts(moment: Moment) -> NDArray[np.float64]:
-    return np.zeros((0, 3)) if moment.contact_points is None else moment.contact_points
+def _contacts(frame: RenderFrame) -> NDArray[np.float64]:
+    return np.zeros((0, 3)) if frame.contact_points is None else frame.contact_points

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from supple.mesh.closed_surfaces import is_closed
 from supple.results.view.look import OBSTACLE, Look, drawn_as, theme
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Model, RenderFrame
 from supple.results.view.skin_contact import kept_out
 from supple.runtime.kernel_cache import njit
 from supple.scene.rows import BodyRows
@@ -44,7 +44,7 @@ class Surface(ABC):
     look: Look
 
     @abstractmethod
-    def at(self, moment: Moment) -> NDArray[np.float64]:
+    def at(self, frame: RenderFrame) -> NDArray[np.float64]:
         """Positions (k, 3) of the vertices [m]."""
 
     @abstractmethod
@@ -88,13 +88,13 @@ class SoftSurface(Surface):
         own = values[self.body.vertices]
         return (self.body.skin.positions(own) if self.skin and self.body.skin is not None else own)[self.rows]
 
-    def at(self, moment: Moment) -> NDArray[np.float64]:
-        x, kept = self.of(moment.finite_positions), moment.model.beyond_tets.get(self.name)
+    def at(self, frame: RenderFrame) -> NDArray[np.float64]:
+        x, kept = self.of(frame.finite_positions), frame.model.beyond_tets.get(self.name)
         if kept is None or not self.skin:
             return x
         outside, reach = kept
-        rows, gap = np.flatnonzero(outside[self.rows]), _SKIN_GAP * moment.model.view.radius
-        return kept_out(x, rows, _STRETCH * reach, moment.model.obstacles, moment.poses, gap)
+        rows, gap = np.flatnonzero(outside[self.rows]), _SKIN_GAP * frame.model.view.radius
+        return kept_out(x, rows, _STRETCH * reach, frame.model.obstacles, frame.poses, gap)
 
     def at_rest(self, model: Model) -> NDArray[np.float64]:
         return self.of(model.rest_positions)
@@ -110,7 +110,7 @@ class RigidSurface(Surface):
     Attributes
     ----------
     vertices : (k, 3) in its own coordinates [m]
-    pose : (3, 4) rotation and translation of a moment
+    pose : (3, 4) rotation and translation of a frame
     opacity : from 0 to 1
     container : whether it is seen from within; its triangles face outwards, and a page draws only their backs
     casts_shadow : on floors; planes and containers do not
@@ -118,14 +118,14 @@ class RigidSurface(Surface):
     """
 
     vertices: NDArray[np.float64]
-    pose: Callable[[Moment], NDArray[np.float64]]
+    pose: Callable[[RenderFrame], NDArray[np.float64]]
     opacity: float = 1.0
     container: bool = False
     casts_shadow: bool = True
     is_floor: bool = False
 
-    def at(self, moment: Moment) -> NDArray[np.float64]:
-        pose = self.pose(moment)
+    def at(self, frame: RenderFrame) -> NDArray[np.float64]:
+        pose = self.pose(frame)
         return self.vertices @ pose[:, :3].T + pose[:, 3]
 
     def at_rest(self, model: Model) -> NDArray[np.float64]:
@@ -152,8 +152,8 @@ def body_surface(model: Model, body: BodyRows, *, skins: bool = True) -> SoftSur
     center = rest.mean(axis=0)
     inverse = np.linalg.inv((rest[1:] - rest[0]).T)
 
-    def pose(moment: Moment) -> NDArray[np.float64]:
-        x = moment.finite_positions[body.vertices]
+    def pose(frame: RenderFrame) -> NDArray[np.float64]:
+        x = frame.finite_positions[body.vertices]
         return np.column_stack([(x[1:] - x[0]).T @ inverse, x.mean(axis=0)])
 
     vertices = body.skin.positions(rest) - center
@@ -235,8 +235,8 @@ def rim_of(
     return points, tube if _volume(points, tube) > 0.0 else tube[:, ::-1].copy()
 
 
-def _pose_of(obstacle: int) -> Callable[[Moment], NDArray[np.float64]]:
-    return lambda moment: moment.poses[obstacle]
+def _pose_of(obstacle: int) -> Callable[[RenderFrame], NDArray[np.float64]]:
+    return lambda frame: frame.poses[obstacle]
 
 
 def _lower_half(

@@ -8,9 +8,9 @@ import pytest
 import supple as sp
 from supple.results.recording.reader import read_recording
 from supple.results.recording.recorder import Recorder
-from supple.results.view.from_recording import evenly, model_of_recording, moment_of_frame
+from supple.results.view.from_recording import evenly, model_of_recording, render_frame_of
 from supple.results.view.options import ViewOptions
-from supple.results.view.page import page_of_moments
+from supple.results.view.page import page_of_frames
 from supple.results.view.stage import Stage
 
 STEPS = 30
@@ -33,10 +33,10 @@ def test_exported_pages_keep_times_and_drop_frames_above_the_limit(recorded, mon
 
     with read_recording(recorded) as recording:
         model = model_of_recording(recording)
-        taken = [(frame.time, moment_of_frame(model, frame)) for frame in recording]
-        whole = page_of_moments(taken, ViewOptions("tets", "volume ratio J"))
+        taken = [(frame.time, render_frame_of(model, frame)) for frame in recording]
+        whole = page_of_frames(taken, ViewOptions("tets", "volume ratio J"))
         monkeypatch.setattr(module, "_MOST_BYTES", 1)
-        thin = page_of_moments(taken, ViewOptions("tets", "volume ratio J"))
+        thin = page_of_frames(taken, ViewOptions("tets", "volume ratio J"))
     assert len(thin) < len(whole)
     assert "<title>ball · Supple</title>" in thin
     assert evenly(10, 4) == [0, 3, 6, 9]
@@ -46,8 +46,8 @@ def test_exported_pages_keep_times_and_drop_frames_above_the_limit(recorded, mon
 def test_a_page_with_the_volume_ratio_plays_alone(recorded, browser, pixels, tmp_path):
     with read_recording(recorded) as recording:
         model = model_of_recording(recording)
-        moments = [(frame.time, moment_of_frame(model, frame)) for frame in recording]
-        (tmp_path / "page.html").write_text(page_of_moments(moments, ViewOptions("tets", "von Mises stress")))
+        render_frames = [(frame.time, render_frame_of(model, frame)) for frame in recording]
+        (tmp_path / "page.html").write_text(page_of_frames(render_frames, ViewOptions("tets", "von Mises stress")))
     plays_alone(browser, pixels, tmp_path / "page.html")
 
 
@@ -85,7 +85,7 @@ def test_stitches_of_recordings_are_drawn(server, tmp_path):
         pass
     with read_recording(path) as recording:
         model = model_of_recording(recording)
-        Stage(server, moment_of_frame(model, recording[0]), ViewOptions())
+        Stage(server, render_frame_of(model, recording[0]), ViewOptions())
         drawn = server.scene._handle_from_node_name["/stitches"].points
         assert len(drawn) == len(recording.stitches) > 0
         assert np.all(np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1) < 0.15)

@@ -98,7 +98,7 @@ class Mouse:
         """Called by viser when a body is clicked: pin the vertex there, or unpin it."""
         if self._stage is None or not _finite(event.ray_origin, event.ray_direction):
             return
-        point = surface_point_on_ray(self._stage.moment, event.ray_origin, event.ray_direction)
+        point = surface_point_on_ray(self._stage.frame, event.ray_origin, event.ray_direction)
         if point is None:
             return
         body, vertex = point.body, point.nearest_vertex
@@ -106,7 +106,7 @@ class Mouse:
         if before is not None and before.visitor == event.client_id and time.monotonic() - before.at < _DOUBLE_CLICK:
             # The second click of two: the first one has no effect, and the body fills the picture.
             self._controller.send(event.client, before.undo)
-            fit(event.client, self._stage.moment.finite_positions[body.vertices])
+            fit(event.client, self._stage.frame.finite_positions[body.vertices])
             return
         held = vertex + body.vertices.start in self._controller.snapshot.pinned
         act, undo = (Unpin, Pin) if held else (Pin, Unpin)
@@ -125,7 +125,7 @@ class Mouse:
             return
         if event.phase == "start":
             self.release(visitor)
-            point = nearest_surface_point(self._stage.moment, event.start_position)
+            point = nearest_surface_point(self._stage.frame, event.start_position)
             number = self._grabs[visitor] = next(self._numbers)
             self._controller.send(
                 event.client,

@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.results.view.fields import round_up
 from supple.results.view.layers.layer import Layer, single
-from supple.results.view.model import Moment
+from supple.results.view.model import RenderFrame
 
 COLOR = (200, 30, 90)
 _LONGEST = 0.5  # length of the arrow of `full`, as a share of the size of the scene
@@ -24,8 +24,8 @@ class ForceView(Layer):
         where none exists
     """
 
-    def __init__(self, scene: Any, moment: Moment) -> None:
-        self._size = moment.model.view.radius
+    def __init__(self, scene: Any, frame: RenderFrame) -> None:
+        self._size = frame.model.view.radius
         self.full: float | None = None
         head = _HEAD * self._size
         self._arrows = scene.add_arrows(
@@ -38,10 +38,10 @@ class ForceView(Layer):
             visible=False,
         )
         self.nodes = [self._arrows]
-        self.update(moment)
+        self.update(frame)
 
-    def update(self, moment: Moment) -> None:
-        points, forces = moment.contact_forces or (np.zeros((0, 3)), np.zeros((0, 3)))
+    def update(self, frame: RenderFrame) -> None:
+        points, forces = frame.contact_forces or (np.zeros((0, 3)), np.zeros((0, 3)))
         sizes = np.linalg.norm(forces, axis=1)
         known = np.isfinite(sizes) & (sizes > 1e-9)
         strongest = float(sizes[known].max(initial=0.0))
@@ -63,8 +63,8 @@ _SECONDS = 0.15  # the length of an arrow is the distance in this time
 class VelocityView(Layer):
     """Arrows at some vertices of the surface."""
 
-    def __init__(self, scene: Any, moment: Moment) -> None:
-        model = moment.model
+    def __init__(self, scene: Any, frame: RenderFrame) -> None:
+        model = frame.model
         chosen = np.linspace(0, len(model.surface_vertices) - 1, min(_MOST, len(model.surface_vertices)))
         self._rows = model.surface_vertices[np.unique(chosen.astype(np.int64))]
         self._longest = 0.5 * model.view.radius
@@ -79,13 +79,13 @@ class VelocityView(Layer):
             visible=False,
         )
         self.nodes = [self._arrows]
-        self.update(moment)
+        self.update(frame)
 
-    def update(self, moment: Moment) -> None:
-        if moment.velocities is None:
+    def update(self, frame: RenderFrame) -> None:
+        if frame.velocities is None:
             return
-        start = moment.finite_positions[self._rows]
-        way = np.nan_to_num(_SECONDS * moment.velocities[self._rows], posinf=0.0, neginf=0.0)
+        start = frame.finite_positions[self._rows]
+        way = np.nan_to_num(_SECONDS * frame.velocities[self._rows], posinf=0.0, neginf=0.0)
         length = np.linalg.norm(way, axis=1, keepdims=True)
         way *= np.minimum(1.0, self._longest / np.maximum(length, 1e-300))
         some = np.linalg.norm(way, axis=1) >= self._head  # shorter arrows than their head are not drawn

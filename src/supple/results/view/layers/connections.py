@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from supple.results.view.layers.layer import Layer, single
-from supple.results.view.model import Moment
+from supple.results.view.model import RenderFrame
 
 STITCH_COLOR = (30, 30, 34)
 _SPRING_COLOR = (20, 150, 70)
@@ -16,7 +16,7 @@ _SPRING_COLOR = (20, 150, 70)
 class SpringView(Layer):
     """A line for each spring, and a label with its length."""
 
-    def __init__(self, scene: Any, moment: Moment) -> None:
+    def __init__(self, scene: Any, frame: RenderFrame) -> None:
         self._scene = scene
         self._lines = scene.add_line_segments(
             "/springs/lines",
@@ -27,10 +27,10 @@ class SpringView(Layer):
             visible=False,
         )
         self._labels: dict[int, Any] = {}
-        self.update(moment)
+        self.update(frame)
 
-    def update(self, moment: Moment) -> None:
-        springs = moment.springs
+    def update(self, frame: RenderFrame) -> None:
+        springs = frame.springs
         self._lines.visible = bool(springs)
         if springs:
             self._lines.points = single(np.array(list(springs.values())))
@@ -59,14 +59,14 @@ def length_text(meters: float) -> str:
 class StitchView(Layer):
     """A line for each stitch."""
 
-    def __init__(self, scene: Any, moment: Moment) -> None:
+    def __init__(self, scene: Any, frame: RenderFrame) -> None:
         self.nodes = []
-        if len(moment.stitch_segments):
+        if len(frame.stitch_segments):
             handle = scene.add_line_segments(
-                "/stitches", single(moment.stitch_segments), STITCH_COLOR, thickness=2.5, thickness_units="screen"
+                "/stitches", single(frame.stitch_segments), STITCH_COLOR, thickness=2.5, thickness_units="screen"
             )
             self.nodes = [handle]
 
-    def update(self, moment: Moment) -> None:
+    def update(self, frame: RenderFrame) -> None:
         for handle in self.nodes:
-            handle.points = single(moment.stitch_segments)
+            handle.points = single(frame.stitch_segments)

@@ -1,4 +1,4 @@
-"""Points of a moment as dots, such as pinned vertices and contacts."""
+"""Points of a frame as dots, such as pinned vertices and contacts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.view.layers.layer import Layer, single
-from supple.results.view.model import Moment
+from supple.results.view.model import RenderFrame
 
 
 class Dots(Layer):
@@ -18,32 +18,32 @@ class Dots(Layer):
     Parameters
     ----------
     name : of the node; size : of a dot, as a share of the size of the scene
-    points : returns those of a moment, (k, 3) [m]
+    points : returns those of a frame, (k, 3) [m]
     """
 
     def __init__(
         self,
         scene: Any,
-        moment: Moment,
+        frame: RenderFrame,
         name: str,
         color: tuple[int, int, int],
         size: float,
-        points: Callable[[Moment], NDArray[np.float64]],
+        points: Callable[[RenderFrame], NDArray[np.float64]],
     ) -> None:
         self._points = points
         self._dots = scene.add_point_cloud(
             name,
             np.zeros((1, 3), dtype=np.float32),
             color,
-            point_size=size * moment.model.view.radius,
+            point_size=size * frame.model.view.radius,
             point_shape="circle",
             visible=False,
         )
         self.nodes = [self._dots]
-        self.update(moment)
+        self.update(frame)
 
-    def update(self, moment: Moment) -> None:
-        points = self._points(moment)
+    def update(self, frame: RenderFrame) -> None:
+        points = self._points(frame)
         self._dots.visible = len(points) > 0
         if len(points):
             self._dots.points = single(points)

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.layers.layer import Layer, quaternion, turning_z_to
 from supple.results.view.look import floor_disc, theme
-from supple.results.view.model import Moment
+from supple.results.view.model import RenderFrame
 from supple.results.view.surfaces import body_surface, boundary_surface, obstacle_surfaces
 
 
 class Ground(Layer):
     """A disc with lines on the highest floor; none where the scene has no floor, because a grid would look like one."""
 
-    def __init__(self, scene: Any, moment: Moment, dark: bool) -> None:
-        model, self.nodes = moment.model, []
+    def __init__(self, scene: Any, frame: RenderFrame, dark: bool) -> None:
+        model, self.nodes = frame.model, []
         view, up, shown = model.view, model.view.up, theme(dark)
         floor = floor_shadow(model, 1)
         if floor is None:
@@ -43,7 +43,7 @@ class Ground(Layer):
         )
         self.nodes.append(grid)
 
-    def update(self, moment: Moment) -> None:
+    def update(self, frame: RenderFrame) -> None:
         """The floor does not change."""
 
 
@@ -65,20 +65,20 @@ _CELLS = 128  # a picture of this many is made in some milliseconds
 class ShadowView(Layer):
     """A picture on the floor; nothing where the scene has no floor."""
 
-    def __init__(self, scene: Any, moment: Moment) -> None:
-        model, self.nodes = moment.model, []
+    def __init__(self, scene: Any, frame: RenderFrame) -> None:
+        model, self.nodes = frame.model, []
         self._shadow = floor_shadow(model, _CELLS)
         if self._shadow is None:
             return
         # The boundary of the tets casts the shadow of a skin: it has fewer triangles.
         bodies = [body_surface(model, body) if body.rigid else boundary_surface(body) for body in model.bodies]
         self._casting = [one for one in (*bodies, *obstacle_surfaces(model)) if one.casts_shadow]
-        self._image = _picture(scene, "/shadow", self._shadow.corners, self._shadow.picture(self._cast(moment)))
+        self._image = _picture(scene, "/shadow", self._shadow.corners, self._shadow.picture(self._cast(frame)))
         self.nodes = [self._image]
 
-    def update(self, moment: Moment) -> None:
+    def update(self, frame: RenderFrame) -> None:
         if self.nodes:
-            self._image.image = self._shadow.picture(self._cast(moment))  # pyright: ignore[reportOptionalMemberAccess]
+            self._image.image = self._shadow.picture(self._cast(frame))  # pyright: ignore[reportOptionalMemberAccess]
 
-    def _cast(self, moment: Moment) -> list[tuple[NDArray[np.float64], NDArray[np.int32]]]:
-        return [(surface.at(moment), surface.triangles) for surface in self._casting]
+    def _cast(self, frame: RenderFrame) -> list[tuple[NDArray[np.float64], NDArray[np.int32]]]:
+        return [(surface.at(frame), surface.triangles) for surface in self._casting]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.view.layers.layer import Layer, single
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Model, RenderFrame
 from supple.scene.joints.placed import PlacedJoint
 
 JOINT_COLOR = (225, 120, 20)
@@ -25,19 +25,19 @@ class JointView(Layer):
     with the second side, and a line that moves with the first shows where the joint is.
     """
 
-    def __init__(self, scene: Any, moment: Moment) -> None:
-        joints = moment.model.joints
-        self._lines = lines_of_joints(moment.model)
+    def __init__(self, scene: Any, frame: RenderFrame) -> None:
+        joints = frame.model.joints
+        self._lines = lines_of_joints(frame.model)
         self.nodes = []
         if joints:
-            ends = single(joint_segments(moment, self._lines))
+            ends = single(joint_segments(frame, self._lines))
             self.nodes = [
                 scene.add_line_segments("/joints", ends, JOINT_COLOR, thickness=3.0, thickness_units="screen")
             ]
 
-    def update(self, moment: Moment) -> None:
+    def update(self, frame: RenderFrame) -> None:
         for handle in self.nodes:
-            handle.points = single(joint_segments(moment, self._lines))
+            handle.points = single(joint_segments(frame, self._lines))
 
 
 def lines_of_joints(model: Model) -> list[Sides]:
@@ -48,26 +48,26 @@ def lines_of_joints(model: Model) -> list[Sides]:
 Sides = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
-def joint_segments(moment: Moment, lines: list[Sides]) -> NDArray[np.float64]:
+def joint_segments(frame: RenderFrame, lines: list[Sides]) -> NDArray[np.float64]:
     """(k, 2, 3) ends of all lines [m], of those in the coordinates of the two sides of each joint."""
     placed = []
-    for joint, sides in zip(moment.model.joints, lines, strict=True):
+    for joint, sides in zip(frame.model.joints, lines, strict=True):
         for side, own in zip(joint.sides, sides, strict=True):
-            placed.append(_moved(moment, side, own.reshape(-1, 3)).reshape(-1, 2, 3))
+            placed.append(_moved(frame, side, own.reshape(-1, 3)).reshape(-1, 2, 3))
     return np.concatenate(placed)
 
 
-def _moved(moment: Moment, side: int | None, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _moved(frame: RenderFrame, side: int | None, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (k, 3) of a body, an obstacle or the world, where they are now."""
-    bodies = moment.model.bodies
+    bodies = frame.model.bodies
     if side is None:
         return points
     if side >= len(bodies):
-        pose = moment.poses[side - len(bodies)]
+        pose = frame.poses[side - len(bodies)]
         return points @ pose[:, :3].T + pose[:, 3]
     rows = bodies[side].vertices
-    rest = np.column_stack([moment.model.rest_positions[rows], np.ones(4)])
-    return np.column_stack([points, np.ones(len(points))]) @ np.linalg.solve(rest, moment.finite_positions[rows])
+    rest = np.column_stack([frame.model.rest_positions[rows], np.ones(4)])
+    return np.column_stack([points, np.ones(len(points))]) @ np.linalg.solve(rest, frame.finite_positions[rows])
 
 
 def _size(model: Model, joint: PlacedJoint) -> float:

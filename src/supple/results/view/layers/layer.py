@@ -1,4 +1,4 @@
-"""The base class of layers, which draw one part of a moment, and numbers in the form that the browser uses."""
+"""The base class of layers, which draw one part of a frame, and numbers in the form that the browser uses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.view.model import Moment
+from supple.results.view.model import RenderFrame
 
 
 class Layer(ABC):
@@ -22,8 +22,8 @@ class Layer(ABC):
     nodes: list[Any]
 
     @abstractmethod
-    def update(self, moment: Moment) -> None:
-        """Draw this moment."""
+    def update(self, frame: RenderFrame) -> None:
+        """Draw this instant."""
 
     def remove(self) -> None:
         """Remove it from the page."""

@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 
 from supple.results.view.layers.layer import Layer, quaternion, single
-from supple.results.view.model import Moment
+from supple.results.view.model import RenderFrame
 from supple.results.view.surfaces import body_surface, boundary_surface, obstacle_surfaces
 
 
 class SkinView(Layer):
     """One mesh for each body, or only the lines of its boundary."""
 
-    def __init__(self, scene: Any, moment: Moment, *, lines: bool = False) -> None:
-        model, self._parts = moment.model, []
+    def __init__(self, scene: Any, frame: RenderFrame, *, lines: bool = False) -> None:
+        model, self._parts = frame.model, []
         for i, body in enumerate(model.bodies):
             surface = boundary_surface(body) if lines else body_surface(model, body).creased(model)
             handle = scene.add_mesh_simple(
                 f"/bodies/{i} {body.name}",
-                single(surface.at(moment)),
+                single(surface.at(frame)),
                 surface.triangles.astype(np.uint32),
                 color=surface.color,
                 wireframe=lines,
@@ -29,21 +29,21 @@ class SkinView(Layer):
             self._parts.append((handle, surface))
         self.nodes = [handle for handle, _ in self._parts]
 
-    def update(self, moment: Moment) -> None:
+    def update(self, frame: RenderFrame) -> None:
         for handle, surface in self._parts:
-            handle.vertices = single(surface.at(moment))
+            handle.vertices = single(surface.at(frame))
 
 
 class ObstacleView(Layer):
     """One mesh for each obstacle."""
 
-    def __init__(self, scene: Any, moment: Moment, dark: bool = False) -> None:
+    def __init__(self, scene: Any, frame: RenderFrame, dark: bool = False) -> None:
         self._parts = []
-        for number, flat in enumerate(obstacle_surfaces(moment.model, dark)):
+        for number, flat in enumerate(obstacle_surfaces(frame.model, dark)):
             if flat.is_floor:  # it is drawn as a disc
                 continue
-            surface = flat.creased(moment.model)
-            pose = surface.pose(moment)
+            surface = flat.creased(frame.model)
+            pose = surface.pose(frame)
             handle = scene.add_mesh_simple(
                 f"/obstacles/{number} {surface.name}",
                 single(surface.vertices),
@@ -58,10 +58,10 @@ class ObstacleView(Layer):
             self._parts.append([handle, surface, pose])
         self.nodes = [handle for handle, _, _ in self._parts]
 
-    def update(self, moment: Moment) -> None:
+    def update(self, frame: RenderFrame) -> None:
         for part in self._parts:
             handle, surface, before = part
-            pose = surface.pose(moment)
+            pose = surface.pose(frame)
             if not np.array_equal(pose, before):
                 handle.wxyz, handle.position = quaternion(pose[:, :3]), pose[:, 3]
                 part[2] = pose

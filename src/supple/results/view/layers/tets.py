@@ -15,7 +15,7 @@ from supple.results.view.fields import NOT_KNOWN_COLOR, Field, Limits, Range, bi
 from supple.results.view.layers.layer import Layer, single
 from supple.results.view.layers.section import Cut, Triangles, surface, whole
 from supple.results.view.look import drawn_as
-from supple.results.view.model import Model, Moment
+from supple.results.view.model import Model, RenderFrame
 from supple.results.view.picking import first_hit
 
 _LEAST = 16  # smallest capacity of a mesh, in triangles
@@ -85,9 +85,9 @@ class TetView(Layer):
     """
 
     def __init__(
-        self, scene: Any, moment: Moment, field: Field | None, ends: Range, explode: float, cut: Cut | None
+        self, scene: Any, frame: RenderFrame, field: Field | None, ends: Range, explode: float, cut: Cut | None
     ) -> None:
-        model = moment.model
+        model = frame.model
         self._field, self._explode = field, explode
         self._limits = Limits(field, ends) if field is not None else None
         self.range: tuple[float, float] | None = None
@@ -99,28 +99,28 @@ class TetView(Layer):
         for i, body in enumerate(model.bodies):
             self._body[body.tets] = i
         self.values: NDArray[np.float64] | None = None
-        self.update(moment)
+        self.update(frame)
 
-    def update(self, moment: Moment) -> None:
-        x = self._triangles.corners(moment.finite_positions)
+    def update(self, frame: RenderFrame) -> None:
+        x = self._triangles.corners(frame.finite_positions)
         if self._explode > 0.0:
-            x = x + self._offsets(moment)[self._triangles.owner][:, None]
+            x = x + self._offsets(frame)[self._triangles.owner][:, None]
         self._corners = x
         if self._field is None or self._limits is None:
             color = self._body[self._triangles.owner]
         else:
-            self.values = self._field.values(moment)
+            self.values = self._field.values(frame)
             self.range = self._limits.follow(self.values)
-            color = bin_of(self._of_triangles(moment, self.values), *(self.range or (0.0, 1.0)))
+            color = bin_of(self._of_triangles(frame, self.values), *(self.range or (0.0, 1.0)))
         self._drawn.update(x, color)
 
-    def _of_triangles(self, moment: Moment, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _of_triangles(self, frame: RenderFrame, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(t,) the mean of the corners, between which values change smoothly; of tets apart from each other, their own
         values (m,)."""
         own = values[self._triangles.owner]
         if self._explode > 0.0:
             return own
-        smooth = self._triangles.corners(nodal_values(moment, values)[:, None])[..., 0].mean(axis=1)
+        smooth = self._triangles.corners(nodal_values(frame, values)[:, None])[..., 0].mean(axis=1)
         return np.where(np.isfinite(own), smooth, own)
 
     def tet_on_ray(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
@@ -128,10 +128,10 @@ class TetView(Layer):
         hit = first_hit(self._corners, origin, direction)
         return None if hit is None else int(self._triangles.owner[hit[0]])
 
-    def _offsets(self, moment: Moment) -> NDArray[np.float64]:
+    def _offsets(self, frame: RenderFrame) -> NDArray[np.float64]:
         """(m, 3) displacement of each tet from the center of its body [m]."""
-        model = moment.model
-        centers = moment.finite_positions[model.tets].mean(axis=1)
+        model = frame.model
+        centers = frame.finite_positions[model.tets].mean(axis=1)
         offsets = np.empty_like(centers)
         for body in model.bodies:
             offsets[body.tets] = centers[body.tets] - centers[body.tets].mean(axis=0)

@@ -161,7 +161,7 @@ def test_simultaneous_clicks_are_handled_in_order(live, visitor, fake, until):
 
 def test_a_drag_is_a_grab_with_release(live, visitor, received):
     handle = live.stage.body_handles[0]
-    x = live.stage.moment.positions[live.stage.model.bodies[0].vertices]
+    x = live.stage.frame.positions[live.stage.model.bodies[0].vertices]
     corner = int(np.argmax(x.sum(axis=1)))
     visitor.drag(handle, "start", x[corner], x[corner])
     grab = received()
@@ -179,7 +179,7 @@ def test_a_drag_is_a_grab_with_release(live, visitor, received):
 def test_a_visitor_who_leaves_releases_the_grab(live, server, visit, received, until):
     visitor = visit(server.get_port())
     until(server.get_clients)
-    handle, x = live.stage.body_handles[0], live.stage.moment.positions[0]
+    handle, x = live.stage.body_handles[0], live.stage.frame.positions[0]
     visitor.drag(handle, "start", x, x)
     grab = received()
     visitor.leave()
@@ -188,7 +188,7 @@ def test_a_visitor_who_leaves_releases_the_grab(live, server, visit, received, u
 
 def test_a_click_pins_and_unpins(live, fake, visitor, received, until):
     handle = live.stage.body_handles[1]
-    x = live.stage.moment.positions
+    x = live.stage.frame.positions
     corner = int(np.argmax(x.sum(axis=1)))
     origin = x[corner] + [1.0, 1.0, 1.0]
     direction = [-1.0 + 1e-3, -1.0 - 1e-3, -1.0]

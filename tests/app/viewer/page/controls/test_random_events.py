@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.app.viewer.protocol.commands import SetSpeed
 from supple.app.viewer.protocol.snapshots import GrabState
 
@@ -66,6 +66,6 @@ def test_a_thousand_random_events(live, server, fake, visit, until, caplog, capf
     assert caplog.records == []
     printed = capfd.readouterr()
     assert "Traceback" not in printed.out + printed.err
-    assert MomentBuilder().moment(fake.snapshot).positions is not None
+    assert RenderFrameBuilder().frame(fake.snapshot).positions is not None
     for visitor in visitors:
         visitor.leave()

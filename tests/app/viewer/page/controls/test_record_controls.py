@@ -35,8 +35,8 @@ def test_recording_as_html_page(live, fake, guest, until):
     assert record.record.label.startswith("Stop")
     for k in range(3):
         wanted = fake.show(positions=fake.snapshot.positions + 0.1, time=0.1 * (k + 1))
-        until(lambda: live.stage.moment.time == wanted.time)  # noqa: B023
-    until(lambda: len(record._moments) >= 4)
+        until(lambda: live.stage.frame.time == wanted.time)  # noqa: B023
+    until(lambda: len(record._frames) >= 4)
     record._toggle(event)
     assert record.record.label == "Record a page"
     assert b"__VISER_EMBED_DATA__" in guest.files["supple.html"]

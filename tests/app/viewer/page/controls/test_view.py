@@ -32,7 +32,7 @@ def test_the_range_of_the_colors_is_chosen(live, fake, visitor, until):
 
 def test_the_value_at_a_place_that_is_clicked_with_shift(live, fake, server, visitor, until):
     views, body = live.panel.views, live.stage.model.bodies[0]
-    middle = live.stage.moment.positions[body.vertices].mean(axis=0)
+    middle = live.stage.frame.positions[body.vertices].mean(axis=0)
     label = lambda: views.probe._label.text if views.probe._label else ""  # noqa: E731
     fake.show(tet_values=np.full(96, 1234.0), tet_quantity="von_mises")
     visitor.set(views.color_by, "von Mises stress")
@@ -51,7 +51,7 @@ def test_the_value_at_a_place_that_is_clicked_with_shift(live, fake, server, vis
 
 def test_two_clicks_fit_the_picture_to_a_body_and_pin_nothing(live, fake, server, visitor, received, until):
     handle, body = live.stage.body_handles[1], live.stage.model.bodies[1]
-    x = live.stage.moment.positions
+    x = live.stage.frame.positions
     corner = int(np.argmax(x.sum(axis=1)))
     direction = [-1.0 + 1e-3, -1.0 - 1e-3, -1.0]
     for _ in range(2):
@@ -69,7 +69,7 @@ def test_the_camera_follows_a_body(live, fake, server, visitor, until):
     camera = next(iter(server.get_clients().values())).camera
     body = live.stage.model.bodies[1]
     visitor.set(live.panel.views.cameras.follow, "body 1")
-    middle = lambda: live.stage.moment.positions[body.vertices].mean(axis=0)  # noqa: E731
+    middle = lambda: live.stage.frame.positions[body.vertices].mean(axis=0)  # noqa: E731
     until(lambda: np.allclose(camera.look_at, middle()))
     away = np.asarray(camera.position) - np.asarray(camera.look_at)
     fake.show(positions=fake.snapshot.positions + np.array([0.0, 3.0, 0.0]))
@@ -81,11 +81,11 @@ def test_the_camera_stays_with_bodies_that_leave_the_picture(live, fake, server,
     camera, radius = next(iter(server.get_clients().values())).camera, live.stage.model.view.radius
     start, x = np.asarray(camera.look_at), fake.snapshot.positions
     fake.show(positions=x + np.array([0.3 * radius, 0.0, 0.0]))
-    until(lambda: np.allclose(live.stage.moment.positions, fake.snapshot.positions))
+    until(lambda: np.allclose(live.stage.frame.positions, fake.snapshot.positions))
     np.testing.assert_allclose(camera.look_at, start)
     pulled = GrabState(1, "body 0", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     fake.show(positions=x + np.array([2.0 * radius, 0.0, 0.0]), grabs=(pulled,))
-    until(lambda: live.stage.moment.springs)
+    until(lambda: live.stage.frame.springs)
     np.testing.assert_allclose(camera.look_at, start)  # it stands still while a body is pulled
 
     def moved(way: float) -> bool:

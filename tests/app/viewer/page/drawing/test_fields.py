@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.controls.view.color_scale import bar_html
-from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
 from supple.results.view.fields import BINS, FIELDS, Limits, Range, bin_of
 
@@ -18,7 +18,7 @@ J, MISES, ENERGY = FIELDS.values()
 def stretched(fake):
     """Body 0 stretched to twice its length in x, body 1 at rest; body 0 made of StVK, body 1 of something unknown."""
     x = fake.snapshot.positions.copy()
-    model = MomentBuilder().moment(fake.snapshot).model
+    model = RenderFrameBuilder().frame(fake.snapshot).model
     first = model.bodies[0]
     count = first.tets.stop - first.tets.start
     known = sp.StVenantKirchhoff(youngs=1000.0, poisson=0.0).per_tet(count)
@@ -26,8 +26,8 @@ def stretched(fake):
     volumes = 1.0 / (6.0 * np.linalg.det(model.rest_shape_inverse))
     laws = TetLaws(model.tets, model.rest_shape_inverse, volumes, joined_materials([known, other]))
     x[first.vertices] *= [2.0, 1.0, 1.0]
-    moment = MomentBuilder().moment(fake.show(positions=x))
-    return replace(moment, laws=laws)
+    frame = RenderFrameBuilder().frame(fake.show(positions=x))
+    return replace(frame, laws=laws)
 
 
 def test_fields_of_a_stretched_body(stretched):

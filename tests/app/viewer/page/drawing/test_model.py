@@ -3,7 +3,7 @@
 import numpy as np
 
 import supple as sp
-from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.results.view.model import facets_of
 
 
@@ -22,27 +22,27 @@ def test_every_facet_is_found_once_and_outer_facets_are_the_surface():
         assert outer < 0 or len(set(mesh.tets[inner]) & set(mesh.tets[outer])) == 3
 
 
-def test_a_snapshot_becomes_a_moment(fake):
+def test_a_snapshot_becomes_a_render_frame(fake):
     values = np.linspace(0.0, 1.0, fake.snapshot.description.n_tets)
     snapshot = fake.show(pinned=np.array([3, 30]), tet_values=values, tet_quantity="J", time=0.5)
-    translator = MomentBuilder()
-    moment = translator.moment(snapshot)
-    assert [body.name for body in moment.model.bodies] == ["body 0", "body 1"]
-    assert moment.time == 0.5
-    assert list(moment.pinned) == [3, 30]
-    np.testing.assert_array_equal(moment.tet_values["J"], values)
-    np.testing.assert_allclose(np.linalg.det(moment.deformation_gradients), 1.0)
-    np.testing.assert_array_equal(moment.poses[0], np.eye(4)[:3])
+    translator = RenderFrameBuilder()
+    frame = translator.frame(snapshot)
+    assert [body.name for body in frame.model.bodies] == ["body 0", "body 1"]
+    assert frame.time == 0.5
+    assert list(frame.pinned) == [3, 30]
+    np.testing.assert_array_equal(frame.tet_values["J"], values)
+    np.testing.assert_allclose(np.linalg.det(frame.deformation_gradients), 1.0)
+    np.testing.assert_array_equal(frame.poses[0], np.eye(4)[:3])
     # The same generation has the same model, so that no layer is created again.
-    assert translator.moment(fake.show()).model is moment.model
+    assert translator.frame(fake.show()).model is frame.model
 
 
 def test_another_generation_has_a_new_model(fake):
     from dataclasses import replace
 
-    translator = MomentBuilder()
-    before = translator.moment(fake.snapshot)
+    translator = RenderFrameBuilder()
+    before = translator.frame(fake.snapshot)
     smaller = replace(fake.snapshot.description, generation=2, bodies=fake.snapshot.description.bodies[:1])
-    after = translator.moment(fake.show(description=smaller, positions=fake.snapshot.positions[:27]))
+    after = translator.frame(fake.show(description=smaller, positions=fake.snapshot.positions[:27]))
     assert after.model is not before.model
     assert [body.name for body in after.model.bodies] == ["body 0"]

@@ -3,43 +3,43 @@
 import numpy as np
 import pytest
 
-from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.results.view.picking import nearest_surface_point, surface_point_on_ray
 
 
 @pytest.fixture
-def moment(fake):
-    return MomentBuilder().moment(fake.snapshot)
+def frame(fake):
+    return RenderFrameBuilder().frame(fake.snapshot)
 
 
-def place_of(moment, point):
+def place_of(frame, point):
     rows = point.vertices + point.body.vertices.start
-    return point.weights @ moment.positions[rows]
+    return point.weights @ frame.positions[rows]
 
 
-def test_nearest_point_of_any_surface(moment):
-    low, high = moment.positions[moment.model.bodies[1].vertices].min(axis=0), moment.positions.max(axis=0)
-    point = nearest_surface_point(moment, high - np.array([-0.5, 0.3, 0.4]))
+def test_nearest_point_of_any_surface(frame):
+    low, high = frame.positions[frame.model.bodies[1].vertices].min(axis=0), frame.positions.max(axis=0)
+    point = nearest_surface_point(frame, high - np.array([-0.5, 0.3, 0.4]))
     assert point.body.name == "body 1"
-    np.testing.assert_allclose(place_of(moment, point), high - [0.0, 0.3, 0.4], atol=1e-12)
-    np.testing.assert_allclose(place_of(moment, nearest_surface_point(moment, low - 1.0)), point_of(moment, low))
+    np.testing.assert_allclose(place_of(frame, point), high - [0.0, 0.3, 0.4], atol=1e-12)
+    np.testing.assert_allclose(place_of(frame, nearest_surface_point(frame, low - 1.0)), point_of(frame, low))
     assert point.weights.min() >= 0.0
     assert point.weights.sum() == pytest.approx(1.0)
 
 
-def point_of(moment, low):
+def point_of(frame, low):
     """The corner of the nearer body that is nearest to what lies below and before both."""
-    offsets = np.linalg.norm(moment.positions - (low - 1.0), axis=1)
-    return moment.positions[np.argmin(offsets)]
+    offsets = np.linalg.norm(frame.positions - (low - 1.0), axis=1)
+    return frame.positions[np.argmin(offsets)]
 
 
-def test_first_intersection_of_a_ray(moment):
-    low, high = moment.positions.min(axis=0), moment.positions.max(axis=0)
+def test_first_intersection_of_a_ray(frame):
+    low, high = frame.positions.min(axis=0), frame.positions.max(axis=0)
     across = 0.5 * (low + high) + [0.0, 0.07, 0.03]
-    point = surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [1.0, 0.0, 0.0])
+    point = surface_point_on_ray(frame, [low[0] - 3.0, *across[1:]], [1.0, 0.0, 0.0])
     assert point.body.name == "body 0"
-    np.testing.assert_allclose(place_of(moment, point), [low[0], *across[1:]], atol=1e-9)
-    vertex = moment.positions[point.nearest_vertex + point.body.vertices.start]
+    np.testing.assert_allclose(place_of(frame, point), [low[0], *across[1:]], atol=1e-9)
+    vertex = frame.positions[point.nearest_vertex + point.body.vertices.start]
     assert np.linalg.norm(vertex - point.place) <= 0.36  # half the diagonal of a facet
-    assert surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [-1.0, 0.0, 0.0]) is None
-    assert surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [0.0, 0.0, 0.0]) is None
+    assert surface_point_on_ray(frame, [low[0] - 3.0, *across[1:]], [-1.0, 0.0, 0.0]) is None
+    assert surface_point_on_ray(frame, [low[0] - 3.0, *across[1:]], [0.0, 0.0, 0.0]) is None

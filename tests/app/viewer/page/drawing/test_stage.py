@@ -1,4 +1,4 @@
-"""All ways to draw a moment: the sent messages, and that their number does not grow."""
+"""All ways to draw a frame: the sent messages, and that their number does not grow."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.from_snapshot import MomentBuilder
+from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.results.view.fields import FIELDS
 from supple.results.view.layers.connections import length_text
 from supple.results.view.layers.section import Cut, surface
@@ -22,11 +22,11 @@ def kept_messages(server):
 @pytest.mark.parametrize("surface", SURFACES)
 @pytest.mark.parametrize("color_by", [COLOR_BY_BODY, *FIELDS])
 def test_bodies_are_drawn_at_their_positions(server, fake, surface, color_by):
-    translator = MomentBuilder()
-    stage = Stage(server, translator.moment(fake.snapshot), ViewOptions(surface, color_by, explode=0.1))
+    translator = RenderFrameBuilder()
+    stage = Stage(server, translator.frame(fake.snapshot), ViewOptions(surface, color_by, explode=0.1))
     shift = np.array([0.0, 5.0, 0.0])
     snapshot = fake.show(positions=fake.snapshot.positions + shift)
-    stage.show(translator.moment(snapshot))
+    stage.show(translator.frame(snapshot))
     drawn = np.concatenate([handle.vertices for handle in stage.body_handles if handle.visible])
     low, high = snapshot.positions.min(axis=0), snapshot.positions.max(axis=0)
     slack = 0.06 if surface == "exploded tets" else 1e-6
@@ -37,21 +37,21 @@ def test_bodies_are_drawn_at_their_positions(server, fake, surface, color_by):
         assert drawn[:, 0].max() < high[0]
 
 
-def test_the_number_of_buffered_messages_does_not_grow_with_moments(server, fake):
-    translator = MomentBuilder()
+def test_the_number_of_buffered_messages_does_not_grow_with_frames(server, fake):
+    translator = RenderFrameBuilder()
     options = ViewOptions("tets", "volume ratio J", velocities=True, contacts=True)
-    stage = Stage(server, translator.moment(fake.snapshot), options)
+    stage = Stage(server, translator.frame(fake.snapshot), options)
     rng = np.random.default_rng(5)
     counts = []
     for _ in range(30):
         x = fake.snapshot.positions + rng.normal(scale=0.05, size=fake.snapshot.positions.shape)
-        stage.show(translator.moment(fake.show(positions=x, velocities=rng.normal(size=x.shape))))
+        stage.show(translator.frame(fake.show(positions=x, velocities=rng.normal(size=x.shape))))
         counts.append(kept_messages(server))
     assert counts[-1] <= counts[9] + 40  # only the visibility of colors that were not used before
 
 
 def test_changed_options_remove_all_old_layers(server, fake):
-    stage = Stage(server, MomentBuilder().moment(fake.snapshot), ViewOptions())
+    stage = Stage(server, RenderFrameBuilder().frame(fake.snapshot), ViewOptions())
     for kind in (*SURFACES, "skin"):
         stage.apply(ViewOptions(kind, velocities=True, contacts=True))
     stage.apply(ViewOptions())
@@ -64,22 +64,22 @@ def test_changed_options_remove_all_old_layers(server, fake):
 def test_values_that_are_not_finite_are_not_sent(server, fake):
     x = fake.snapshot.positions.copy()
     x[3], x[4] = np.nan, np.inf
-    translator = MomentBuilder()
+    translator = RenderFrameBuilder()
     for options in (ViewOptions(), ViewOptions("exploded tets", "volume ratio J", velocities=True)):
-        stage = Stage(server, translator.moment(fake.show(positions=x, velocities=x)), options)
+        stage = Stage(server, translator.frame(fake.show(positions=x, velocities=x)), options)
         for handle in stage.body_handles:
             assert np.isfinite(handle.vertices).all()
 
 
 def test_a_new_generation_creates_new_layers(server, fake):
-    translator = MomentBuilder()
-    stage = Stage(server, translator.moment(fake.snapshot), ViewOptions())
+    translator = RenderFrameBuilder()
+    stage = Stage(server, translator.frame(fake.snapshot), ViewOptions())
     old = fake.snapshot.description
     new = replace(old, generation=2, bodies=old.bodies[:1], n_vertices=27, n_tets=48)
     heard = []
     stage.prepare_bodies(heard.append)
     heard.clear()
-    stage.show(translator.moment(fake.show(description=new, positions=fake.snapshot.positions[:27])))
+    stage.show(translator.frame(fake.show(description=new, positions=fake.snapshot.positions[:27])))
     assert [handle.name for handle in stage.body_handles] == ["/bodies/0 body 0"]
     assert heard == [stage.body_handles]
 
@@ -87,16 +87,16 @@ def test_a_new_generation_creates_new_layers(server, fake):
 def test_springs_with_length_and_pins(server, fake):
     from supple.app.viewer.protocol.snapshots import GrabState
 
-    translator = MomentBuilder()
-    stage = Stage(server, translator.moment(fake.snapshot), ViewOptions())
+    translator = RenderFrameBuilder()
+    stage = Stage(server, translator.frame(fake.snapshot), ViewOptions())
     held = GrabState(7, "body 0", (0.0, 0.0, 0.0), (0.0, 0.3, 0.4))
-    stage.show(translator.moment(fake.show(grabs=(held,), pinned=np.array([2]))))
+    stage.show(translator.frame(fake.show(grabs=(held,), pinned=np.array([2]))))
     nodes = server.scene._handle_from_node_name
     assert nodes["/springs/7"].text == "50.0 cm"
     np.testing.assert_allclose(nodes["/springs/lines"].points, [[[0.0, 0.0, 0.0], [0.0, 0.3, 0.4]]], atol=1e-7)
     assert nodes["/springs/lines"].visible
     np.testing.assert_allclose(nodes["/pins"].points, fake.snapshot.positions[[2]])
-    stage.show(translator.moment(fake.show(grabs=(), pinned=np.zeros(0, int))))
+    stage.show(translator.frame(fake.show(grabs=(), pinned=np.zeros(0, int))))
     assert "/springs/7" not in nodes
     assert [nodes[name].visible for name in ("/springs/lines", "/pins")] == [False] * 2
 
@@ -108,7 +108,7 @@ def test_stitches_are_lines_from_vertices_to_the_places_that_were_nearest(server
         weights=np.array([[0.2, 0.3, 0.5]]),
     )
     description = replace(fake.snapshot.description, stitches=drawn)
-    stage = Stage(server, MomentBuilder().moment(fake.show(description=description)), ViewOptions())
+    stage = Stage(server, RenderFrameBuilder().frame(fake.show(description=description)), ViewOptions())
     assert stage.options.stitches
     x = fake.snapshot.positions
     points = server.scene._handle_from_node_name["/stitches"].points
@@ -122,7 +122,7 @@ def test_units_of_lengths(meters, text):
 
 @pytest.mark.parametrize(("axis", "place"), [(0, 0.5), (1, 0.37), (2, 0.81), (0, 1.0)])
 def test_a_cut_is_a_closed_surface_with_a_plane_section(fake, axis, place):
-    model = MomentBuilder().moment(fake.snapshot).model
+    model = RenderFrameBuilder().frame(fake.snapshot).model
     drawn = surface(model, Cut(axis, place))
     corners = drawn.corners(model.rest_positions)
     a, b, c = corners.transpose(1, 0, 2)
@@ -143,18 +143,18 @@ def test_a_cut_is_a_closed_surface_with_a_plane_section(fake, axis, place):
 
 
 def test_forces_are_arrows_with_a_scale(server, fake):
-    translator = MomentBuilder()
+    translator = RenderFrameBuilder()
     points, forces = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), np.array([[0.0, 30.0, 0.0], [0.0, 0.0, 15.0]])
-    stage = Stage(server, translator.moment(fake.show(contact_forces=(points, forces))), ViewOptions(contacts=True))
+    stage = Stage(server, translator.frame(fake.show(contact_forces=(points, forces))), ViewOptions(contacts=True))
     arrows = server.scene._handle_from_node_name["/forces"]
     unit = 0.5 * stage.model.view.radius / 50.0
     assert stage.force_scale == 50.0
     np.testing.assert_allclose(arrows.points, np.stack([points, points + unit * forces], axis=1), rtol=1e-6)
-    stage.show(translator.moment(fake.show(contact_forces=(points, 0.5 * forces))))
+    stage.show(translator.frame(fake.show(contact_forces=(points, 0.5 * forces))))
     assert stage.force_scale == 50.0
-    stage.show(translator.moment(fake.show(contact_forces=(points, 10.0 * forces))))
+    stage.show(translator.frame(fake.show(contact_forces=(points, 10.0 * forces))))
     assert stage.force_scale == 500.0
-    stage.show(translator.moment(fake.show(contact_forces=None)))
+    stage.show(translator.frame(fake.show(contact_forces=None)))
     assert stage.force_scale is None
     assert not arrows.visible
 
@@ -163,7 +163,7 @@ def test_a_room_is_drawn_open(server, fake):
     room = sp.obstacles.Sphere(radius=3.0, inside=True, name="bowl")
     Stage(
         server,
-        MomentBuilder().moment(fake.show(description=replace(fake.snapshot.description, obstacles=(room,)))),
+        RenderFrameBuilder().frame(fake.show(description=replace(fake.snapshot.description, obstacles=(room,)))),
         ViewOptions(),
     )
     bowl = server.scene._handle_from_node_name["/obstacles/0 bowl"]

@@ -34,9 +34,9 @@ class Cameras:
         self._server, self._stage = server, stage
         self._lock = threading.RLock()
         self._carried: dict[int, CarriedCamera] = {}  # by the number of the visitor
-        self._start = stage.moment.finite_positions.mean(axis=0)
+        self._start = stage.frame.finite_positions.mean(axis=0)
         self._center: NDArray[np.float64] | None = self._start
-        self._time = stage.moment.time  # at which the cameras have moved last
+        self._time = stage.frame.time  # at which the cameras have moved last
         self.presets = server.gui.add_button_group(
             "Camera", PRESETS, hint="Keys 1 to 5; F fits the picture to the bodies"
         )
@@ -61,25 +61,25 @@ class Cameras:
             self.follow.options = names
 
     def move(self) -> None:
-        """Called with every drawn moment: the cameras of all visitors move with what they follow."""
-        moment, center = self._stage.moment, self._followed()
+        """Called with every drawn frame: the cameras of all visitors move with what they follow."""
+        frame, center = self._stage.frame, self._followed()
         with self._lock:
             if self._center is None or center is None:
                 return
             way = center - self._center
             if self.follow.value == ALL:
-                if moment.springs:  # a camera that moves would move the mouse's target
+                if frame.springs:  # a camera that moves would move the mouse's target
                     return
-                way *= _SHARE if moment.time >= self._time else 1.0  # back at the start, nothing moves
+                way *= _SHARE if frame.time >= self._time else 1.0  # back at the start, nothing moves
             if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
                 return
-            self._center, self._time = self._center + way, moment.time
+            self._center, self._time = self._center + way, frame.time
         self._carry(lambda client: way)
 
     def fit(self, client: Any) -> None:
         """Show one visitor all bodies as they are."""
         self._carried_of(client).forget()
-        fit(client, self._stage.moment.finite_positions)
+        fit(client, self._stage.frame.finite_positions)
 
     def look(self, client: Any, preset: str) -> None:
         """Move the camera of one visitor to a preset."""
@@ -110,7 +110,7 @@ class Cameras:
 
     def _followed(self) -> NDArray[np.float64] | None:
         """(3,) the center of the body that is followed [m], that of all bodies beyond where it is free, or None."""
-        x, chosen = self._stage.moment.finite_positions, self.follow.value
+        x, chosen = self._stage.frame.finite_positions, self.follow.value
         if chosen == ALL:
             way = x.mean(axis=0) - self._start
             free = _FREE * self._stage.model.view.radius

@@ -7,12 +7,12 @@ import threading
 import time
 from typing import Any
 
-from supple.results.view.model import Moment
-from supple.results.view.page import page_of_moments
+from supple.results.view.model import RenderFrame
+from supple.results.view.page import page_of_frames
 from supple.results.view.stage import Stage
 
 _MOST_SECONDS = 120.0  # of a page
-_MOST_BYTES = 300_000_000  # of recorded moments
+_MOST_BYTES = 300_000_000  # of recorded frames
 _TALLEST = 2160  # of a screenshot [pixels]
 _PICTURE_TIMEOUT = 20.0  # software OpenGL takes seconds [s]
 
@@ -22,7 +22,7 @@ class RecordControls:
 
     def __init__(self, server: Any, stage: Stage) -> None:
         self._stage, self._lock = stage, threading.Lock()
-        self._moments: list[tuple[float, Moment]] | None = None
+        self._frames: list[tuple[float, RenderFrame]] | None = None
         self._bytes, self._began = 0, 0.0
         gui = server.gui
         with gui.add_folder("Record", expand_by_default=False):
@@ -33,16 +33,16 @@ class RecordControls:
         self.screenshot.on_click(self._send_screenshot)
         self.record.on_click(self._toggle)
 
-    def note(self, moment: Moment) -> None:
-        """Called with every drawn moment."""
+    def note(self, frame: RenderFrame) -> None:
+        """Called with every drawn frame."""
         with self._lock:
-            if self._moments is None:
+            if self._frames is None:
                 return
             seconds = time.monotonic() - self._began
             if seconds > _MOST_SECONDS or self._bytes > _MOST_BYTES:
                 return
-            self._bytes += 2 * moment.positions.nbytes
-            self._moments.append((seconds, moment))
+            self._bytes += 2 * frame.positions.nbytes
+            self._frames.append((seconds, frame))
 
     def _send_screenshot(self, event: Any) -> None:
         self.screenshot.disabled = True
@@ -55,12 +55,12 @@ class RecordControls:
 
     def _toggle(self, event: Any) -> None:
         with self._lock:
-            moments, self._moments = self._moments, None
-            if moments is None:
-                self._began, self._bytes, self._moments = time.monotonic(), 0, [(0.0, self._stage.moment)]
-            self.record.label = "Stop, and receive the page" if moments is None else "Record a page"
-        if moments is not None:
-            event.client.send_file_download("supple.html", page_of_moments(moments, self._stage.options).encode())
+            frames, self._frames = self._frames, None
+            if frames is None:
+                self._began, self._bytes, self._frames = time.monotonic(), 0, [(0.0, self._stage.frame)]
+            self.record.label = "Stop, and receive the page" if frames is None else "Record a page"
+        if frames is not None:
+            event.client.send_file_download("supple.html", page_of_frames(frames, self._stage.options).encode())
 
 
 def png_of(client: Any) -> bytes:

@@ -46,7 +46,7 @@ class Probe:
             return
         body = next(body.name for body in stage.model.bodies if body.tets.start <= tet < body.tets.stop)
         text = f"{written(value, stage.field.unit)} · {body}"
-        place = tuple(stage.moment.finite_positions[stage.model.tets[tet]].mean(axis=0))
+        place = tuple(stage.frame.finite_positions[stage.model.tets[tet]].mean(axis=0))
         if self._label is None:
             self._label = self._server.scene.add_label("/probe", text, position=place)
         else:
@@ -176,7 +176,7 @@ class ViewControls:
         self.probe.refresh()
         full = stage.force_scale
         self._overlay.show("arrows", "" if full is None else arrows_html(full))
-        found = stage.moment.contact_points
+        found = stage.frame.contact_points
         forces = "" if full is not None or not found_some(found) else " Their forces are not known."
         self._message.content = f"Contacts: {'not known' if found is None else len(found)}.{forces}"
         self._message.visible = stage.options.contacts
