@@ -1,6 +1,6 @@
 """When what was stitched together collides again: as soon as its sides are apart, after its stitches have broken.
 
-At a seam surfaces may touch, or be through each other, and contact that began there would push them apart with energy
+At a seam surfaces may touch, or penetrate, and contact that began there would push them apart with energy
 from nothing. So pairs that have broken stay excluded until nothing that they exclude is nearer than a small distance.
 """
 

@@ -97,7 +97,7 @@ def _still_meets(s: StartSurfaces, a: int, b: int) -> bool:
 
 
 def _depths(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How deep (k,) the triangles (k, 3, 3) of each pair go through each other, and approximately where (k, 3)."""
+    """How deep (k,) the triangles (k, 3, 3) of each pair penetrate each other, and approximately where (k, 3)."""
     behind = []
     for one, other in ((first, second), (second, first)):
         normal = np.cross(other[:, 1] - other[:, 0], other[:, 2] - other[:, 0])

@@ -105,7 +105,7 @@ def take_substep(
 ) -> Substep | None:
     """One step of length h [s] to the time `end` [s], from a state with the obstacles' vertices.
 
-    None where it is `divisible` and things would pass through each other if they went on as they do.
+    None where it is `divisible` and things would penetrate each other if they went on as they do.
 
     Where its integrator makes energy of the velocities before a blow, the step is taken again without its history.
     """

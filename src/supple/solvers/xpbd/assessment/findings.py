@@ -22,7 +22,7 @@ class Findings:
     Attributes
     ----------
     inverted : number of inverted tets by body, without bodies that began with some
-    overlaps : things that are through each other
+    overlaps : things that penetrate each other
     held : the share of the substeps in which the motion of bodies was shortened
     gained : energy without a source, so far, that has not been lost since, over the scene's energy [-]
     open : what works leave open, so far, over the scene's energy, where this frame has added to it [-]

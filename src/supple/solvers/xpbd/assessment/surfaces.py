@@ -1,4 +1,4 @@
-"""Whether surfaces are through each other, or vertices deep inside of obstacles, at the end of a frame."""
+"""Whether surfaces penetrate each other, or vertices an obstacle, at the end of a frame."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ MOST_PAIRS = 1000
 
 @dataclass(frozen=True)
 class Overlap:
-    """Two things that are through each other: their names, and how far.
+    """Two things that penetrate each other: their names, and how far.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Overlap:
 
 
 def crossings(overlaps: Iterable[Overlap]) -> int:
-    """Number of pairs of triangles that are through each other."""
+    """Number of pairs of triangles that penetrate each other."""
     return sum(overlap.pairs for overlap in overlaps)
 
 
@@ -138,7 +138,7 @@ class SurfaceCheck:
         self._surface, self._begins = np.concatenate(own), np.cumsum([0, *map(len, own[:-1])])
 
     def find(self, x: NDArray[np.float64], time: float, asleep: NDArray[np.bool_] | None = None) -> list[Overlap]:
-        """The things that are through each other, at world positions x (n, 3) [m] and a time [s].
+        """The things that penetrate each other, at world positions x (n, 3) [m] and a time [s].
 
         Sleeping bodies (b,) are not compared with each other and with obstacles: nothing has moved there.
         """
@@ -187,7 +187,7 @@ class SurfaceCheck:
         ]
 
     def depths(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_] | None = None) -> list[Overlap]:
-        """Bodies with vertices deep in obstacles without triangles, of the pairs `collide` (p, p)."""
+        """Bodies with vertices inside of obstacles without triangles, of the pairs `collide` (p, p)."""
         collide = self._collide if collide is None else collide
         R, t = self._poses.at(time)
         x = self.system.points.positions(x)

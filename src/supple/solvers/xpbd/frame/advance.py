@@ -99,7 +99,7 @@ def damping_in(ws: XPBDWorkspace, h: float) -> Damping | None:
 
 
 def overlaps_of(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> list[Overlap]:
-    """The things that are through each other at the world positions of the workspace."""
+    """The things that penetrate each other at the world positions of the workspace."""
     return ws.assessment.surfaces.find(ws.world, time, sleep.asleep) if ws.contact else []
 
 

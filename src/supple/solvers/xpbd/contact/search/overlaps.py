@@ -1,4 +1,4 @@
-"""Things that are through each other when a frame begins: the pairs that push them out, and what is not kept apart.
+"""Things that penetrate each other when a frame begins: the pairs that push them out, and what is not kept apart.
 
 Pairs of surfaces that cross do not keep their sides, because that would prevent their separation. A point of one thing
 that is inside of the other is pushed towards the triangle that is nearest at that time. Two edges whose nearest places
@@ -24,7 +24,7 @@ from supple.solvers.xpbd.contact.search.surface import Simplices
 
 
 class Overlaps(NamedTuple):
-    """Things that are through each other when a frame begins.
+    """Things that penetrate each other when a frame begins.
 
     Attributes
     ----------
