@@ -33,7 +33,7 @@ from supple.results.readings.reading import READINGS, Reading
 from supple.results.readings.sensor_readings import reading_of
 from supple.results.view.from_recording import model_of_recording, moment_of_frame
 from supple.scene.joints.joint import Conditions, Function, Joint
-from supple.scene.loads.load import OnBody, body_of
+from supple.scene.loads.load import OnBody
 from supple.scene.registry import PARTS, register
 from supple.scene.sensors import Sensor
 
@@ -129,9 +129,6 @@ class Thrust(OnBody):
     force: Annotated[np.ndarray, Vector()]
     name: Annotated[str | None, Name()] = None
 
-    def check(self, bodies):
-        body_of(self.body, bodies, self.label)
-
 
 def thrust_on_vertices(load: Thrust, setting: Setting) -> list[AppliedLoad]:
     body = setting.body(load.body)
@@ -200,9 +197,6 @@ class Altimeter(Sensor):
     name: Annotated[str, Name()]
     body: Annotated[str, BodyName()]
     above: Annotated[float, ANY_NUMBER] = 0.0
-
-    def check(self, bodies, obstacles):
-        body_of(self.body, bodies, self.label)
 
 
 @dataclass(frozen=True, eq=False)

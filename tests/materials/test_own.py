@@ -11,7 +11,7 @@ from tests.recordings import set_in_scene
 
 import supple as sp
 from supple.errors import OutputError, SceneError
-from supple.materials.own.formula_law import FormulaLaw
+from supple.materials.own.energy_material import FormulaLaw
 
 BULK = 4e6
 MESH = sp.shapes.box((0.3, 0.2, 0.2), (2, 1, 1))

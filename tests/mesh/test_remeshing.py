@@ -7,8 +7,8 @@ import pytest
 from tests.mesh.cad_parts import CLEAN, cup, housing, joined, noisy_scan, overlapping, turned_tetrahedron
 
 from supple.errors import MeshingError
-from supple.mesh.meshing.consent import asking
 from supple.mesh.meshing.option_names import named_for
+from supple.mesh.meshing.sizes import asking
 from supple.mesh.meshing.tetrahedralize import tetrahedralize, tetrahedralize_reported
 from supple.mesh.shapes import box_surface, sphere_surface
 

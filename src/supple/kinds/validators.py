@@ -199,7 +199,9 @@ class Name(Validator):
 
 @dataclass(frozen=True)
 class BodyName(Name):
-    """The name of a body, or of what may stand for one."""
+    """The name of a body; obstacles : whether it may also be that of an obstacle. Scenes check that it exists."""
+
+    obstacles: bool = False
 
     def bodies(self, value: Any) -> tuple[str, ...]:
         return (value,)

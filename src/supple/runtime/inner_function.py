@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dis
 import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cached_property
 from types import FunctionType
 from typing import Any
@@ -14,33 +12,6 @@ import numba
 from numba.core import compiler, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.registry import CPUDispatcher
-from numba.core.targetconfig import ConfigStack
-
-
-class Flags(compiler.Flags):
-    """Numba's, equal where functions that are compiled for a caller with these flags come out the same.
-
-    Numba compiles its own functions, such as `np.empty`, again for each set of flags of a caller, and compares flags at
-    every call that it types: 160,000 times for a first frame.
-    """
-
-    # What functions inherit, see `numba.core.cpu.CPUTargetOptions.finalize`.
-    INHERITED = ("nrt", "fastmath", "error_model", "forceinline")
-
-    def __hash__(self) -> int:
-        return 0  # Numba's own is the same for all flags, too: it sorts their names
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Flags):
-            return super().__eq__(other)
-        return self._values == other._values or all(
-            getattr(self, name) == getattr(other, name) for name in self.INHERITED
-        )
-
-
-def compare_quickly(dispatcher: Any) -> None:
-    """Let a function be compiled with `Flags` of this module."""
-    dispatcher._compiler._customize_flags = Flags
 
 
 class _LinkedLibrary(JITCodeLibrary):
@@ -71,38 +42,6 @@ class _LinkedCompiler(compiler.Compiler):
             self.state.library = _LinkedLibrary(self.state.targetctx.codegen(), "inner function")
 
 
-_OPERATIONS: dict[tuple[Any, ...], tuple[Any, Any]] = {}  # signature and implementation of operations on numbers
-
-
-@contextmanager
-def _known_operations(context: Any) -> Iterator[None]:
-    """Meanwhile the types of an operation on numbers, such as a product of two floats, are found once.
-
-    Numba asks every implementation of the operation at every use; there are 30 times as many uses as operations.
-    """
-    resolve = context.resolve_function_type
-
-    def resolve_once(function: Any, args: Any, kws: Any) -> Any:
-        numbers = all(isinstance(entry, (types.Number, types.Boolean)) for entry in args)
-        if kws or not numbers or function.__class__ is not types.Function:
-            return resolve(function, args, kws)
-        flags = ConfigStack().top()
-        key = (function, args, *(str(getattr(flags, name)) for name in Flags.INHERITED))
-        if key not in _OPERATIONS:
-            signature = resolve(function, args, kws)
-            if signature is None:
-                return None
-            _OPERATIONS[key] = signature, function.get_impl_key(signature)
-        signature, function._impl_keys[signature.args] = _OPERATIONS[key]
-        return signature
-
-    context.resolve_function_type = resolve_once
-    try:
-        yield
-    finally:
-        context.resolve_function_type = resolve
-
-
 class KernelCompiler(compiler.Compiler):
     """Compiles functions that are called from Python, with inner functions of this module linked into them.
 
@@ -113,8 +52,7 @@ class KernelCompiler(compiler.Compiler):
         collects = gc.isenabled()
         gc.disable()
         try:
-            with _known_operations(self.state.typingctx):
-                result = super().compile_extra(func)
+            result = super().compile_extra(func)
         finally:
             if collects:
                 gc.enable()
@@ -140,7 +78,6 @@ class InnerFunction(CPUDispatcher):
 
     def __init__(self, py_func: FunctionType, locals: dict[str, Any], targetoptions: dict[str, Any]) -> None:
         super().__init__(py_func, locals, {**targetoptions, "no_cpython_wrapper": True}, _LinkedCompiler)
-        compare_quickly(self)
 
     def get_call_template(self, args, kws):
         """Numba would compile a function once more for each constant, such as True, that a call passes."""

@@ -33,10 +33,10 @@ from numpy.typing import NDArray
 
 from supple.runtime import inner_function, kernel_folder
 from supple.runtime.displayed import WATCHERS, supplied
-from supple.runtime.inner_function import InnerFunction, KernelCompiler, compare_quickly, inlined_size
+from supple.runtime.inner_function import InnerFunction, KernelCompiler, inlined_size
 from supple.runtime.lock import FileLock
 from supple.runtime.parallel_kernel import ParallelKernel
-from supple.runtime.reached_code import code_of_module, reached_code
+from supple.runtime.reached_code import reached_code
 
 # Below this many rows, a loop ends before a second thread has started.
 ROWS = 500
@@ -54,7 +54,7 @@ _COMPILER = (
     sys.implementation.cache_tag,
     sys.abiflags if hasattr(sys, "abiflags") else "",
     [getattr(config, name, None) for name in _SETTINGS],
-    code_of_module(inner_function),
+    Path(inner_function.__file__).read_bytes(),
 )
 
 logger = logging.getLogger(__name__)
@@ -113,7 +113,6 @@ def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> A
         options = {**options, "nopython": True, "boundscheck": None}
         return InnerFunction(function, {}, {"forceinline": inlined_size(function) <= INLINED, **options})
     compiled: Any = numba.njit(**options, pipeline_class=KernelCompiler)(function)
-    compare_quickly(compiled)
     compiled._cache = kept = KernelCache(compiled)
     KERNELS[kept.name] = compiled
     return compiled

@@ -47,21 +47,6 @@ def reached_code(kernel: FunctionType | Dispatcher) -> bytes:
     return digest.digest()
 
 
-def code_of_module(module: ModuleType) -> bytes:
-    """A digest of what a module defines: the code of its functions and classes, and their constants."""
-    found: list[str] = []
-    pending = list(vars(module).items())
-    while pending:
-        name, value = pending.pop()
-        if isinstance(value, type) and value.__module__ == module.__name__:
-            pending += ((f"{name}.{member}", inner) for member, inner in vars(value).items())
-        elif isinstance(value, FunctionType) and value.__module__ == module.__name__:
-            found.append(f"{name} {_text(value.__code__, value.__doc__)}")
-        elif "." in name and isinstance(value, (*_NUMBERS_AND_ARRAYS, tuple)) and "__" not in name:
-            found.append(f"{name} {value!r}")
-    return hashlib.sha256("\n".join(sorted(found)).encode()).digest()
-
-
 @cache
 def _text(code: CodeType, docstring: str | None) -> bytes:
     """The content of a code object and of those in it, without line numbers and without the docstring."""

@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.checks import finite_vector
 from supple.kinds.described import Described
+from supple.kinds.kind import declared
 from supple.kinds.suggestion import suggestion
+from supple.kinds.validators import BodyName
 from supple.runtime.displayed import Showable, short_list
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
@@ -37,7 +39,7 @@ from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rigid.stiffness import with_stiffness
 from supple.scene.selection import InBox
 from supple.scene.sensors import Sensor, SurfaceSensor
-from supple.scene.stitches.stitch import Stitch, check_names
+from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, stitch_together
 
 Named = TypeVar("Named", Obstacle, Joint, Weld)
@@ -114,32 +116,26 @@ class Scene(Showable, metaclass=Described):
                         things = f"{named[item.name]} {item.name!r} and {thing} {item.name!r}"
                         raise SceneError(f"{things} have the same name; give each body and obstacle a different name")
                 named[item.name] = thing
+        self._check_names(given)
         pinned = {body.name: np.zeros(len(body.points), dtype=bool) for body in self.bodies}
         for key in ("pins", "forces", "soft_targets"):
             for i, item in enumerate(getattr(self, key)):
                 with at(*given.get(id(item), (key, i))):
                     self._check_selection(item, pinned)
-        for load in self.loads:
-            with at(*given[id(load)]):
-                load.check(self.bodies)
         for key in ("sensors", "cavities", "cables", "joints", "welds"):
             self._require_own_names(key)
-        for i, sensor in enumerate(self.sensors):
-            with at("sensors", i):
-                sensor.check(self.bodies, [str(obstacle.name) for obstacle in self.obstacles])
+        for key in ("loads", "sensors", "cables", "joints"):
+            for i, item in enumerate(getattr(self, key)):
+                with at(*given.get(id(item), (key, i))):
+                    item.check(self.bodies)
         for i, cavity in enumerate(self.cavities):
             with at("cavities", i):
                 cavity.check(self.bodies, self.cavities[:i])
-        for i, cable in enumerate(self.cables):
-            with at("cables", i):
-                cable.corners(self.bodies)
-        self._check_joints()
         self._check_welds(pinned)
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
         self._check_skins()
-        check_names(self.stitches, list(pinned), [str(obstacle.name) for obstacle in self.obstacles])
 
     def _facts(self) -> dict[str, str]:
         facts = {"bodies": short_list(body.name for body in self.bodies)}
@@ -147,6 +143,21 @@ class Scene(Showable, metaclass=Described):
         facts["obstacles"] = short_list(obstacle.name for obstacle in self.obstacles)
         facts |= {key: str(len(getattr(self, key))) for key in PARTS if key not in facts}
         return {name: value for name, value in facts.items() if value not in ("", "0")}
+
+    def _check_names(self, given: Mapping[int, tuple[str, int]]) -> None:
+        """Raise where a declared field names a body, or an obstacle, that does not exist."""
+        bodies = [body.name for body in self.bodies]
+        known = {False: bodies, True: [*bodies, *(str(obstacle.name) for obstacle in self.obstacles)]}
+        for key in PARTS:
+            for i, item in enumerate(getattr(self, key)):
+                for field, one in declared(type(item)).items():
+                    name, of = getattr(item, field), one.validator
+                    if isinstance(of, BodyName) and name is not None and name not in known[of.obstacles]:
+                        what = "body or obstacle" if of.obstacles else "body"
+                        with at(*given.get(id(item), (key, i)), field):
+                            raise SceneError(
+                                f"{item.label}: {what} {name!r} does not exist; {suggestion(name, known[of.obstacles])}"
+                            )
 
     def _require_own_names(self, key: str) -> None:
         taken: set[str | None] = set()
@@ -172,13 +183,6 @@ class Scene(Showable, metaclass=Described):
                                 f"{key}; give it collide='tets'"
                             )
 
-    def _check_joints(self) -> None:
-        bodies = {body.name: body for body in self.bodies}
-        obstacles = {str(obstacle.name): obstacle for obstacle in self.obstacles}
-        for i, joint in enumerate(self.joints):
-            with at("joints", i):
-                joint.check(bodies, obstacles)
-
     def _check_welds(self, pinned: dict[str, NDArray[np.bool_]]) -> None:
         vertices, weld_of, begin = self.welding.vertices, self.welding.weld, 0
         for body in self.bodies:
@@ -194,12 +198,7 @@ class Scene(Showable, metaclass=Described):
             begin += count
 
     def _check_selection(self, item: Pin | Force | SoftTarget, pinned: dict[str, NDArray[np.bool_]]) -> None:
-        """Raise where body or vertices do not exist, or a pin selects vertices that are `pinned`, then mark these."""
-        if item.body not in pinned:
-            with at("body"):
-                raise SceneError(
-                    f"{item.label}: body {item.body!r} does not exist; {suggestion(item.body, list(pinned))}"
-                )
+        """Raise where vertices do not exist, or a pin selects vertices that are `pinned`, then mark these."""
         body, held = self.body(item.body), pinned[item.body]
         item.check_kind_of_body(isinstance(body, RigidBody))
         with at("box" if isinstance(item.vertices, InBox) else "vertices"):

@@ -5,7 +5,7 @@ What they feel is computed in `supple.results.readings.sensor_readings`.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.kind import Kind
-from supple.kinds.suggestion import suggestion
 from supple.kinds.validators import BodyName, Counts, Direction, Name, Vector
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TRIANGLES, Region, body_of, surface_region
@@ -31,9 +30,8 @@ class Sensor(Kind, ABC):
 
     name: str
 
-    @abstractmethod
-    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
-        """Raise `SceneError` where it does not fit these bodies, and the names of obstacles."""
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        """Raise `SceneError` where it does not fit these bodies."""
 
 
 class SurfaceSensor(Sensor):
@@ -42,7 +40,7 @@ class SurfaceSensor(Sensor):
     body: str
     region: Region
 
-    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
         self.triangles(bodies)
 
     def triangles(self, bodies: Sequence[PlacedBody]) -> NDArray[np.int64]:
@@ -78,15 +76,12 @@ class ForceSensor(SurfaceSensor):
     name: Annotated[str, Name()]
     body: Annotated[str, BodyName()]
     region: Annotated[Region, TRIANGLES] = None
-    by: Annotated[str | None, BodyName()] = None
+    by: Annotated[str | None, BodyName(obstacles=True)] = None
 
-    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
-        super().check(bodies, obstacles)
-        known = [name for name in (*(body.name for body in bodies), *obstacles) if name != self.body]
-        if self.by is not None and self.by not in known:
-            raise SceneError(
-                f"{self.label}: other body or obstacle {self.by!r} does not exist; {suggestion(self.by, known)}"
-            )
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.by == self.body:
+            raise SceneError(f"{self.label}: by is its own body, {self.body!r}; name another body or an obstacle")
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +150,7 @@ class AngleSensor(OnVertices, Sensor):
     vertices: Annotated[Selection | None, Vertices()] = None
     axis: Annotated[ArrayLike | None, Direction()] = None
 
-    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
         body = body_of(self.body, bodies, self.label)
         self.check_kind_of_body(isinstance(body, RigidBody))
         placed = body.place(body.points)
@@ -189,6 +184,6 @@ class DistanceSensor(Sensor):
     first: Annotated[Point, PointValidator()]
     second: Annotated[Point, PointValidator()]
 
-    def check(self, bodies: Sequence[PlacedBody], obstacles: Sequence[str]) -> None:
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
         for key in ("first", "second"):
             point_corners(getattr(self, key), bodies, f"{self.label}: {key}")

@@ -215,7 +215,7 @@ def test_a_pad_that_is_pressed_has_its_force_displacement_and_work(solver, tmp_p
 @pytest.mark.parametrize(
     ("sensor", "reason"),
     [
-        (sp.ForceSensor("a", "block", by="flor"), "other body or obstacle 'flor' does not exist; did you mean 'floor'"),
+        (sp.ForceSensor("a", "block", by="flor"), "body or obstacle 'flor' does not exist; did you mean 'floor'"),
         (sp.AngleSensor("a", "block", [0, 1]), "2 vertices are on one line"),
         (sp.AngleSensor("a", "block"), "give the vertices"),
         (
@@ -227,3 +227,5 @@ def test_a_pad_that_is_pressed_has_its_force_displacement_and_work(solver, tmp_p
 def test_sensors_that_do_not_fit_the_scene(sensor, reason):
     with pytest.raises(sp.SceneError, match=reason):
         sp.Scene([sp.Body("block", MESH, RUBBER)], [sp.HalfSpace(name="floor")], sensors=[sensor])
+    with pytest.raises(sp.SceneError, match="by is its own body, 'block'"):
+        sp.ForceSensor("a", "block", by="block")

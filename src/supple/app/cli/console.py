@@ -108,7 +108,7 @@ def set_up_log(*, quiet: bool) -> None:
 @contextmanager
 def reading(yes: bool = False, what: str = "reading the scene and making its meshes") -> Iterator[None]:
     """Shows in a terminal that meshes are made; asks where they get very large, unless `yes`."""
-    from supple.mesh.meshing.consent import asking
+    from supple.mesh.meshing.sizes import asking
 
     console = Console(stderr=True)
     status = console.status(what)

@@ -24,8 +24,7 @@ from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.splitting import tets_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.io.text import file_contents, without_mark
-from supple.mesh.merge import merge_map
-from supple.mesh.topology import has_vertex_twice, repeats_another, without_unused
+from supple.mesh.topology import has_vertex_twice, merge_map, repeats_another, without_unused
 from supple.runtime.replacing import whole_files
 
 logger = logging.getLogger(__name__)

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from supple.errors import MeshingError
-from supple.mesh.merge import merge_map
 from supple.mesh.meshing.child_process import Limits, run_mesher
 from supple.mesh.meshing.facing import consistently_oriented
 from supple.mesh.meshing.holes import close_holes
 from supple.mesh.meshing.option_names import option
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
-from supple.mesh.topology import facet_keys, has_vertex_twice
+from supple.mesh.topology import facet_keys, has_vertex_twice, merge_map
 
 logger = logging.getLogger(__name__)
 

@@ -1,12 +1,17 @@
-"""How large tets become: a bound on their volume from the length of edges, or from the number of tets."""
+"""How large tets become: a bound on their volume from the length of edges, or from the number of tets.
+
+Where a mesh becomes much larger than what was asked for, whoever wants it is asked.
+"""
 
 from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from supple.errors import MeshingError
-from supple.mesh.meshing.consent import agreed, beforehand
 from supple.mesh.meshing.meshers import TETS_OF_SQUARE
 from supple.mesh.meshing.option_names import option
 from supple.mesh.surface import SurfaceMesh
@@ -98,3 +103,30 @@ def allow(why: str, needed: int, tets: int) -> None:
     if not agreed(many):
         more = option("tets", int(float(f"{1.05 * needed:.2g}")))
         raise MeshingError(f"{many}; ask for them ({more}{beforehand()}), or give a simpler or thicker surface")
+
+
+# The function that asks, and what says yes beforehand.
+_ASK: ContextVar[tuple[Callable[[str], bool], str] | None] = ContextVar("ask", default=None)
+
+
+@contextmanager
+def asking(ask: Callable[[str], bool], beforehand: str) -> Iterator[None]:
+    """Meshing inside puts its questions to `ask`, which returns whether to continue; an option says yes
+    `beforehand`."""
+    token = _ASK.set((ask, beforehand))
+    try:
+        yield
+    finally:
+        _ASK.reset(token)
+
+
+def agreed(question: str) -> bool:
+    """The answer; no where nobody is asked, as in a program or a scene file."""
+    ask = _ASK.get()
+    return ask is not None and ask[0](question)
+
+
+def beforehand() -> str:
+    """The option that says yes beforehand, with a comma; empty where nobody is asked."""
+    ask = _ASK.get()
+    return "" if ask is None else f", {ask[1]}"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,12 +69,7 @@ def stuffed(surface: SurfaceMesh, tets: int | None, edge: float | None) -> tuple
     length = edge or MEAN_EDGE * (12.0 * volume / (tets or 1)) ** (1.0 / 3.0)
     best, made, longest = None, None, np.inf  # edges of that length lose walls
     for _ in range(_MOST_TRIES if tets else 1):
-        try:
-            made = stuff("stuffing", inside, (middle - half, middle + half), length, _BISECTIONS)
-        except MeshError as error:
-            if "no tet is left" not in str(error):
-                raise MeshingError(str(error).replace("make edge_length longer", "ask for fewer tets")) from None
-            made = None
+        made = _lattice(inside, (middle - half, middle + half), length)
         wanted = tets or 0
         if made is None or not _keeps_walls(made, volume, surface):
             longest = length
@@ -96,6 +93,18 @@ def stuffed(surface: SurfaceMesh, tets: int | None, edge: float | None) -> tuple
         allow(f"a lattice that keeps the surface's walls has {len(best.tets):,} tets", len(best.tets), tets)
         logger.warning("%s tets instead of %s: longer ones lose walls", f"{len(best.tets):,}", f"{tets:,}")
     return as_large(best, volume), volume
+
+
+def _lattice(
+    inside: Callable[[NDArray[np.float64]], NDArray[np.float64]], box: tuple[Any, Any], length: float
+) -> TetMesh | None:
+    """The tets of one lattice with edges of a length [m]; None where it has none inside."""
+    try:
+        return stuff("stuffing", inside, box, length, _BISECTIONS)
+    except MeshError as error:
+        if "no tet is left" in str(error):
+            return None
+        raise MeshingError(str(error).replace("make edge_length longer", "ask for fewer tets")) from None
 
 
 def _keeps_walls(mesh: TetMesh, volume: float, surface: SurfaceMesh) -> bool:

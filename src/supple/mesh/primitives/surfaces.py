@@ -8,10 +8,10 @@ from typing import Annotated
 import numpy as np
 
 from supple.kinds.validators import POSITIVE
-from supple.mesh.merge import merge_map
 from supple.mesh.primitives.shape import shape
 from supple.mesh.primitives.sizes import edge_of_torus, edge_or_share, fits, not_too_many
 from supple.mesh.surface import SurfaceMesh
+from supple.mesh.topology import merge_map
 
 
 @shape

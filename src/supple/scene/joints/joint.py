@@ -15,7 +15,7 @@ and further ones can be added, see `supple.model.joints.functions`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -24,11 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.kinds.kind import Kind
-from supple.kinds.suggestion import suggestion
 from supple.kinds.validators import BodyName, Boolean, Name, Vector
 from supple.scene.body import PlacedBody
 from supple.scene.located import at
-from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 
 FREE = (-np.inf, np.inf)
@@ -97,7 +95,7 @@ class Joint(Kind, ABC):
     title: ClassVar[str] = "joint"
 
     first: Annotated[str, BodyName()]
-    second: Annotated[str | None, BodyName()] = None
+    second: Annotated[str | None, BodyName(obstacles=True)] = None
     point: Annotated[ArrayLike | None, Vector()] = None
     collide: Annotated[bool, Boolean()] = False
     name: Annotated[str | None, Name()] = None
@@ -132,27 +130,17 @@ class Joint(Kind, ABC):
     def conditions(self) -> Conditions:
         """What holds between the two sides, and what is measured."""
 
-    def check(self, bodies: Mapping[str, PlacedBody], obstacles: Mapping[str, Obstacle]) -> None:
-        """Raise `SceneError` where what it joins does not exist, or is soft."""
-        with at("first"):
-            self._rigid(self.first, bodies)
-        if self.second is not None and self.second not in obstacles:
-            with at("second"):
-                self._rigid(self.second, bodies, obstacles)
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        """Raise `SceneError` where a body that it joins is soft."""
+        soft = [body.name for body in bodies if not isinstance(body, RigidBody)]
+        for key in ("first", "second"):
+            if getattr(self, key) in soft:
+                with at(key):
+                    raise SceneError(f"{self.label}: body {getattr(self, key)!r} is soft; joints join rigid bodies")
 
     def place(self, body: RigidBody) -> NDArray[np.float64]:
         """(3,) the joint's point in the world, where the scene places its first body [m]."""
         return body.place(body.properties.center) if self.point is None else np.asarray(self.point)
-
-    def _rigid(
-        self, name: str, bodies: Mapping[str, PlacedBody], obstacles: Mapping[str, Obstacle] | None = None
-    ) -> None:
-        if name not in bodies:
-            known = [key for key, body in bodies.items() if isinstance(body, RigidBody)] + list(obstacles or ())
-            what = "body" if obstacles is None else "body or obstacle"
-            raise SceneError(f"{self.label}: {what} {name!r} does not exist; {suggestion(name, known)}")
-        if not isinstance(bodies[name], RigidBody):
-            raise SceneError(f"{self.label}: body {name!r} is soft; joints join rigid bodies")
 
 
 def axes_along(axis: ArrayLike | None) -> NDArray[np.float64]:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.kinds.suggestion import suggestion
 from supple.kinds.validators import POSITIVE, BodyName, Name
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.body import PlacedBody
@@ -59,12 +58,10 @@ class Weld(OnVertices):
 
         Raises
         ------
-        SceneError : where one does not exist, or is of the other kind.
+        SceneError : where one is of the other kind.
         """
         for key, name, rigid in (("body", self.body, False), ("rigid", self.rigid, True)):
             with at(key):
-                if name not in bodies:
-                    raise SceneError(f"{self.label}: body {name!r} does not exist; {suggestion(name, list(bodies))}")
                 if isinstance(bodies[name], RigidBody) != rigid:
                     what = "soft" if rigid else "rigid"
                     raise SceneError(f"{self.label}: body {name!r} is {what}; a weld is of a soft body to a rigid one")

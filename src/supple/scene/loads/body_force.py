@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
 from supple.kinds.validators import BodyName, Name
-from supple.scene.body import PlacedBody
-from supple.scene.loads.load import Load, body_of
+from supple.scene.loads.load import Load
 from supple.scene.loads.over_time import Curve, OverTimeOf, value_at
 
 
@@ -38,10 +37,6 @@ class BodyForce(Load):
     force: Annotated[ArrayLike | Curve | Callable[[NDArray[np.float64], float], ArrayLike], OverTimeOf((3,))]
     body: Annotated[str | None, BodyName()] = None
     name: Annotated[str | None, Name()] = None
-
-    def check(self, bodies: Sequence[PlacedBody]) -> None:
-        if self.body is not None:
-            body_of(self.body, bodies, self.label)
 
     @property
     def is_uniform(self) -> bool:

@@ -60,6 +60,10 @@ class Cable(Kind):
             remedy = "give it" if self.stiffness is None else "it has no effect with tension; leave it out"
             raise SceneError(f"{self.label}: stiffness is {self.stiffness!r}; {remedy}")
 
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        """Raise `SceneError` where it does not fit these bodies."""
+        self.corners(bodies)
+
     def corners(
         self, bodies: Sequence[PlacedBody]
     ) -> list[tuple[str | None, NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]]:

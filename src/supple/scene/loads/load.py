@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +23,6 @@ class Load(Kind, ABC):
 
     name: str | None
 
-    @abstractmethod
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         """Raise `SceneError` where it does not fit these bodies."""
 

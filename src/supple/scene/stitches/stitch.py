@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
 
@@ -13,10 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.checks import float_array
 from supple.kinds.kind import Kind
-from supple.kinds.suggestion import suggestion
 from supple.kinds.validators import NON_NEGATIVE, POSITIVE, BodyName, Choice, Name, Number, Validator
 from supple.numerics.geometry.triangle_tree import TriangleTree, pair_distances
-from supple.scene.located import at
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side
 
@@ -90,7 +87,7 @@ class Stitch(Kind, ABC):
     exactly_one: ClassVar[tuple[str, ...]] = ("pairs", "max_distance")
 
     first: Annotated[str, BodyName()]
-    second: Annotated[str, BodyName()]
+    second: Annotated[str, BodyName(obstacles=True)]
     pairs: Annotated[ArrayLike | None, PairList()] = field(default=None, kw_only=True)
     max_distance: Annotated[float | None, POSITIVE] = field(default=None, kw_only=True)
     pairing: Annotated[str, Choice(("closest", "all"))] = field(default="closest", kw_only=True)
@@ -194,20 +191,3 @@ def _without_round_off(distances: NDArray[np.float64], first: Side, second: Side
     """Zero for pairs that touch: round-off would stretch a spring of 1e-17 m by a factor of 1e9."""
     size = max(float(np.abs(side.points).max(initial=0.0)) for side in (first, second))
     return np.where(distances <= 8.0 * np.finfo(np.float64).eps * size, 0.0, distances)
-
-
-def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Sequence[str]) -> None:
-    """Raise where a stitch names an unknown body or obstacle.
-
-    Raises
-    ------
-    SceneError : names the known ones.
-    """
-    for number, stitch in enumerate(stitches):
-        for name, what, known in (
-            (stitch.first, "body", bodies),
-            (stitch.second, "body or obstacle", [*bodies, *obstacles]),
-        ):
-            if name not in known:
-                with at("stitches", number):
-                    raise SceneError(f"{stitch.label}: {what} {name!r} does not exist; {suggestion(name, known)}")

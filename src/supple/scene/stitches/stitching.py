@@ -261,7 +261,7 @@ def no_stitching(body_vertices: int) -> Stitching:
 def stitch_together(
     bodies: Sequence[PlacedBody], obstacles: Sequence[Obstacle], stitches: Sequence[Stitch]
 ) -> Stitching:
-    """Find the pairs of all stitches, and number them. All names must exist, see `check_names` of `stitch.py`.
+    """Find the pairs of all stitches, and number them. All names must exist.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from supple.mesh.io.cells import CellSoup, FormatError
 from supple.mesh.io.libraries.positions_file import Facts, written_series
 from supple.mesh.io.libraries.usd import cells_of_prim, rows_of
-from supple.mesh.io.tets_and_triangles import cells_of
+from supple.mesh.io.splitting import cells_of
 
 
 def read_series(path: Path, out: Path) -> Facts:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from supple.mesh.io.cells import POLYGON, TRIANGLE_STRIP, CellSoup, FormatError
 from supple.mesh.io.libraries.positions_file import Facts, written_series
-from supple.mesh.io.tets_and_triangles import cells_of
+from supple.mesh.io.splitting import cells_of
 
 _KINDS = {"Polygons": POLYGON, "Strips": TRIANGLE_STRIP}
 

@@ -12,7 +12,7 @@ from supple.errors import MeshError
 from supple.mesh.io.cells import CellSoup, FormatError
 from supple.mesh.io.mesh_files import located, read_contents
 from supple.mesh.io.series.series import Cells, OtherCells, Series
-from supple.mesh.io.tets_and_triangles import cells_of
+from supple.mesh.io.splitting import cells_of
 
 MAX_FRAMES = 1_000_000
 
