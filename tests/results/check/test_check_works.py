@@ -304,3 +304,38 @@ def test_forces_that_differ_from_vertex_to_vertex_and_springs_of_the_length_at_t
     report = checked(later)
     assert report.ok, str(report)
     assert "without springs: a length at the start is not in a recording that begins later" in report["works"].message
+
+
+@pytest.mark.parametrize("solver", [sp.Implicit(), sp.XPBD(substeps=20)], ids=["implicit", "xpbd"])
+def test_loads_on_rigid_and_soft_bodies_together(tmp_path, solver):
+    """Also several of one kind, and muscles in tets that grow: each force follows from the declared load."""
+    box = sp.shapes.box((0.2, 0.1, 0.1), (3, 2, 2))
+    block = sp.shapes.box_surface((0.1, 0.1, 0.1), (2, 2, 2))
+    bodies = [
+        sp.Body("soft", box, RUBBER, position=(0, 0.5, 0)),
+        sp.Body("other", box, RUBBER, position=(0, 1, 0), rotation=(0.2, 0.3, 0.1)),
+        sp.RigidBody("rigid", block, mass=0.8, position=(0.5, 0.5, 0), rotation=(0.4, 0, 0.2)),
+    ]
+    loads = [
+        sp.Traction("rigid", lambda t: (30 * np.sin(9 * t), 40, -20)),
+        sp.Traction("soft", (0, 50, 20), sp.InBox((0.09, -1, -1), (0.2, 1, 1))),
+        sp.Spring(("soft", 3), ("rigid", (0.02, 0, 0.01)), stiffness=15.0),
+        sp.Spring(("other", (0.05, 0, 0)), ("soft", (0, 0.01, 0)), stiffness=5.0, rest_length=lambda t: 0.4 + t),
+        sp.Wind("other", (3.0, 0, 1), drag=1.0),
+        sp.BodyForce((0, 1, 2), "other"),
+        sp.BodyForce((0.5, 0, 0)),
+        sp.Growth("other", lambda t: 1 + 0.5 * t, direction=(1, 0, 0)),
+        sp.Muscle("other", 2e3, (1, 0, 0), lambda t: np.sin(9 * t) ** 2),
+    ]
+    forces = [
+        sp.Force("rigid", [0, 3, 5], lambda t: (0, 4 + t, 0)),
+        sp.Force("soft", [0, 7], [[0, 0.3, 0], [0.1, 0, 0]]),
+    ]
+    points = [("soft", 2), ("rigid", (0, 0.04, 0)), (None, (1, 1, 0))]
+    cables = [sp.Cable(points, tension=sp.Curve([0.0, 0.2], [0.0, 2.0]))]
+    scene = sp.Scene(bodies, loads=loads, forces=forces, cables=cables)
+    path = recorded(tmp_path / "r.vtkhdf", scene, solver, 1 / 120, 10)
+    report = checked(path)
+    assert report.ok, str(report)
+    names = "body_forces, cables, forces, muscles, springs, tractions and wind"
+    assert report["works"].message.startswith(f"those of {names} agree")
