@@ -84,12 +84,13 @@ class RowSolver:
         """Solve the rows of contacts and of joints."""
         nodes, rigid = self._nodes, self._rigid
         moving = Moving(nodes.x, nodes.begin, nodes.v, nodes.impulses, nodes.bodies, rigid.control, rigid.welds)
-        contacts = moving, nodes.embedded, rows, count, self.islands, self._tolerances(h)
+        find_islands(nodes.x, rows, count, self.islands)
+        contacts = (rows, count, self.islands, self._tolerances(h)) if count else None
         at_once = MOST_LINEARIZATIONS if joints.at_once else 1
         for first in range(0, MOST_LINEARIZATIONS, at_once):
             joints.evaluate_others(nodes.x)
             turns = first, first + at_once
-            done, self.left = solve_joined(*contacts, joints.record, joints.substep, h, turns)
+            done, self.left = solve_joined(moving, nodes.embedded, contacts, joints.record, joints.substep, h, turns)
             if done:
                 break
 
@@ -131,7 +132,7 @@ class Moving(NamedTuple):
 
 
 @njit(cache=True)
-def solve_joined(moving, embedded, rows, count, islands, tolerances, joints, substep, h, turns):
+def solve_joined(moving, embedded, contacts, joints, substep, h, turns):
     """Solve the rows of contacts and of joints in a substep of h [s].
 
     Rows of joints are linear in small turns of bodies. They are linearized again at the same places, from the first of
@@ -146,17 +147,14 @@ def solve_joined(moving, embedded, rows, count, islands, tolerances, joints, sub
         begin_rows(constants, functions, joint_rows, joints.step[substep], joints.given[substep])
     offsets = joints.offsets[substep + 1]
     most = max(MOST_JOINT_SWEEPS, SWEEPS_PER_JOINT * len(moving.control))
-    find_islands(x, rows, count, islands)
     for turn in range(turns[0], turns[1]):
         linearize(constants, functions, joint_rows, offsets, x, moving.begin, bodies.arms, bodies.w, bodies.J, h)
-        hold_bodies(x, bodies, rows, count)
         before = x[:n, :3].copy()
-        if count:
-            exact = JOINT_EXACT if turn else 0.0
-            contacts = x, bodies, moving.begin, rows, count, islands
-            off, left = _sweep_both(contacts, joint_rows, exact, tolerances, most)
-        else:
+        if contacts is None:
             off = _sweep_alone(joint_rows, bodies.twists, most)
+        else:
+            enough = JOINT_EXACT if turn else 0.0
+            off, left = _sweep_both(x, bodies, moving.begin, contacts, joint_rows, enough, most)
         _take_over(moving, embedded, joint_rows, before, h)
         note_rows(constants, functions, joint_rows, x, h)
         if off <= JOINT_EXACT:
@@ -164,16 +162,17 @@ def solve_joined(moving, embedded, rows, count, islands, tolerances, joints, sub
     return False, left
 
 
-@njit
-def _sweep_both(contacts, joints, enough, tolerances, most):
+@njit(forceinline=False)
+def _sweep_both(x, bodies, begin, contacts, joints, enough, most):
     """Sweep over joints and contacts in turn until both change little, at most this many times; see `solve`.
 
     enough : contacts are left alone if joints need smaller corrections, as shares of their size
 
     Returns the largest correction of joints in the first turn, and what the last sweep over contacts changed, in gaps.
     """
-    points, bodies, begin, rows, count, islands = contacts
+    rows, count, islands, tolerances = contacts
     first, residual = np.inf, 0.0
+    hold_bodies(x, bodies, rows, count)
     for turn in range(most):
         largest = 0.0
         for k in range(_INNER):
@@ -185,13 +184,13 @@ def _sweep_both(contacts, joints, enough, tolerances, most):
             first = largest
             if first <= enough:
                 break
-        _, residual = solve(points, bodies, begin, rows, count, islands, tolerances, (1, 1))
+        _, residual = solve(x, bodies, begin, rows, count, islands, tolerances, (1, 1))
         if largest <= _SMALL and residual <= tolerances[0] and islands.changes.max() <= tolerances[1]:
             break
     return first, residual
 
 
-@njit
+@njit(forceinline=False)
 def _sweep_alone(joints, twists, most):
     """Sweep over joints, at most this many times; returns half of the square of the largest turn."""
     for turn in range(most):
@@ -203,7 +202,7 @@ def _sweep_alone(joints, twists, most):
     return 0.5 * largest
 
 
-@njit
+@njit(forceinline=False)
 def _take_over(moving, embedded, joints, before, h):
     """Give velocities the changes of places since `before` (n, 3), and of bodies.
 

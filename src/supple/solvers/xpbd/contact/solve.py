@@ -64,7 +64,7 @@ def _turn(out, scale, points, bodies, begin, nodes, e, moment):
 def solve(points, bodies, begin, rows, count, islands, tolerances, most):
     """Sweep over the rows of each active island until no sweep changes an n . r by more than its tolerance.
 
-    tolerances : in gaps, and of islands with rigid bodies also [m]
+    tolerances : in gaps, and of rows on rigid bodies also [m]
     most : the largest number of sweeps of islands without and with rigid bodies
 
     Returns the number of sweeps, and the largest change in the last one of any island, in gaps.
@@ -92,7 +92,8 @@ def solve(points, bodies, begin, rows, count, islands, tolerances, most):
                 continue
             moved = abs(push - before) / mass
             islands.residual[island] = max(islands.residual[island], moved / rows.gaps[e])
-            islands.changes[island] = max(islands.changes[island], moved)
+            if rows.rigid[e]:
+                islands.changes[island] = max(islands.changes[island], moved)
             held = (f[0] - before * n[0], f[1] - before * n[1], f[2] - before * n[2])
             slip = (r[0] - s * n[0], r[1] - s * n[1], r[2] - s * n[2])
             if rows.friction[e] > 0.0 and rows.rigid[e]:

@@ -142,7 +142,7 @@ def begin_rows(joints, functions, rows, step, given):
         joints[k].on_corners[:] = 0.0
 
 
-@njit
+@njit(forceinline=False)
 def linearize(joints, functions, rows, offsets, x, begin, arms, w, J, h):
     """Set the rows at places x (N, >= 3), in a substep of h [s] that began at `begin` (N, 3).
 
@@ -219,7 +219,7 @@ def sweep_joints(rows, twists, turn):
     return largest
 
 
-@njit
+@njit(forceinline=False)
 def note_rows(joints, functions, rows, x, h):
     """Add up the impulses of rows that have been solved; x (N, >= 3) places of the control points."""
     arm = np.zeros(3)
