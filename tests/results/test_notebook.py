@@ -5,8 +5,6 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-import nbclient
-import nbformat
 import numpy as np
 import pytest
 from rich.console import Console
@@ -144,6 +142,9 @@ def test_progress_in_a_notebook_is_a_line_that_changes(tools, capsys):
 
 
 def test_the_notebook_runs(tmp_path):
+    import nbclient  # not above: each process of the tests would import it
+    import nbformat
+
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells), "clear the outputs before you save the notebook"
     nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
