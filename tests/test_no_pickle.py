@@ -1,12 +1,14 @@
 """No file and no connection from outside is read by pickle, which would execute whatever is in it."""
 
 import ast
+import re
 from pathlib import Path
 
 import supple
 
 ROOT = Path(supple.__file__).parent
 MODULES = {"pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve", "_pickle"}
+WORDS = re.compile("pickle|dill|joblib|marshal|shelve|yaml|fromregex|eval|exec")  # parsing every file takes seconds
 # Calls that are safe: kernels in the user's own folder; bytes are only hashed; a pipe to a child of the same program.
 ALLOWED = {
     "runtime/kernel_cache.py": {"pickle.loads"},
@@ -17,8 +19,10 @@ ALLOWED = {
 
 def uses(path):
     """`module.name` for everything that a file takes from such modules, and loads of NumPy or YAML that would do it."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    found, text = set(), path.read_text(encoding="utf-8")
+    if not WORDS.search(text):
+        return found
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in MODULES:
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in MODULES:

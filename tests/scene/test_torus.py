@@ -29,7 +29,7 @@ def test_a_small_ball_falls_through_the_hole(solver):
 @BOTH
 def test_a_large_ball_rests_in_it_and_the_check_agrees(solver, tmp_path):
     path = tmp_path / "ring.vtkhdf"
-    frames = converged(sp.simulate(sp.Scene([ball(0.3, 0.28)], [RING]), solver, 1 / 60, 45, sinks=[sp.Recorder(path)]))
+    frames = converged(sp.simulate(sp.Scene([ball(0.3, 0.28)], [RING]), solver, 1 / 60, 31, sinks=[sp.Recorder(path)]))
     last = frames[-1].positions["ball"]
     distances, _ = RING.signed_distance(last)
     assert -1e-9 < distances.min() < 3e-3

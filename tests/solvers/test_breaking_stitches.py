@@ -183,7 +183,7 @@ def test_what_was_torn_off_falls_back_onto_what_it_was_stitched_to(tmp_path, sol
     else:
         scene = sp.Scene([top], [sp.obstacles.TriangleObstacle(name="plate", surface=plate)], **parts)
     path = tmp_path / "r.vtkhdf"
-    frames = list(sp.simulate(scene, solver, DT, 24, sinks=[sp.Recorder(path)]))
+    frames = list(sp.simulate(scene, solver, DT, 17, sinks=[sp.Recorder(path)]))
     assert len(broken(frames)) >= 1
     assert len(frames[-1].state.separated_stitches) == len(scene.stitching) >= 5
     heights = [frame.positions["top"][:, 1].min() for frame in frames]
@@ -192,7 +192,7 @@ def test_what_was_torn_off_falls_back_onto_what_it_was_stitched_to(tmp_path, sol
     assert heights[-1] < 0.026
     assert {str(frame.report.status) for frame in frames} == {"converged"}
     begun = next(frame for frame in frames if len(frame.state.separated_stitches))
-    rest = sp.simulate(scene, solver, DT, 24 - begun.index, start=begun)
+    rest = sp.simulate(scene, solver, DT, 17 - begun.index, start=begun)
     assert all(map(same_bits, frames[begun.index :], rest))
     with sp.read_recording(path) as recording:
         report = recording.check()

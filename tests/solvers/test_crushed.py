@@ -24,7 +24,7 @@ def ball(youngs, height=0.11):
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 def test_a_stiffness_in_megapascals_is_told_at_the_start_and_in_each_crushed_frame(solver, caplog):
     with caplog.at_level(logging.WARNING, logger="supple"):
-        frames = list(sp.simulate(ball(0.05), solver(), dt=1 / 60, steps=14))
+        frames = list(sp.simulate(ball(0.05), solver(), dt=1 / 60, steps=7))
     assert "E = 0.05 Pa" in caplog.text
     assert "did you mean 0.05 MPa (youngs=5e+04)?" in caplog.text
     reports = [frame.report for frame in frames if frame.report.min_det_F < 0.25]

@@ -192,7 +192,7 @@ def test_swing_and_twist_of_a_ball_are_limited_and_the_check_finds_larger_ones(s
     for rate in (3.0, -3.0):
         path = tmp_path / f"{rate}.vtkhdf"
         scene = sp.Scene([bar(angular_velocity=(rate, 0, 0))], joints=[joint])
-        frames = run(solver, scene, 50, sinks=[sp.Recorder(path, solver=SOLVERS[solver][0])])
+        frames = run(solver, scene, 35, sinks=[sp.Recorder(path, solver=SOLVERS[solver][0])])
         twists[rate] = np.array([twist_of(frame.poses["bar"].rotation) for frame in frames])
         swings = coordinates(frames, "ball")
         directions = np.array([frame.poses["bar"].rotation[:, 0] for frame in frames])

@@ -66,7 +66,7 @@ def test_a_falling_body_reaches_its_terminal_velocity(solver):
     areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 1]
     mass, area = 40.0 * mesh.volume, 0.5 * np.abs(areas).sum()
     terminal = np.sqrt(2.0 * mass * 9.81 / (10.0 * 0.47 * area))
-    frames = converged(sp.simulate(scene, solver, 0.02, 100))
+    frames = converged(sp.simulate(scene, solver, 0.02, 70))
     times = np.array([frame.time for frame in frames])
     speeds = np.array([-frame.report.linear_momentum[1] / mass for frame in frames])
     assert speeds[-1] == pytest.approx(terminal, rel=1e-2)
