@@ -23,13 +23,13 @@ def with_stitched_points(system: System) -> System:
     nodes = system.stitching.apart
     if not len(nodes):
         return system
-    seen = system.effective_masses
+    effective = system.effective_masses
     light = np.full(len(nodes), LIGHT * float(system.masses[system.masses > 0.0].min()))
     return replace(
         system,
         rest_positions=with_rows(nodes.positions(system.rest_positions), system.rest_positions),
         masses=np.concatenate([system.masses, light]),
-        effective_masses=None if seen is None else np.concatenate([seen, light]),
+        effective_masses=None if effective is None else np.concatenate([effective, light]),
         components=np.concatenate([system.components, system.components[nodes.control[:, 0]]]),
         welding=system.welding.with_vertices(nodes.numbers, nodes.control, nodes.weights),
         stitching=system.stitching.with_rigid_vertices(),

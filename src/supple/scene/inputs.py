@@ -27,7 +27,7 @@ class Ramp:
     last: NDArray[np.float64]
 
     def straight(self, time: float) -> NDArray[np.float64]:
-        """The value at `time` [s] on the straight way from the first to the last."""
+        """The value at `time` [s] on the straight path from the first to the last."""
         if time >= self.end:
             return self.last
         if time <= self.begin:

@@ -91,7 +91,7 @@ def add_active_piolas(active: Sequence[ActiveTets], F: Floats, out: Floats) -> N
     """Add a S f(s) (F d / s) d^T of all fibres to `out` (m, 3, 3) [Pa], with s = |F d|; F (m, 3, 3)."""
     for load in active:
         if load.kind == MUSCLE:
-            ways = np.einsum("kij,kj->ki", F[load.rows], load.directions)
-            s = np.linalg.norm(ways, axis=1)
+            fibres = np.einsum("kij,kj->ki", F[load.rows], load.directions)
+            s = np.linalg.norm(fibres, axis=1)
             pull = load.value * load.strength * np.interp(s, *load.curve.T) / np.where(s > 0.0, s, np.inf)
-            out[load.rows] += pull[:, None, None] * ways[:, :, None] * load.directions[:, None, :]
+            out[load.rows] += pull[:, None, None] * fibres[:, :, None] * load.directions[:, None, :]

@@ -53,9 +53,9 @@ class FibreTension(ActiveLoad):
 
     def fibres(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Stretches (m,) and unit vectors (m, 3) of the fibres at x (n, 3); zero for a fibre without length."""
-        ways = np.einsum("mp,mpi->mi", self.coefficients, x[self.tets])
-        stretches = np.sqrt(np.einsum("mi,mi->m", ways, ways))
-        return stretches, ways / np.where(stretches > 0.0, stretches, np.inf)[:, None]
+        fibres = np.einsum("mp,mpi->mi", self.coefficients, x[self.tets])
+        stretches = np.sqrt(np.einsum("mi,mi->m", fibres, fibres))
+        return stretches, fibres / np.where(stretches > 0.0, stretches, np.inf)[:, None]
 
     def energy(self, x: NDArray[np.float64], time: float) -> float:
         """From the rest state [J]."""

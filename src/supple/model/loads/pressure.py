@@ -6,8 +6,8 @@ corners a, b, c move straight by da, db, dc, the triangle sweeps the volume
     W = D . N / 6,    D = da + db + dc,    N = u x v + (u x dv + du x v) / 2 + du x dv / 3,
 
 u = b - a, v = c - a where the motion begins. W is counted along the outward normal. Of a closed surface the sum is
-exactly the change of the volume inside, whatever the way. Of a part of a surface the work of a pressure depends on the
-way, and p W is that of the straight one.
+exactly the change of the volume inside, whatever the path. Of a part of a surface the work of a pressure depends on the
+path, and p W is that of the straight one.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def area_vectors(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArra
 
 
 class SweptTriangles:
-    """Triangles (t, 3) on their way from x_n to x (n, 3); see the formulas of this file.
+    """Triangles (t, 3) on their path from x_n to x (n, 3); see the formulas of this file.
 
     Attributes
     ----------

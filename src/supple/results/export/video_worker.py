@@ -47,7 +47,7 @@ class Studio:
 
         self._film, self._view, self._distance = film, model.view, 0.0
         self._image: NDArray[np.uint8] | None = None
-        self._seen: list[NDArray[np.float64]] = []
+        self._drawn_from: list[NDArray[np.float64]] = []
         self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
         shown = theme(film.dark)
         plotter.set_background(_share(shown.bottom), top=_share(shown.top))  # pyright: ignore[reportArgumentType]
@@ -131,12 +131,12 @@ class Studio:
         nodal = None if self._field is None else nodal_values(render_frame, self._field.values(render_frame))
         camera = self._aim(np.concatenate(points[: self._bodies]), share)
         lines = [segments(render_frame).reshape(-1, 3) for _, segments in self._lines]
-        seen = [*points, *lines, camera, np.zeros(0) if nodal is None else nodal]
+        inputs = [*points, *lines, camera, np.zeros(0) if nodal is None else nodal]
         # Where everything rests, the picture stays.
-        if self._image is None or not all(map(np.array_equal, seen, self._seen)):
+        if self._image is None or not all(map(np.array_equal, inputs, self._drawn_from)):
             for (mesh, _), x in zip(self._lines, lines, strict=True):
                 mesh.points = x.astype(np.float32)
-            self._seen, self._image = seen, self._drawn(points, nodal)
+            self._drawn_from, self._image = inputs, self._drawn(points, nodal)
         return self._image
 
     def _drawn(self, points: list[NDArray[np.float64]], nodal: NDArray[np.float64] | None) -> NDArray[np.uint8]:
@@ -215,12 +215,12 @@ def placed(film: Film, view: View, points: _Vector, share: float) -> tuple[_Vect
         away = np.cos(angle) * away + np.sin(angle) * np.cross(u, away) + (1 - np.cos(angle)) * (u @ away) * u
     if film.eye is not None:
         return target, away, distance
-    seen = view.outline
+    visible = view.outline
     if film.camera == "follow":
-        seen = box_corners(points.min(axis=0), points.max(axis=0))
+        visible = box_corners(points.min(axis=0), points.max(axis=0))
     slope = float(np.tan(np.radians(0.5 * _ANGLE)))
     slopes = (slope * film.size[0] / film.size[1], slope)
-    center, distance = fitted(seen, away, u, slopes, centered=film.camera == "fit")
+    center, distance = fitted(visible, away, u, slopes, centered=film.camera == "fit")
     return center, away, max(distance, view.radius * 1e-3)
 
 

@@ -221,18 +221,18 @@ class DrivenReading(Reading):
         Of what does not move, `force` is the size. `work` is on bodies since the first frame [J], by the mean force of
         each two frames; NaN from where it turns on.
         """
-        way, angle, force = numbers[:, :3], numbers[:, 3], numbers[:, 4:]
-        size = np.linalg.norm(way, axis=1)
+        moved, angle, force = numbers[:, :3], numbers[:, 3], numbers[:, 4:]
+        size = np.linalg.norm(moved, axis=1)
         if not (size.any() or angle.any()):
             return {"force": np.linalg.norm(force, axis=1)} | vector_columns("force", force)
         farthest = int(np.nanargmax(size))
-        direction = way[farthest] / (size[farthest] or 1.0)
+        direction = moved[farthest] / (size[farthest] or 1.0)
         means = 0.5 * (force[1:] + force[:-1])
-        steps = np.einsum("ki,ki->k", means, np.diff(way, axis=0))
+        steps = np.einsum("ki,ki->k", means, np.diff(moved, axis=0))
         work = np.concatenate([[0.0], np.cumsum(np.where(angle[1:] > 0.0, np.nan, steps))])
-        found = {"displacement": way @ direction, "force": force @ direction, "work": work}
+        found = {"displacement": moved @ direction, "force": force @ direction, "work": work}
         found |= {"angle": angle} if angle.any() else {}
-        return found | vector_columns("displacement", way) | vector_columns("force", force)
+        return found | vector_columns("displacement", moved) | vector_columns("force", force)
 
 
 # By the kind of the sensor.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from supple.scene.obstacles.obstacle import Obstacle
 
-# Obstacles that are larger than the bodies and the way between them by more than this factor are surroundings.
+# Obstacles that are larger than the bodies and the distance between them by more than this factor are surroundings.
 _LARGEST = 2.0
 
 

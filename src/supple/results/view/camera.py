@@ -94,11 +94,11 @@ def fit(client: Any, points: NDArray[np.float64]) -> None:
     _fit(client, points, away / length if length > 0.0 else np.array([0.0, 0.0, 1.0]))
 
 
-def follow(client: Any, way: NDArray[np.float64]) -> None:
-    """Move the camera of one visitor, and the point that it looks at, by `way` (3,) [m]."""
+def follow(client: Any, displacement: NDArray[np.float64]) -> None:
+    """Move the camera of one visitor, and the point that it looks at, by `displacement` (3,) [m]."""
     camera = client.camera
     eye, center = np.asarray(camera.position), np.asarray(camera.look_at)
-    _move(client, center + way, eye - center)
+    _move(client, center + displacement, eye - center)
 
 
 def stay_above(client: Any, floor: NDArray[np.float64], view: View, *, was_above: bool = True) -> bool:

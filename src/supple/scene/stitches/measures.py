@@ -56,13 +56,14 @@ def stitch_loads(
     d = springs.extensions(points)
     lengths = np.linalg.norm(d, axis=1)
     # From the vertex to the other side: of a tet, the normal of the triangle at rest.
-    ways = np.concatenate([np.cross(x2 - x1, x3 - x1), -d])
-    ways /= np.maximum(np.linalg.norm(ways, axis=1), np.finfo(np.float64).tiny)[:, None]
-    forces = np.concatenate([of_tets, (springs.stiffness * (lengths - springs.rest_lengths))[:, None] * ways[count:]])
+    directions = np.concatenate([np.cross(x2 - x1, x3 - x1), -d])
+    directions /= np.maximum(np.linalg.norm(directions, axis=1), np.finfo(np.float64).tiny)[:, None]
+    tensions = springs.stiffness * (lengths - springs.rest_lengths)
+    forces = np.concatenate([of_tets, tensions[:, None] * directions[count:]])
     if known is not None:
         forces = np.where(np.isnan(known), forces, known)
-    along = np.einsum("ki,ki->k", forces, ways)
-    across = np.linalg.norm(forces - along[:, None] * ways, axis=1)
+    along = np.einsum("ki,ki->k", forces, directions)
+    across = np.linalg.norm(forces - along[:, None] * directions, axis=1)
     across[count:] = 0.0  # of springs: what has turned since the last sweep
     return np.hypot(across, np.maximum(along, 0.0))
 

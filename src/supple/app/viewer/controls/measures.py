@@ -116,7 +116,7 @@ def measures_text(snapshot: Snapshot) -> str:
 
 
 def _joint_text(name: str, joint: JointReading) -> str:
-    """Where a joint is, and with what it holds; angles and torques, or ways and forces."""
+    """Where a joint is, and with what it holds; angles and torques, or displacements and forces."""
     text = f"{plain(name)}:"
     if joint.coordinate is not None:
         text += f" at {joint.coordinate:.3g},"

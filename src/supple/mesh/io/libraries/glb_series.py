@@ -134,18 +134,18 @@ class _Glb:
         roots = scenes[self._document.get("scene", 0)]["nodes"] if scenes else range(len(nodes))
         stack = [[root] for root in reversed(list(roots))]
         while stack:
-            way = stack.pop()
-            if len(way) > len(nodes):
+            node_path = stack.pop()
+            if len(node_path) > len(nodes):
                 raise FormatError("its nodes form a cycle")
-            node = nodes[way[-1]]
-            stack += [[*way, child] for child in reversed(node.get("children", []))]
+            node = nodes[node_path[-1]]
+            stack += [[*node_path, child] for child in reversed(node.get("children", []))]
             if "mesh" in node:
                 mesh = self._document["meshes"][node["mesh"]]
-                found = self._mesh(mesh, way, node)
+                found = self._mesh(mesh, node_path, node)
                 if found is not None:
                     yield found
 
-    def _mesh(self, mesh: dict[str, Any], way: list[int], node: dict[str, Any]) -> _Placed | None:
+    def _mesh(self, mesh: dict[str, Any], node_path: list[int], node: dict[str, Any]) -> _Placed | None:
         base, triangles, targets, count = [], [], [], 0
         for primitive in mesh["primitives"]:
             if primitive.get("mode", 4) != 4:
@@ -169,7 +169,7 @@ class _Glb:
         joined = [np.concatenate(entry) for entry in zip(*targets, strict=True)]
         weights = node.get("weights") or mesh.get("weights") or [0.0] * len(joined)
         name = str(node.get("name") or mesh.get("name") or "")
-        return _Placed(name, way, np.concatenate(base), np.concatenate(triangles), joined, weights)
+        return _Placed(name, node_path, np.concatenate(base), np.concatenate(triangles), joined, weights)
 
     def points(self, mesh: _Placed, time: float | None) -> NDArray[np.float64]:
         """The points of a mesh at a time, in the world."""
@@ -187,17 +187,17 @@ class _Glb:
         if "matrix" in node:
             M = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
             return x @ M[:3, :3].T + M[:3, 3]
-        scale, turn, way = (self._value(number, path, time, 1) for path in ("scale", "rotation", "translation"))
+        scale, turn, shift = (self._value(number, path, time, 1) for path in ("scale", "rotation", "translation"))
         scale = node.get("scale") if scale is None else scale
         turn = node.get("rotation") if turn is None else turn
-        way = node.get("translation") if way is None else way
+        shift = node.get("translation") if shift is None else shift
         if scale is not None:
             x = x * np.asarray(scale, dtype=np.float64)
         if turn is not None and not np.array_equal(turn, [0, 0, 0, 1]):
             from scipy.spatial.transform import Rotation
 
             x = x @ Rotation.from_quat(np.asarray(turn, dtype=np.float64)).as_matrix().T
-        return x if way is None else x + np.asarray(way, dtype=np.float64)
+        return x if shift is None else x + np.asarray(shift, dtype=np.float64)
 
     def _value(self, node: int, path: str, time: float | None, count: int) -> NDArray[np.float64] | None:
         """An animated value at a time; None where it is not animated."""

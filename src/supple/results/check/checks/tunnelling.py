@@ -148,7 +148,7 @@ class GoingOn(FrameCheck):
         self.tally.see(at, float(len(passed)), bool(passed), where)
 
     def _through(self, before: Snapshot, at: Snapshot) -> list[tuple[int, int]]:
-        """The owners that pass on the straight way, of those that are fast."""
+        """The owners that pass on the straight path, of those that are fast."""
         surfaces = self.of.surfaces
         p, triangles, owners = len(surfaces.names), surfaces.triangles, surfaces.owners
         a, areas = before.points[triangles[:, 0]], area_vectors(before.points, triangles)

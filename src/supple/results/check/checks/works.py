@@ -127,7 +127,7 @@ class Works(EnergyCheck):
         before, after = (np.einsum("ij,ij->i", of.load_forces[name], moved) for of in (last, at))
         left_open = 0.5 * np.abs(after - before)
         if not self.of.implicit:
-            # Within a frame, its change acts on what the way is longer than the straight one, too.
+            # Within a frame, its change acts on what the path is longer than the straight one, too.
             change = np.linalg.norm(at.load_forces[name] - last.load_forces[name], axis=1)
             left_open += 0.5 * change * self._way(last, at)
         return 0.5 * (before + after), left_open
@@ -143,7 +143,7 @@ class Works(EnergyCheck):
                 work += after.force * ds
                 left_open += 0.5 * change * abs(ds)
                 if not self.of.implicit:
-                    # Within a frame, the change of the force acts on what the way is longer than the straight one.
+                    # Within a frame, the change of the force acts on what the path is longer than the straight one.
                     rates = [np.vdot(state.gradient, of.velocities) for state, of in ((before, last), (after, at))]
                     left_open += 0.25 * self.of.dt * change * abs(float(rates[1] - rates[0]))
                     # In a collision the coordinate goes and comes back; both frames may be at rest in it.

@@ -50,9 +50,9 @@ def is_inside(
     x[p] = point
     directions = np.random.default_rng(0)
     for _ in range(_MOST_TRIES):
-        way = directions.normal(size=3)
+        direction = directions.normal(size=3)
         # Ends outside of the box: farther along one axis than the box is wide.
-        x[q] = point + way * (2.0 * float((high - low).max()) / float(np.abs(way).max()))
+        x[q] = point + direction * (2.0 * float((high - low).max()) / float(np.abs(direction).max()))
         count = _crossings(x, p, q, triangles, rows)
         if count >= 0:
             return count % 2 == 1

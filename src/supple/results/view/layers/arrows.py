@@ -85,10 +85,10 @@ class VelocityView(Layer):
         if frame.velocities is None:
             return
         start = frame.finite_positions[self._rows]
-        way = np.nan_to_num(_SECONDS * frame.velocities[self._rows], posinf=0.0, neginf=0.0)
-        length = np.linalg.norm(way, axis=1, keepdims=True)
-        way *= np.minimum(1.0, self._longest / np.maximum(length, 1e-300))
-        some = np.linalg.norm(way, axis=1) >= self._head  # shorter arrows than their head are not drawn
+        displacement = np.nan_to_num(_SECONDS * frame.velocities[self._rows], posinf=0.0, neginf=0.0)
+        length = np.linalg.norm(displacement, axis=1, keepdims=True)
+        displacement *= np.minimum(1.0, self._longest / np.maximum(length, 1e-300))
+        some = np.linalg.norm(displacement, axis=1) >= self._head  # shorter arrows than their head are not drawn
         self._arrows.visible = bool(some.any())
         if some.any():
-            self._arrows.points = single(np.stack([start[some], (start + way)[some]], axis=1))
+            self._arrows.points = single(np.stack([start[some], (start + displacement)[some]], axis=1))

@@ -33,7 +33,7 @@ class Triangles:
 
     Attributes
     ----------
-    start, end : (t, 3) vertices; share : (t, 3) of the way from `start` to `end`
+    start, end : (t, 3) vertices; share : (t, 3) of the path from `start` to `end`
     owner : (t,) the tet that each belongs to
     """
 

@@ -66,15 +66,15 @@ class Cameras:
         with self._lock:
             if self._center is None or center is None:
                 return
-            way = center - self._center
+            displacement = center - self._center
             if self.follow.value == ALL:
                 if frame.springs:  # a camera that moves would move the mouse's target
                     return
-                way *= _SHARE if frame.time >= self._time else 1.0  # back at the start, nothing moves
-            if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
+                displacement *= _SHARE if frame.time >= self._time else 1.0  # back at the start, nothing moves
+            if float(np.linalg.norm(displacement)) < 1e-3 * self._stage.model.view.radius:
                 return
-            self._center, self._time = self._center + way, frame.time
-        self._carry(lambda client: way)
+            self._center, self._time = self._center + displacement, frame.time
+        self._carry(lambda client: displacement)
 
     def fit(self, client: Any) -> None:
         """Show one visitor all bodies as they are."""
@@ -100,10 +100,12 @@ class Cameras:
         view = self._stage.model.view
         if self._center is None or self.follow.value != ALL:
             return view
-        way = self._center - self._start
-        if not way.any():
+        displacement = self._center - self._start
+        if not displacement.any():
             return view
-        return replace(view, low=view.low + way, high=view.high + way, outline=view.outline + way)
+        return replace(
+            view, low=view.low + displacement, high=view.high + displacement, outline=view.outline + displacement
+        )
 
     def _names(self) -> tuple[str, ...]:
         return ALL, NOTHING, *(body.name for body in self._stage.model.bodies)
@@ -112,9 +114,9 @@ class Cameras:
         """(3,) the center of the body that is followed [m], that of all bodies beyond where it is free, or None."""
         x, chosen = self._stage.frame.finite_positions, self.follow.value
         if chosen == ALL:
-            way = x.mean(axis=0) - self._start
+            displacement = x.mean(axis=0) - self._start
             free = _FREE * self._stage.model.view.radius
-            return self._start + max(0.0, 1.0 - free / max(float(np.linalg.norm(way)), free)) * way
+            return self._start + max(0.0, 1.0 - free / max(float(np.linalg.norm(displacement)), free)) * displacement
         rows = (body.vertices for body in self._stage.model.bodies if body.name == chosen)
         of_body = next(rows, None) if chosen != NOTHING else None
         return None if of_body is None else x[of_body].mean(axis=0)

@@ -37,16 +37,16 @@ class CarriedCamera:
         with self._lock:
             self._places.clear()
 
-    def carry(self, way: NDArray[np.float64]) -> None:
-        """Move the camera, and the point that it looks at, by `way` (3,) [m] from the wished place."""
+    def carry(self, displacement: NDArray[np.float64]) -> None:
+        """Move the camera, and the point that it looks at, by `displacement` (3,) [m] from the wished place."""
         with self._lock:
             looked_at, late = np.asarray(self._client.camera.look_at), self._late()
             if late is None:  # the visitor moves it
                 self._places.clear()
                 self._places.append(looked_at)
                 late = np.zeros(3)
-            self._places.append(looked_at + late + way)
-            follow(self._client, late + way)
+            self._places.append(looked_at + late + displacement)
+            follow(self._client, late + displacement)
 
     def keep(self) -> None:
         """Called with every report of the browser: an earlier place is corrected."""

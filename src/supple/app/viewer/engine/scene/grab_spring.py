@@ -64,11 +64,11 @@ class GrabSpring(ABC):
         """(3,) the point to which the spring is attached, or its velocity, from those of its body's points (n, 3)."""
         return np.asarray(self.command.weights) @ points[list(self.command.vertices)]
 
-    def way(self, points: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+    def displacement(self, points: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
         """(3,) from the point to a target, as far as it pulls [m]."""
-        way = target - self.point(points)
-        length = float(np.linalg.norm(way))
-        return way * (self.longest / length) if length > self.longest else way
+        displacement = target - self.point(points)
+        length = float(np.linalg.norm(displacement))
+        return displacement * (self.longest / length) if length > self.longest else displacement
 
     def drawn(self, points: NDArray[np.float64]) -> GrabState:
         """The spring to draw, with the points (n, 3) of the body [m]."""
@@ -92,7 +92,7 @@ class SoftGrab(GrabSpring):
     farthest: float
     _points: NDArray[np.float64] = field(init=False)  # of the body, at the start of the step
     _rest: NDArray[np.float64] = field(init=False)  # of the patch's targets
-    _ends: tuple[NDArray[np.float64], NDArray[np.float64]] = field(init=False)  # of the way of the target
+    _ends: tuple[NDArray[np.float64], NDArray[np.float64]] = field(init=False)  # of the displacement of the target
     _times: tuple[float, float] = (0.0, 0.0)  # at these ends
     _begun: bool = False
     _asked: float = 0.0  # the latest time for which the displacements were asked
@@ -116,11 +116,11 @@ class SoftGrab(GrabSpring):
         rows = next(part.vertices for part in system.bodies if part.name == self.command.body)
         mean = np.average(state.velocities[rows], axis=0, weights=system.masses[rows])
         farthest = (end - now) * (self.farthest / dt + float(np.linalg.norm(mean)))
-        way = self.target - place
-        length = float(np.linalg.norm(way))
+        displacement = self.target - place
+        length = float(np.linalg.norm(displacement))
         if length > farthest:
-            way *= farthest / length
-        self._ends, self._times, self._begun = (place, place + way), (now, end), True
+            displacement *= farthest / length
+        self._ends, self._times, self._begun = (place, place + displacement), (now, end), True
 
     def _place(self, time: float) -> NDArray[np.float64]:
         """(3,) of the target on its way [m]."""
@@ -130,7 +130,7 @@ class SoftGrab(GrabSpring):
 
     def _displacements(self, time: float) -> NDArray[np.float64]:
         self._asked = time
-        return self._points[self.patch] + self.way(self._points, self._place(time)) - self._rest
+        return self._points[self.patch] + self.displacement(self._points, self._place(time)) - self._rest
 
 
 @dataclass(eq=False)
@@ -157,7 +157,7 @@ class RigidGrab(GrabSpring):
         inverse = float(self.point(part.body.weights) ** 2 @ (1.0 / system.masses[part.vertices]))
         force = (
             self.stiffness
-            * (self.way(x, self.target) - dt * self.point(v))
+            * (self.displacement(x, self.target) - dt * self.point(v))
             / (1.0 + self.stiffness * dt * dt * inverse)
         )
         self._forces = np.outer(self.command.weights, force)
