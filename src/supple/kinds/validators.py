@@ -199,9 +199,17 @@ class Name(Validator):
 
 @dataclass(frozen=True)
 class BodyName(Name):
-    """The name of a body; obstacles : whether it may also be that of an obstacle. Scenes check that it exists."""
+    """The name of a body. A scene checks that such a body exists.
+
+    Attributes
+    ----------
+    obstacles : whether it may also be the name of an obstacle
+    soft : whether the body must be soft, or must be rigid; None where it may be either; why : of that, in messages
+    """
 
     obstacles: bool = False
+    soft: bool | None = None
+    why: str = ""
 
     def bodies(self, value: Any) -> tuple[str, ...]:
         return (value,)

@@ -101,6 +101,9 @@ class Force(OnVertices):
         return np.asarray(self.force)
 
 
+_PULLED = BodyName(soft=True, why="soft targets pull soft bodies; move a rigid one with a Pin or a Force")
+
+
 @dataclass(frozen=True, eq=False)
 class SoftTarget(OnVertices):
     """Springs of rest length zero from vertices to their positions at the start, or to where `motion` moves these.
@@ -120,13 +123,8 @@ class SoftTarget(OnVertices):
 
     kind: ClassVar[str] = "soft_target"
 
-    body: Annotated[str, BodyName()]
+    body: Annotated[str, _PULLED]
     vertices: Annotated[Selection, Vertices()]
     stiffness: Annotated[float, POSITIVE]
     motion: Annotated[Motion, MotionValidator()] = None
     name: Annotated[str | None, Name()] = None
-
-    def check_kind_of_body(self, rigid: bool) -> None:
-        """Raise `SceneError` for a rigid body: the springs pull vertices of tets."""
-        if rigid:
-            raise SceneError(f"{self.label}: soft targets pull soft bodies; move a rigid one with a Pin or a Force")

@@ -124,7 +124,7 @@ class Scene(Showable, metaclass=Described):
                     self._check_selection(item, pinned)
         for key in ("sensors", "cavities", "cables", "joints", "welds"):
             self._require_own_names(key)
-        for key in ("loads", "sensors", "cables", "joints"):
+        for key in ("loads", "sensors", "cables"):
             for i, item in enumerate(getattr(self, key)):
                 with at(*given.get(id(item), (key, i))):
                     item.check(self.bodies)
@@ -145,19 +145,23 @@ class Scene(Showable, metaclass=Described):
         return {name: value for name, value in facts.items() if value not in ("", "0")}
 
     def _check_names(self, given: Mapping[int, tuple[str, int]]) -> None:
-        """Raise where a declared field names a body, or an obstacle, that does not exist."""
-        bodies = [body.name for body in self.bodies]
-        known = {False: bodies, True: [*bodies, *(str(obstacle.name) for obstacle in self.obstacles)]}
+        """Raise where a declared field names a body or an obstacle that does not exist, or of the wrong kind."""
+        soft = {body.name: not isinstance(body, RigidBody) for body in self.bodies}
+        obstacles = [str(obstacle.name) for obstacle in self.obstacles]
         for key in PARTS:
             for i, item in enumerate(getattr(self, key)):
                 for field, one in declared(type(item)).items():
                     name, of = getattr(item, field), one.validator
-                    if isinstance(of, BodyName) and name is not None and name not in known[of.obstacles]:
-                        what = "body or obstacle" if of.obstacles else "body"
-                        with at(*given.get(id(item), (key, i)), field):
-                            raise SceneError(
-                                f"{item.label}: {what} {name!r} does not exist; {suggestion(name, known[of.obstacles])}"
-                            )
+                    if not isinstance(of, BodyName) or name is None:
+                        continue
+                    known = [*soft, *(obstacles if of.obstacles else ())]
+                    with at(*given.get(id(item), (key, i)), field):
+                        if name not in known:
+                            what = "body or obstacle" if of.obstacles else "body"
+                            raise SceneError(f"{item.label}: {what} {name!r} does not exist; {suggestion(name, known)}")
+                        if of.soft is not None and soft.get(name, of.soft) != of.soft:
+                            what = "rigid" if of.soft else "soft"
+                            raise SceneError(f"{item.label}: body {name!r} is {what}; {of.why}")
 
     def _require_own_names(self, key: str) -> None:
         taken: set[str | None] = set()

@@ -245,7 +245,7 @@ AT = ("bar", (0.1, 0.0, 0.0))
         (lambda: sp.Spring(AT, ("bar", 0), 1.0, rest_length=-0.1), "rest_length is -0.1; it must be zero or more"),
         (lambda: sp.Curve([0, 0], [1, 2]), "does not come after"),
         (lambda: sp.Curve([0, 1], [1, 2, 3]), "give 2 numbers or vectors"),
-        (lambda: sp.Pressure("rigid", 1.0), "pressure on body 'rigid': the body is rigid, and pressure acts on soft"),
+        (lambda: sp.Pressure("rigid", 1.0), "pressure on body 'rigid': body 'rigid' is rigid; pressure acts on soft"),
         (lambda: 3.0, "loads.0. is a float; give a Load"),
     ],
 )

@@ -104,7 +104,7 @@ def test_a_free_muscle_shortens_to_its_equilibrium_and_keeps_its_momentum(name):
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), force_length=([1, 0.5], [1, 1])), "stretches must be finite, above"),
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), force_length=([1.0], [-1.0])), "values must be finite and zero or"),
         (lambda: sp.Muscle("bar", 1.0, (1, 0, 0), force_length=3.0), "force_length is 3.0; give .stretches, values."),
-        (lambda: sp.Muscle("rigid", 1.0, (1, 0, 0)), "the body is rigid; a muscle acts in soft bodies"),
+        (lambda: sp.Muscle("rigid", 1.0, (1, 0, 0)), "body 'rigid' is rigid; a muscle acts in soft bodies"),
         (lambda: sp.Muscle("rod", 1.0, (1, 0, 0)), "body 'rod' does not exist"),
     ],
 )

@@ -138,7 +138,7 @@ def test_file_info_recording_and_check_know_wind(tmp_path, capsys, solver):
         (lambda: sp.Wind("plate", 3.0), "wind on body 'plate': velocity has shape .*; give three numbers"),
         (lambda: sp.Wind("plate", (1, 0, 0), drag=-1), "drag is -1; it must be zero or more"),
         (lambda: sp.Wind("plate", (1, 0, 0), density=np.nan), "density is nan; it must be finite"),
-        (lambda: sp.Wind("stone", (1, 0, 0)), "the body is rigid, and wind acts on soft ones"),
+        (lambda: sp.Wind("stone", (1, 0, 0)), "body 'stone' is rigid; wind acts on soft ones"),
         (lambda: sp.Wind("plot", (1, 0, 0)), "body 'plot' does not exist; did you mean 'plate'"),
     ],
 )

@@ -44,7 +44,7 @@ def test_loads_on_points_of_a_rigid_body_have_their_force_and_moment():
 
 def test_pressure_on_a_rigid_body_is_refused():
     body = sp.RigidBody("cube", CUBE, density=500)
-    with pytest.raises(SceneError, match="body 'cube': the body is rigid"):
+    with pytest.raises(SceneError, match="body 'cube': body 'cube' is rigid"):
         build_system(sp.Scene([body], loads=[sp.Pressure("cube", 100.0)]))
 
 

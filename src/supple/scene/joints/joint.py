@@ -15,8 +15,7 @@ and further ones can be added, see `supple.model.joints.functions`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -25,11 +24,10 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.kind import Kind
 from supple.kinds.validators import BodyName, Boolean, Name, Vector
-from supple.scene.body import PlacedBody
-from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
 
 FREE = (-np.inf, np.inf)
+_RIGID = BodyName(soft=False, why="joints join rigid bodies")
 
 
 class Function(NamedTuple):
@@ -94,8 +92,8 @@ class Joint(Kind, ABC):
 
     title: ClassVar[str] = "joint"
 
-    first: Annotated[str, BodyName()]
-    second: Annotated[str | None, BodyName(obstacles=True)] = None
+    first: Annotated[str, _RIGID]
+    second: Annotated[str | None, replace(_RIGID, obstacles=True)] = None
     point: Annotated[ArrayLike | None, Vector()] = None
     collide: Annotated[bool, Boolean()] = False
     name: Annotated[str | None, Name()] = None
@@ -129,14 +127,6 @@ class Joint(Kind, ABC):
     @abstractmethod
     def conditions(self) -> Conditions:
         """What holds between the two sides, and what is measured."""
-
-    def check(self, bodies: Sequence[PlacedBody]) -> None:
-        """Raise `SceneError` where a body that it joins is soft."""
-        soft = [body.name for body in bodies if not isinstance(body, RigidBody)]
-        for key in ("first", "second"):
-            if getattr(self, key) in soft:
-                with at(key):
-                    raise SceneError(f"{self.label}: body {getattr(self, key)!r} is soft; joints join rigid bodies")
 
     def place(self, body: RigidBody) -> NDArray[np.float64]:
         """(3,) the joint's point in the world, where the scene places its first body [m]."""

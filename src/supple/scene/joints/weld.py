@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -13,9 +12,10 @@ from supple.errors import SceneError
 from supple.kinds.validators import POSITIVE, BodyName, Name
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.body import PlacedBody
-from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.selection import OnVertices, Selection, Vertices
+
+_WHY = "a weld is of a soft body to a rigid one"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class Weld(OnVertices):
 
     kind: ClassVar[str] = "weld"
 
-    body: Annotated[str, BodyName()]
-    rigid: Annotated[str, BodyName()]
+    body: Annotated[str, BodyName(soft=True, why=_WHY)]
+    rigid: Annotated[str, BodyName(soft=False, why=_WHY)]
     vertices: Annotated[Selection | None, Vertices()] = None
     max_distance: Annotated[float | None, POSITIVE] = None
     name: Annotated[str | None, Name()] = None
@@ -52,22 +52,6 @@ class Weld(OnVertices):
     def facts(self, scene: Any) -> str:
         count = int((scene.welding.weld == scene.welds.index(self)).sum())
         return f"{count} vertices of {self.body} are points of {self.rigid}"
-
-    def bodies_of(self, bodies: Mapping[str, PlacedBody]) -> tuple[PlacedBody, RigidBody]:
-        """The soft and the rigid body.
-
-        Raises
-        ------
-        SceneError : where one is of the other kind.
-        """
-        for key, name, rigid in (("body", self.body, False), ("rigid", self.rigid, True)):
-            with at(key):
-                if isinstance(bodies[name], RigidBody) != rigid:
-                    what = "soft" if rigid else "rigid"
-                    raise SceneError(f"{self.label}: body {name!r} is {what}; a weld is of a soft body to a rigid one")
-        soft, rigid_body = bodies[self.body], bodies[self.rigid]
-        assert isinstance(rigid_body, RigidBody)
-        return soft, rigid_body
 
     def chosen(self, soft: PlacedBody, rigid: RigidBody) -> NDArray[np.int32]:
         """The welded vertices (k,) of the soft body's mesh.

@@ -14,6 +14,7 @@ from supple.scene.body import PlacedBody
 from supple.scene.joints.joint import Joint
 from supple.scene.joints.weld import Weld
 from supple.scene.located import at
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 
 
@@ -80,7 +81,8 @@ def weld_together(welds: Sequence[Weld], bodies: Sequence[PlacedBody]) -> Weldin
     vertices, control, weights, weld = [np.zeros(0, np.int32)], [np.zeros((0, 4), np.int32)], [np.zeros((0, 4))], []
     for k, one in enumerate(welds):
         with at("welds", k):
-            soft, rigid = one.bodies_of(named)
+            soft, rigid = named[one.body], named[one.rigid]
+            assert isinstance(rigid, RigidBody)
             chosen = one.chosen(soft, rigid)
             own = (chosen + begins[one.body]).astype(np.int32)
             twice = np.isin(own, np.concatenate(vertices))

@@ -16,7 +16,6 @@ from supple.mesh.closed_surfaces import enclosed_voids, is_closed, signed_volume
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Rows, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
-from supple.scene.rigid.rigid_body import RigidBody
 
 AMOUNT = OverTimeOf(bounds=POSITIVE)
 GAS_CONSTANT = 8.31446261815324  # [J/(mol K)], exact by definition
@@ -74,7 +73,7 @@ class Cavity(Kind):
     kind: ClassVar[str] = "cavity"
     exactly_one: ClassVar[tuple[str, ...]] = ("pressure", "volume", "gas")
 
-    body: Annotated[str, BodyName()]
+    body: Annotated[str, BodyName(soft=True, why="a cavity acts on soft bodies")]
     pressure: Annotated[OverTime | None, OverTimeOf()] = None
     volume: Annotated[OverTime | None, OverTimeOf(bounds=POSITIVE)] = None
     gas: Annotated[Gas | None, OneOf((Gas,), "a Gas")] = None
@@ -101,11 +100,9 @@ class Cavity(Kind):
 
         Raises
         ------
-        SceneError : where the body does not exist or is rigid, or no such closed surface exists.
+        SceneError : where the body does not exist, or no such closed surface exists.
         """
         body = body_of(self.body, bodies, self.label)
-        if isinstance(body, RigidBody):
-            raise SceneError(f"{self.label}: body {self.body!r} is rigid; a cavity acts on soft bodies")
         points, triangles = body.points, body.triangles
         if self.triangles is None:
             voids = enclosed_voids(points, triangles)

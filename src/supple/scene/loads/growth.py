@@ -16,7 +16,6 @@ from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TETS, OnBody, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
 from supple.scene.loads.tet_region import Directions, TetRegion, directions_of, tets_in
-from supple.scene.rigid.rigid_body import RigidBody
 
 # Of a stretch: volumes and stiffnesses beyond it are not those of a body in the same scene.
 STRETCH = OverTimeOf(bounds=Number(least=1e-3, most=1e3))
@@ -46,7 +45,7 @@ class Growth(OnBody):
 
     kind: ClassVar[str] = "growth"
 
-    body: Annotated[str, BodyName()]
+    body: Annotated[str, BodyName(soft=True, why="growth acts in soft bodies")]
     stretch: Annotated[OverTime, STRETCH]
     direction: Annotated[ArrayLike | None, Directions()] = None
     tets: Annotated[TetRegion, TETS] = None
@@ -60,11 +59,9 @@ class Growth(OnBody):
 
         Raises
         ------
-        SceneError : where the body is rigid or not elastic, a tet does not exist, or there are other numbers of tets
+        SceneError : where the body is not elastic, a tet does not exist, or there are other numbers of tets
             and directions.
         """
-        if isinstance(body, RigidBody):
-            raise SceneError(f"{self.label}: the body is rigid; growth acts in soft bodies")
         if isinstance(body.material, EdgesAndVolume):
             raise SceneError(
                 f"{self.label}: EdgesAndVolume has no deformation gradient that could grow; give the body an elastic "

@@ -16,7 +16,6 @@ from supple.scene.body import PlacedBody
 from supple.scene.loads.load import TETS, OnBody, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
 from supple.scene.loads.tet_region import Directions, TetRegion, directions_of, tets_in
-from supple.scene.rigid.rigid_body import RigidBody
 
 ACTIVATION = OverTimeOf(bounds=Number(least=0.0, most=1.0))
 
@@ -67,7 +66,7 @@ class Muscle(OnBody):
 
     kind: ClassVar[str] = "muscle"
 
-    body: Annotated[str, BodyName()]
+    body: Annotated[str, BodyName(soft=True, why="a muscle acts in soft bodies")]
     strength: Annotated[float, POSITIVE]
     direction: Annotated[ArrayLike, Directions()]
     activation: Annotated[OverTime, ACTIVATION] = 1.0
@@ -83,9 +82,7 @@ class Muscle(OnBody):
 
         Raises
         ------
-        SceneError : where the body is rigid, a tet does not exist, or there are other numbers of tets and directions.
+        SceneError : where a tet does not exist, or there are other numbers of tets and directions.
         """
-        if isinstance(body, RigidBody):
-            raise SceneError(f"{self.label}: the body is rigid; a muscle acts in soft bodies")
         rows = tets_in(self.tets, body, self.label)
         return rows, directions_of(self.direction, rows, self.label)

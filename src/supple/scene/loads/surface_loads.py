@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from supple.errors import SceneError
 from supple.kinds.validators import NON_NEGATIVE, BodyName, Name
-from supple.scene.body import PlacedBody
-from supple.scene.loads.load import TRIANGLES, OnSurface, Region, body_of
+from supple.scene.loads.load import TRIANGLES, OnSurface, Region
 from supple.scene.loads.over_time import OverTime, OverTimeOf
-from supple.scene.rigid.rigid_body import RigidBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +52,10 @@ class Pressure(OnSurface):
 
     kind: ClassVar[str] = "pressure"
 
-    body: Annotated[str, BodyName()]
+    body: Annotated[str, BodyName(soft=True, why="pressure acts on soft ones; give a Traction")]
     pressure: Annotated[OverTime, OverTimeOf()]
     region: Annotated[Region, TRIANGLES] = None
     name: Annotated[str | None, Name()] = None
-
-    def check(self, bodies: Sequence[PlacedBody]) -> None:
-        super().check(bodies)
-        if isinstance(body_of(self.body, bodies, self.label), RigidBody):
-            raise SceneError(f"{self.label}: the body is rigid, and pressure acts on soft ones; give a Traction")
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +83,9 @@ class Wind(OnSurface):
 
     kind: ClassVar[str] = "wind"
 
-    body: Annotated[str, BodyName()]
+    body: Annotated[str, BodyName(soft=True, why="wind acts on soft ones; give a Traction")]
     velocity: Annotated[OverTime, OverTimeOf((3,))]
     drag: Annotated[float, NON_NEGATIVE] = 1.0
     density: Annotated[float, NON_NEGATIVE] = 1.2
     region: Annotated[Region, TRIANGLES] = None
     name: Annotated[str | None, Name()] = None
-
-    def check(self, bodies: Sequence[PlacedBody]) -> None:
-        super().check(bodies)
-        body = body_of(self.body, bodies, self.label)
-        if isinstance(body, RigidBody):
-            raise SceneError(f"{self.label}: the body is rigid, and wind acts on soft ones; give a Traction")
