@@ -31,7 +31,7 @@ from supple.results.check.loads import forces_of
 from supple.results.export.exporter import FORMATS, Format
 from supple.results.readings.reading import READINGS, Reading
 from supple.results.readings.sensor_readings import reading_of
-from supple.results.view.from_recording import model_of_recording, moment_of_frame
+from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.scene.joints.joint import Conditions, Function, Joint
 from supple.scene.loads.load import OnBody
 from supple.scene.registry import PARTS, register
@@ -407,8 +407,8 @@ def test_checks_accept_it_and_find_what_is_wrong(run, tmp_path):
 def test_a_page_draws_them(run, tmp_path):
     _, _, path = run
     with sp.read_recording(path) as recording:
-        moment = moment_of_frame(model_of_recording(recording), recording[-1])
-        assert len(moment.model.bodies) == 3
+        drawn = render_frame_of(model_of_recording(recording), recording[-1])
+        assert len(drawn.model.bodies) == 3
         recording.export("html", tmp_path / "page.html")
     assert (tmp_path / "page.html").stat().st_size > 100_000
 
