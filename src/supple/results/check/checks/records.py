@@ -56,4 +56,4 @@ class Records(FrameCheck):
                 measured[name] = energy, abs(energy) + of.floors.sums / _SAME
         for name, (value, size) in measured.items():
             text = "smallest det F" if name == "min_det_F" else name.replace("_", " ")
-            yield float(np.linalg.norm(of.records.series(name)[at.number] - value)) / size, text
+            yield float(np.linalg.norm(of.records.series(name)[at.number] - value) / size), text
