@@ -115,18 +115,32 @@ def _normal(u, v, n):
     return m if dot(m, n) >= 0.0 else (-m[0], -m[1], -m[2])
 
 
-@njit
-def _kept(gap, floor):
-    """What remains of a gap."""
-    return max(KEEP * gap, min(_NEARLY_ALL * gap, floor))
+class Kept(NamedTuple):
+    """What remains of the distance of two parts: a tenth of it or `near`, whichever is less, and at least `floor`.
+
+    Attributes
+    ----------
+    floor : [m], of distances above it; those below stay nearly as they are
+    near : [m] parts that come no nearer than this limit no motion, so that candidates that do not are not missed
+    """
+
+    floor: float = 0.0
+    near: float = math.inf
+
+
+NO_FLOOR = Kept()
 
 
 @njit
-def collision_time(x, way, kind, points, limit, floor):
+def _remainder(gap, kept):
+    return max(min(KEEP * gap, kept.near), min(_NEARLY_ALL * gap, kept.floor))
+
+
+@njit
+def collision_time(x, way, kind, points, limit, kept):
     """How long, up to `limit`, the parts of the four `points` may move along `way` (s, 3) from x (s, 3).
 
-    Until then they keep at least `KEEP` of their distance, and `floor` [m] where it is larger. Larger than `limit`
-    where they may move longer than that.
+    Until then they keep what `Kept` says. Larger than `limit` where they may move longer than that.
 
     Parameters
     ----------
@@ -143,7 +157,7 @@ def collision_time(x, way, kind, points, limit, floor):
     for _ in range(_MOST_STEPS):
         n, gap = _direction(_between(kind, a, b, c))
         if keep < 0.0:
-            keep = _kept(gap, floor) + error
+            keep = _remainder(gap, kept) + error
         elif gap <= _CLOSE_ENOUGH * keep:
             return time
         step, least = _bound(kind, n, a, b, c, p, q, r, keep)
@@ -163,7 +177,7 @@ def collision_time(x, way, kind, points, limit, floor):
 
 # What a long way sweeps overlaps everything, and most of a long way is not taken: it is divided into pieces of this
 # many mean edges, which are examined one after another.
-_PIECE = 1.0
+_PIECE = 8.0
 _MOST_PIECES = 128
 # Pairs are divided into this many runs, whatever the number of threads.
 _RUNS = 64
@@ -191,17 +205,15 @@ def largest_step(
     points: NDArray[np.float64],
     way: NDArray[np.float64],
     candidates: Candidates,
-    floor: float = 0.0,
+    kept: Kept = NO_FLOOR,
 ) -> Limit:
-    """How far along `way` (s, 3) from `points` (s, 3), at most 1, every candidate keeps a tenth of its distance.
-
-    Distances above `floor` [m] stay above it, and those below stay nearly as they are.
+    """How far along `way` (s, 3) from `points` (s, 3), at most 1, every candidate keeps what `Kept` says.
 
     The points may be moved by step * way in rounded numbers. The pair is the first of those with the least step.
     """
     limit = Limit(1.0)
     for kind, pairs in ((VERTEX_TRIANGLE, candidates.vertex_triangle), (EDGE_EDGE, candidates.edge_edge)):
-        step, k = _first(points, way, kind, mesh.triangles, mesh.edges, pairs, limit.step, floor)
+        step, k = _first(points, way, kind, mesh.triangles, mesh.edges, pairs, limit.step, kept)
         if k >= 0:
             limit = Limit(step, kind, tuple(map(int, corners(kind, mesh.triangles, mesh.edges, *pairs[k]))))
     return limit
@@ -211,21 +223,46 @@ def largest_step_in_pieces(
     finder: CandidateFinder, points: NDArray[np.float64], way: NDArray[np.float64], floor: float = 0.0
 ) -> Limit:
     """As `largest_step`, with candidates from `finder`; a step of zero where the way is not finite."""
-    mesh = finder.mesh
-    longest = float(np.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)))
-    if not np.isfinite(longest):
-        return Limit(0.0)
-    piece = _PIECE * float(mesh.edge_lengths.mean()) if len(mesh.edges) else np.inf
-    count = max(1, int(np.ceil(min(longest / piece, _MOST_PIECES))))
-    share = min(1.0, piece * count / longest) / count if longest > 0.0 else 1.0
-    for k in range(count):
-        begin = points if k == 0 else points + (k * share) * way
-        part = share * way
-        limit = largest_step(mesh, begin, part, finder.find(begin, begin + part), floor)
-        if limit.points:
-            return limit._replace(step=(k + limit.step) * share)
-    # A complete way must give exactly 1: count * (1 / count) can be slightly less.
-    return Limit(1.0 if longest <= count * piece else count * share)
+    return Along(finder, points, way, floor).largest_step(way)
+
+
+class Along:
+    """How far points may go on ways that are shorter than those given, each on its own; one search serves them all.
+
+    Parameters
+    ----------
+    points, way : (s, 3) [m]; floor : see `Kept`
+    """
+
+    def __init__(
+        self, finder: CandidateFinder, points: NDArray[np.float64], way: NDArray[np.float64], floor: float = 0.0
+    ) -> None:
+        self._finder, self._points, self._kept = finder, points, Kept(floor, finder.dhat)
+        self._finite, self._all = bool(np.isfinite(way).all()), None
+        if self._finite:
+            edges, longest = finder.mesh.edge_lengths, finder.longest(points, way)
+            piece = _PIECE * float(edges.mean()) if len(edges) else np.inf
+            self._count = max(1, int(np.ceil(min(longest / piece, _MOST_PIECES))))
+            self._complete = longest <= self._count * piece
+            # A complete way must give exactly 1: count * (1 / count) can be slightly less.
+            self._share = 1.0 / self._count if self._complete else piece / longest
+            if self._count == 1:
+                self._all = finder.find(points, points + way)
+
+    def largest_step(self, way: NDArray[np.float64]) -> Limit:
+        """The largest step along a way (s, 3) that is nowhere longer; see `largest_step`."""
+        if not self._finite:
+            return Limit(0.0)
+        share = self._share
+        for k in range(self._count):
+            begin, part = self._points, share * way
+            if k:
+                begin = begin + (k * share) * way
+            near = self._finder.find(begin, begin + part) if self._all is None else self._all
+            limit = largest_step(self._finder.mesh, begin, part, near, self._kept)
+            if limit.points:
+                return limit._replace(step=(k + limit.step) * share)
+        return Limit(1.0 if self._complete else self._count * share)
 
 
 @njit
@@ -253,15 +290,17 @@ def is_clear(x, way, kind, points):
 
 
 @njit(cache=True, parallel=True)
-def _first(x, way, kind, triangles, edges, pairs, limit, floor):
+def _first(x, way, kind, triangles, edges, pairs, limit, kept):
     """The least step below `limit` of pairs (k, 2) of a kind, and the first row with it; `limit` and -1 for none."""
     steps, rows = np.full(_RUNS, limit), np.full(_RUNS, -1, dtype=np.int64)
+    floor, near = kept  # Numba takes no tuples into a parallel loop
     for r in prange(_RUNS):
+        its_kept = Kept(floor, near)
         least, at = limit, np.int64(-1)
         for k in range(r, len(pairs), _RUNS):
             points = corners(kind, triangles, edges, pairs[k, 0], pairs[k, 1])
             if not is_clear(x, way, kind, points):
-                step = collision_time(x, way, kind, points, least, floor)
+                step = collision_time(x, way, kind, points, least, its_kept)
                 if step < least:
                     least, at = step, k
         steps[r], rows[r] = least, at

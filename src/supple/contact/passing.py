@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from supple.contact.ccd import collision_time, is_clear
+from supple.contact.ccd import NO_FLOOR, collision_time, is_clear
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE, any_across, corners, unit
 from supple.contact.mesh.contact_mesh import ContactMesh
 from supple.contact.search.patch_search import PatchSearch
@@ -43,10 +43,14 @@ class Passing:
     Parameters
     ----------
     rest : (s, 3) the points of the mesh at rest [m]
+
+    Attributes
+    ----------
+    searches : how many have been made
     """
 
     def __init__(self, mesh: ContactMesh, rest: NDArray[np.float64]) -> None:
-        self.mesh, self._rest = mesh, rest
+        self.mesh, self._rest, self.searches = mesh, rest, 0
         self._owners = int(mesh.owner.max(initial=-1)) + 1
 
     @cached_property
@@ -114,6 +118,7 @@ class Passing:
         share = (times[1] - times[0]) / pieces
         for piece in range(pieces):
             x, way = x0 + (times[0] + piece * share) * ways, share * ways
+            self.searches += 1
             found = search.find(x, way, 0.0)
             for kind, pairs in zip((VERTEX_TRIANGLE, EDGE_EDGE), found, strict=True):
                 met = np.zeros((len(pairs), 5))
@@ -196,7 +201,7 @@ def _write_meetings(x, way, end, kind, triangles, edges, pairs, met):
                 y[i, m], w[i, m] = x[points[i], m], way[points[i], m]
         now = 0.0
         for _ in range(_ROUNDS):
-            time = collision_time(y, w, kind, four, 1.0 - now, 0.0)
+            time = collision_time(y, w, kind, four, 1.0 - now, NO_FLOOR)
             now += time
             if now > 1.0:
                 break

@@ -6,7 +6,7 @@ import ipctk
 import numpy as np
 import pytest
 
-from supple.contact.ccd import KEEP, ROUND_OFF, collision_time
+from supple.contact.ccd import KEEP, NO_FLOOR, ROUND_OFF, collision_time
 from supple.contact.features.pair_geometry import EDGE_EDGE
 from supple.contact.features.pair_geometry import VERTEX_TRIANGLE as POINT_TRIANGLE
 from supple.runtime.kernel_cache import njit
@@ -15,7 +15,7 @@ from supple.runtime.kernel_cache import njit
 @njit
 def all_times(kind, x, way, out):
     for k in range(len(x)):
-        out[k] = collision_time(x[k], way[k], kind, (0, 1, 2, 3), 1.0, 0.0)
+        out[k] = collision_time(x[k], way[k], kind, (0, 1, 2, 3), 1.0, NO_FLOOR)
 
 
 def times(kind, x, way):

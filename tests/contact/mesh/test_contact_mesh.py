@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.candidates import nearer
+from supple.contact.candidates import distances
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import contact_mesh, intersects, mesh_of_triangles
 from supple.contact.mesh.obstacles import obstacle_positions, with_obstacles
@@ -134,7 +134,7 @@ def test_stitched_pairs_and_pairs_that_touch_at_the_start_are_excluded():
     points, faces = np.meshgrid(np.arange(s), np.arange(len(mesh.triangles)), indexing="ij")
     pairs = np.column_stack([points.ravel(), faces.ravel()]).astype(np.int32)
     pairs = pairs[apart[pairs[:, 0], mesh.triangles[pairs[:, 1], 0]]]
-    near = nearer(x, VERTEX_TRIANGLE, mesh.triangles, mesh.edges, pairs, 1e-6)
+    near = distances(x, VERTEX_TRIANGLE, mesh.triangles, mesh.edges, pairs) < 1e-6
     near &= stitched[pairs[:, 0]] | stitched[mesh.triangles[pairs[:, 1]]].any(axis=1)
     expected = set(map(tuple, pairs[near].tolist())) | set(
         zip(*map(np.ndarray.tolist, stitched_triangles(nodes, mesh.triangles, s)), strict=True)
@@ -143,7 +143,9 @@ def test_stitched_pairs_and_pairs_that_touch_at_the_start_are_excluded():
     one, other = np.triu_indices(len(mesh.edges), 1)
     pairs = np.column_stack([one, other]).astype(np.int32)
     pairs = pairs[apart[mesh.edges[pairs[:, 0], 0], mesh.edges[pairs[:, 1], 0]]]
-    near = nearer(x, EDGE_EDGE, mesh.triangles, mesh.edges, pairs, 1e-6) & stitched[mesh.edges[pairs]].any(axis=(1, 2))
+    near = (distances(x, EDGE_EDGE, mesh.triangles, mesh.edges, pairs) < 1e-6) & stitched[mesh.edges[pairs]].any(
+        axis=(1, 2)
+    )
     masked = np.column_stack(stitched_edges(nodes, mesh.edges, s)).tolist()
     expected = {pair for a, b in pairs[near].tolist() + masked for pair in ((a, b), (b, a))}
     assert listed(mesh.stitched.edges_of_edge) == expected

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.candidates import CandidateFinder, nearer
+from supple.contact.candidates import CandidateFinder, distances
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import mesh_of_triangles
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -49,8 +49,8 @@ def near_pairs(mesh, places):
         candidates.build(library, np.asfortranarray(x), DHAT)
         points = np.array([(c.vertex_id, c.face_id) for c in candidates.fv_candidates], dtype=np.int32).reshape(-1, 2)
         sides = np.array([(c.edge0_id, c.edge1_id) for c in candidates.ee_candidates], dtype=np.int32).reshape(-1, 2)
-        points = points[nearer(x, VERTEX_TRIANGLE, mesh.triangles, mesh.edges, points, DHAT)]
-        sides = np.sort(sides[nearer(x, EDGE_EDGE, mesh.triangles, mesh.edges, sides, DHAT)], axis=1)
+        points = points[distances(x, VERTEX_TRIANGLE, mesh.triangles, mesh.edges, points) < DHAT]
+        sides = np.sort(sides[distances(x, EDGE_EDGE, mesh.triangles, mesh.edges, sides) < DHAT], axis=1)
         owners = mesh.owner[points[:, 0]], mesh.owner[mesh.triangles[points[:, 1], 0]]
         found[0].update(map(tuple, points[mesh.collide[owners]].tolist()))
         owners = mesh.owner[edges[sides[:, 0], 0]], mesh.owner[edges[sides[:, 1], 0]]
@@ -120,6 +120,23 @@ def test_places_on_the_way_need_no_search(monkeypatch):
     monkeypatch.setattr("supple.contact.candidates.PatchSearch.find", None)
     for place in along(x, x + way, (1.0, 0.5, 0.25, 0.1, 0.01)):
         assert_contains(finder.at(place), near_pairs(mesh, [place]))
+
+
+def test_one_search_serves_every_shorter_way_of_each_point():
+    mesh, x = scene()
+    rng = np.random.default_rng(9)
+    way = 0.2 * rng.normal(size=(3, 3))[mesh.owner] + 0.1 * rng.normal(size=x.shape)
+    finder = CandidateFinder(mesh, DHAT)
+    finder.find(x, x + way)
+    needed = 0
+    for _ in range(12):
+        begin, end = (x + rng.random((3, 1))[mesh.owner] * way for _ in range(2))
+        pairs = near_pairs(mesh, along(begin, end))
+        assert_contains(finder.find(begin, end), pairs)
+        assert_contains(finder.at(end), near_pairs(mesh, [end]))
+        needed += len(pairs[0]) + len(pairs[1])
+    assert finder.searches == 1
+    assert needed > 500
 
 
 def test_pairs_with_common_points_and_pairs_that_may_not_touch_are_left_out():

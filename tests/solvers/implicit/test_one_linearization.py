@@ -133,6 +133,23 @@ def test_a_box_on_a_slope_follows_coulombs_law(friction, most):
         assert work == pytest.approx(-friction * 0.5 * 9.81 * np.cos(angle) * way, rel=0.02)
 
 
+def test_a_step_searches_twice_at_most_and_solves_three_systems():
+    """Four times after an impact: also along what collisions change, and where things may have passed each other."""
+    details = [details_of(frame) for frame in sp.simulate(tower(), sp.Implicit(max_iterations=1), 1 / 60, 30)][1:]
+    searches, systems = [each.searches for each in details], [each.linear_solves for each in details]
+    assert max(searches) <= 4
+    assert np.mean(searches) < 2.5
+    assert 1 in systems[:3]  # in free fall
+    assert 2 <= max(systems) <= 3
+
+
+def test_a_body_at_rest_needs_no_search_and_one_system():
+    box = sp.Body("box", shapes.box((0.06, 0.06, 0.06), (3, 3, 3)), rubber(), position=(0, 0.0301, 0))
+    frames = list(sp.simulate(sp.Scene([box], FLOOR), sp.Implicit(max_iterations=1), 1 / 60, 40))
+    assert all(details_of(frame).searches == 0 for frame in frames[-10:])
+    assert all(details_of(frame).linear_solves <= 3 for frame in frames[-10:])
+
+
 def test_a_drop_comes_to_rest_at_the_height_of_the_whole_method():
     box = sp.Body("box", shapes.box((0.06, 0.06, 0.06), (3, 3, 3)), rubber(), position=(0, 0.035, 0))
     ends = [last(sp.Scene([box], FLOOR), most, 60) for most in (120, 1)]

@@ -97,10 +97,10 @@ def _along(a, u, time):
 
 
 @njit(cache=True)
-def write_collisions(x, way, triangles, edges, point_pairs, edge_pairs, floor, rows):
+def write_collisions(x, way, triangles, edges, point_pairs, edge_pairs, kept, rows):
     """Write the rows of all pairs that collide while points go from x (s, 3) along `way` (s, 3); returns their number.
 
-    floor : see `collision_time`. Where `rows` has no room, only the first ones are written.
+    kept : see `Kept`. Where `rows` has no room, only the first ones are written.
     """
     count = 0
     for kind in (VERTEX_TRIANGLE, EDGE_EDGE):
@@ -109,7 +109,7 @@ def write_collisions(x, way, triangles, edges, point_pairs, edge_pairs, floor, r
             points = corners(kind, triangles, edges, pairs[k, 0], pairs[k, 1])
             if is_clear(x, way, kind, points):
                 continue
-            time = collision_time(x, way, kind, points, 1.0, floor)
+            time = collision_time(x, way, kind, points, 1.0, kept)
             if time <= 1.0:
                 if count < len(rows.kinds):
                     _write(x, way, time, kind, points, rows, count)

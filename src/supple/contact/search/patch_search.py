@@ -1,8 +1,8 @@
 """Which pairs of points and triangles, and of edges, may come near each other while all nodes go straight on.
 
 A pair is found if its parts may come nearer than `reach` on the given ways. Only relative ways count: parts that move
-together keep their distance. Boxes of patches are swept along an axis; in patches whose boxes overlap, the parts are
-compared that reach into the box of the other patch.
+together keep their distance. Of parts that go `apart`, each may be anywhere on its own way. Boxes of patches are swept
+along an axis; in patches whose boxes overlap, the parts are compared that reach into the box of the other patch.
 """
 
 from __future__ import annotations
@@ -67,16 +67,19 @@ def _meeting(box, i, boxes, first, last, reach, hits, out):
 
 
 @njit(inline="always")
-def _relative(way, a, b):
-    d = subtract(row(way, a), row(way, b))
-    return dot(d, d)
+def _relative(way, a, b, apart):
+    """The square of how much nearer two nodes may come. Apart, it is largest where each way is whole or not begun."""
+    u, v = row(way, a), row(way, b)
+    d = subtract(u, v)
+    return max(dot(d, d), dot(u, u), dot(v, v)) if apart else dot(d, d)
 
 
 @njit
-def _point_near(x, way, v, triangles, t, reach):
+def _point_near(x, way, apart, v, triangles, t, reach):
     """Whether a point may come nearer to a triangle than `reach`."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    far = reach + math.sqrt(max(_relative(way, v, a), _relative(way, v, b), _relative(way, v, c)))
+    most = max(_relative(way, v, a, apart), _relative(way, v, b, apart), _relative(way, v, c, apart))
+    far = reach + math.sqrt(most)
     # The plane across the line from the middle of the triangle to the point, before the exact distance.
     p, u, w, z = row(x, v), row(x, a), row(x, b), row(x, c)
     n = (p[0] - (u[0] + w[0] + z[0]) / 3.0, p[1] - (u[1] + w[1] + z[1]) / 3.0, p[2] - (u[2] + w[2] + z[2]) / 3.0)
@@ -87,10 +90,11 @@ def _point_near(x, way, v, triangles, t, reach):
 
 
 @njit
-def _edges_near(x, way, edges, e, f, reach):
+def _edges_near(x, way, apart, edges, e, f, reach):
     """Whether two edges may come nearer than `reach`."""
     a, b, c, d = edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1]
-    most = max(max(_relative(way, a, c), _relative(way, a, d)), max(_relative(way, b, c), _relative(way, b, d)))
+    first = max(_relative(way, a, c, apart), _relative(way, a, d, apart))
+    most = max(first, _relative(way, b, c, apart), _relative(way, b, d, apart))
     far = reach + math.sqrt(most)
     p, q, r, s = row(x, a), row(x, b), row(x, c), row(x, d)
     n = (p[0] + q[0] - r[0] - s[0], p[1] + q[1] - r[1] - s[1], p[2] + q[2] - r[2] - s[2])
@@ -113,7 +117,7 @@ def _reaching(box, i, boxes, first, last, reach, room):
 
 
 @njit
-def _search_run(share, x, way, reach, asked, s, patches, boxes, order, rooms):
+def _search_run(share, x, way, apart, reach, asked, s, patches, boxes, order, rooms):
     """The pairs of patches in a share of `order`, two ends, with later ones. Returns the numbers of both kinds."""
     out_points, out_edges = rooms
     of_points, of_triangles, of_edges, of_patches, axis = boxes
@@ -146,7 +150,9 @@ def _search_run(share, x, way, reach, asked, s, patches, boxes, order, rooms):
                         t = patch_triangles.items[other[1][near[j]]]
                         if v in (s.triangles[t, 0], s.triangles[t, 1], s.triangles[t, 2]):
                             continue
-                        if not _point_near(x, way, v, s.triangles, t, reach) or in_list(s.excluded_triangles, k, t):
+                        if not _point_near(x, way, apart, v, s.triangles, t, reach) or in_list(
+                            s.excluded_triangles, k, t
+                        ):
                             continue
                         if points < len(out_points):
                             out_points[points, 0], out_points[points, 1] = k, t
@@ -163,7 +169,7 @@ def _search_run(share, x, way, reach, asked, s, patches, boxes, order, rooms):
                     g, h = s.edges[f, 0], s.edges[f, 1]
                     if c in (g, h) or d in (g, h):
                         continue
-                    if not _edges_near(x, way, s.edges, e, f, reach) or in_list(s.excluded_edges, e, f):
+                    if not _edges_near(x, way, apart, s.edges, e, f, reach) or in_list(s.excluded_edges, e, f):
                         continue
                     if edges < len(out_edges):
                         out_edges[edges, 0], out_edges[edges, 1] = min(e, f), max(e, f)
@@ -172,12 +178,12 @@ def _search_run(share, x, way, reach, asked, s, patches, boxes, order, rooms):
 
 
 @njit(cache=True, parallel=True)
-def search_patches(x, way, reach, asked, parts, patches, boxes, order, counts, out_points, out_edges):
+def search_patches(x, way, apart, reach, asked, parts, patches, boxes, order, counts, out_points, out_edges):
     """List pairs with a part in a patch that is asked (q,), in runs over the patches.
 
     Parameters
     ----------
-    x, way : (N, >= 3) of the nodes [m]; reach : [m]
+    x, way : (N, >= 3) of the nodes [m]; apart : whether parts go independently; reach : [m]
     boxes : of points, triangles and edges in the order of their patches, and of patches
     order : (q,) patches by the low end of their box along `axis`
     counts : (r, 2) the numbers of both kinds that each run finds, which may not fit
@@ -201,7 +207,7 @@ def search_patches(x, way, reach, asked, parts, patches, boxes, order, counts, o
         )
         its_boxes = of_points, of_triangles, of_edges, of_patches, axis
         share, rooms = (r * rows // runs, (r + 1) * rows // runs), (out_points[r], out_edges[r])
-        points, lines = _search_run(share, x, way, reach, asked, its_parts, its_patches, its_boxes, order, rooms)
+        points, lines = _search_run(share, x, way, apart, reach, asked, its_parts, its_patches, its_boxes, order, rooms)
         counts[r, 0], counts[r, 1] = points, lines
 
 
@@ -217,15 +223,22 @@ class PatchSearch:
         self._room = [np.empty((1, 1024, 2), dtype=np.int32) for _ in range(2)]
 
     def find(
-        self, x: NDArray[np.float64], way: NDArray[np.float64], reach: float, asked: NDArray[np.bool_] | None = None
+        self,
+        x: NDArray[np.float64],
+        way: NDArray[np.float64],
+        reach: float,
+        asked: NDArray[np.bool_] | None = None,
+        collide: NDArray[np.bool_] | None = None,
+        apart: bool = False,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """(k, 2) points and triangles, (l, 2) edges, the lower first; see the module.
 
         Parameters
         ----------
         x, way : (N, 3) [m]; reach : [m]; asked : (q,) patches of one side of every pair, None for all
+        collide : (p, p) the owners to compare, None for all that may touch; apart : whether parts go independently
         """
-        p = self._patches
+        p, parts = self._patches, self._parts if collide is None else self._parts._replace(collide=collide)
         asked = np.ones(len(p.owner), dtype=np.bool_) if asked is None else asked
         for rows, boxes in zip(self._simplices, self._boxes, strict=False):
             _boxes(x, way, rows, boxes)
@@ -238,7 +251,7 @@ class PatchSearch:
         if len(self._room[0]) != len(counts):
             self._room = [np.empty((len(counts), 1024 // len(counts), 2), dtype=np.int32) for _ in range(2)]
         while True:
-            search_patches(x, way, reach, asked, self._parts, p[:4], boxes, order, counts, *self._room)
+            search_patches(x, way, apart, reach, asked, parts, p[:4], boxes, order, counts, *self._room)
             most = counts.max(axis=0)
             if all(count <= room.shape[1] for count, room in zip(most, self._room, strict=True)):
                 break

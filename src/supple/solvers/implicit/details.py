@@ -26,7 +26,10 @@ class ImplicitDetails(SolverDetails):
     newton_iterations : of all substeps, also of those that were repeated with half the length
     extension_iterations : those that moved pins to their places
     cg_iterations : of the conjugate gradient method, in all linear solves
-    direct_solves : linear solves by factorization
+    linear_solves : systems that were solved; with `max_iterations` of 1 to 3, at most three times as many in a substep,
+        and one more where a matrix was found to be indefinite
+    direct_solves : those by factorization
+    searches : for pairs of surfaces that may touch
     line_search_cuts : how often a step was halved
     filter_steps : iterations in which inversion or contact limited the step
     substeps : how many substeps succeeded
@@ -46,7 +49,9 @@ class ImplicitDetails(SolverDetails):
     newton_iterations: int = 0
     extension_iterations: int = 0
     cg_iterations: int = 0
+    linear_solves: int = 0
     direct_solves: int = 0
+    searches: int = 0
     line_search_cuts: int = 0
     filter_steps: int = 0
     substeps: int = 0

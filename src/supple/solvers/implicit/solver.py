@@ -73,8 +73,9 @@ class Implicit(Solver):
     ----------
     integrator : "backward_euler", "bdf2", "newmark" (midpoint; without rigid bodies), "static", or an `Integrator`.
     tolerance : Newton stops when no vertex's step is longer than this share of the (smallest) body's diagonal, per
-        second of the step [1/s]; for "static", than this share of the diagonal [-]. None: 1e-3 1/s or 1e-9, and where
-        there is contact no longer than a tenth of `dhat`, with friction than a hundredth of `friction_velocity`.
+        second of the step [1/s]; for "static", than this share of the diagonal [-]. None: 1e-9, or 1e-3 1/s, and less
+        with the square of steps below 1/15 s (backward Euler: 1/60 s); where there is contact no longer than a tenth of
+        `dhat`, with friction than a hundredth of `friction_velocity`.
     force_tolerance : where surfaces touch, Newton also goes on until the remaining forces are below this share of
         contact's [-].
     max_iterations : of Newton in one (sub)step. 1 to 3: that many linearizations, for real time, and up to 3 where
@@ -224,6 +225,7 @@ class Implicit(Solver):
         SceneError, SolverError : see `check`, which is called here for a state that is not known to pass it.
         """
         workspace.tools.clock.restart()
+        solves, searches = workspace.counts
         if workspace.checked is None or state.positions is not workspace.checked.positions:
             self.check(system, state, workspace)
         state = replace(state, internal=checked(system.laws.material, state.internal))
@@ -290,6 +292,7 @@ class Implicit(Solver):
         workspace.checked = now
         details = replace(
             ImplicitDetails.of_rows(rows, substeps),
+            linear_solves=workspace.counts[0] - solves,
             work=energy,
             energy_residual=residual,
             time_error=time_error,
@@ -306,7 +309,8 @@ class Implicit(Solver):
             details, nearest, contacts = last.contact.measured(details, last.state.positions)
             if last.joints is not None:
                 details = last.joints.measured(details, last.outcome.end.positions)
-        details = replace(details, seconds=workspace.tools.clock.shares())
+        searches = workspace.counts[1] - searches
+        details = replace(details, searches=searches, seconds=workspace.tools.clock.shares())
         return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)
 
 

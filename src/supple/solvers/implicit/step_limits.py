@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.solvers.implicit.contact.collisions import StepAlong
 from supple.solvers.implicit.contact.model import ContactModel
 from supple.solvers.implicit.inversion_guard import InversionGuard
 from supple.solvers.implicit.timings import Clock
@@ -43,13 +44,24 @@ class StepLimits:
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> StepLimit:
         """The largest step along `direction` (n, 3)."""
+        return self._largest_step(x, direction, self._along(x, direction))
+
+    def _along(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> StepAlong | None:
+        if self.contact is None:
+            return None
+        with self.clock.of("contact"):
+            return self.contact.collisions.along(x, direction)
+
+    def _largest_step(
+        self, x: NDArray[np.float64], direction: NDArray[np.float64], along: StepAlong | None
+    ) -> StepLimit:
         with self.clock.of("elasticity"):
             step, tet = self.guard.largest_step(x, direction)
         inversion = StepLimit(step, tet, "" if tet < 0 else f"inversion of {self.guard.name(tet)}")
-        if self.contact is None or step == 0.0:
+        if self.contact is None or along is None or step == 0.0:
             return inversion
         with self.clock.of("contact"):
-            free, points = self.contact.largest_step(x, step * direction)
+            free, points = along.largest_step(step * direction)
         if free == 1.0:
             return inversion
         reason = f"contact of {self.contact.names(points)}" if points else "length of the search for contacts"
@@ -63,11 +75,11 @@ class StepLimits:
         Bodies that are joined or touch are shortened together, and others on their own: what collides does not stop
         what flies. They go this share (n, 1) of the way that is free.
         """
-        taken = np.ones((len(x), 1))
-        first = limit = self.largest_step(x, direction)
+        along = self._along(x, direction)
+        first = limit = self._largest_step(x, direction, along)
         if limit.step == 1.0:
             return direction, first
-        pieces = self.guard.system.joined_components
+        taken, pieces = np.ones((len(x), 1)), self.guard.system.joined_components
         if self.contact is not None:
             pieces = self.contact.clusters(x, pieces)
         for _ in range(_MOST_ROUNDS):
@@ -79,9 +91,10 @@ class StepLimits:
                 meeting = pieces[self.contact.vertices(limit.points)]
             else:
                 break
-            taken = np.where(np.isin(pieces, meeting)[:, None], limit.step * share * taken, taken)
-            limit = self.largest_step(x, taken * direction)
-        taken = limit.step * taken
+            free = np.isin(pieces, meeting)
+            taken[free] *= limit.step * (share[free] if isinstance(share, np.ndarray) else share)
+            limit = self._largest_step(x, taken * direction, along)
+        taken *= limit.step
         return taken * direction, first._replace(step=float(taken.min(initial=1.0)))
 
     def allows(self, x: NDArray[np.float64]) -> bool:

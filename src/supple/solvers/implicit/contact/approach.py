@@ -32,10 +32,14 @@ class Approach(ContactPotential):
         """No rows."""
         return cls(collisions, CollisionRows.room(0), stiffness)
 
-    def with_more(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> Approach:
-        """The rows that push along a `way` (n, 3) from x (n, 3): those that are known, and those of new collisions."""
+    def with_more(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> Approach | None:
+        """The rows that push along a `way` (n, 3) from x (n, 3): those that are known, and those of new collisions;
+        None where nothing collides."""
         ahead = self.collisions.half_spaces.points.positions(way)
-        rows = self.rows.along(ahead).joined(self.collisions.ahead(x, ahead, self.target))
+        new = self.collisions.ahead(x, ahead, self.target)
+        if not len(new.kinds):
+            return None
+        rows = self.rows.along(ahead).joined(new)
         return Approach(self.collisions, rows.where(rows.ends < self.target), self.stiffness)
 
     @property

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from supple.contact.barrier.barrier_energy import add_barrier_gradient, barrier_energy, barrier_hessian
 from supple.contact.barrier.collision_rows import CollisionRows, write_collisions
 from supple.contact.candidates import CandidateFinder
-from supple.contact.ccd import largest_step_in_pieces
+from supple.contact.ccd import Along, Kept
 from supple.contact.features.contact_set import Found, contacts_at
 from supple.contact.features.contacts import Contacts, KnownWeights
 from supple.contact.features.half_spaces import HalfSpaces
@@ -31,7 +31,7 @@ class Collisions:
     Attributes
     ----------
     floor : distance [m] below which steps keep nearly all of it; 0 but in linearizations
-    half_spaces : has the points that contacts name, and their owners
+    half_spaces : has the points that contacts name, and their owners; finder : of what is near what
     """
 
     def __init__(self, mesh: ContactMesh, obstacles: tuple[ObstacleRange, ...], dhat: float) -> None:
@@ -39,7 +39,7 @@ class Collisions:
         self.half_spaces = HalfSpaces(mesh, obstacles)
         self.dhat = dhat
         self.floor = 0.0
-        self._finder = CandidateFinder(mesh, REACH * dhat)
+        self.finder = CandidateFinder(mesh, REACH * dhat)
         self._x: NDArray[np.float64] | None = None
         self._points = np.zeros((0, 3))
         self._found: Found | None = None
@@ -73,7 +73,7 @@ class Collisions:
     def _at(self, x: NDArray[np.float64]) -> Found:
         points, s = self.points(x), len(self.mesh.points)
         if self._found is None:
-            near = self._finder.at(points[:s])
+            near = self.finder.at(points[:s])
             pairs = near.vertex_triangle, near.edge_edge
             found = contacts_at(points[:s], self.mesh, *pairs, self._known, self.dhat)
             on_planes, least = self.half_spaces.contacts(points, self.dhat)
@@ -82,23 +82,25 @@ class Collisions:
             self._found = found._replace(least=min(found.least, least))
         return self._found
 
-    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:
-        """How far along `direction` (n, 3), at most 1, nothing touches; the points of the pair that allows no more."""
+    def along(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> StepAlong:
+        """How far everything may go from x (n, 3) along ways that are nowhere longer than `direction` (n, 3)."""
         points, way, s = self.points(x), self.half_spaces.points.positions(direction), len(self.mesh.points)
-        step, row = self.half_spaces.largest_step(points, way)
-        pair = [] if row < 0 else self.half_spaces.tets[row, [3, 0]].tolist()
-        if step > 0.0:
-            limit = largest_step_in_pieces(self._finder, points[:s], step * way[:s], self.floor)
-            step *= limit.step
-            pair = list(limit.points) or pair
-        return step, pair
+        return StepAlong(self, points, Along(self.finder, points[:s], way[:s], self.floor))
 
     def ahead(self, x: NDArray[np.float64], way: NDArray[np.float64], least: float) -> CollisionRows:
         """Rows of the pairs that collide while points go from x (n, 3) along `way` (s + 3 h, 3).
 
-        least : gap [m] that a point keeps from a half-space, or it collides
+        least : gap [m] that a point keeps from a half-space, or it gets a row, where anything collides
         """
         points, s, mesh = self.points(x), len(self.mesh.points), self.mesh
+        found = self.finder.find(points[:s], points[:s] + way[:s])
+        pairs = mesh.triangles, mesh.edges, found.vertex_triangle, found.edge_edge
+        rows, kept = CollisionRows.room(64), Kept(self.floor, self.finder.dhat)
+        while (count := write_collisions(points[:s], way[:s], *pairs, kept, rows)) > len(rows.kinds):
+            rows = CollisionRows.room(count)
+        rows = rows.where(slice(count))
+        if not count and self.half_spaces.largest_step(points, way)[0] == 1.0:
+            return rows
         longest = float(np.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)))
         planes, _ = self.half_spaces.contacts(points, least + longest)
         on_planes = CollisionRows(
@@ -109,16 +111,32 @@ class Collisions:
             planes.distances,
             planes.distances,
         ).along(way)
-        found = self._finder.find(points[:s], points[:s] + way[:s])
-        pairs = mesh.triangles, mesh.edges, found.vertex_triangle, found.edge_edge
-        rows = CollisionRows.room(64)
-        while (count := write_collisions(points[:s], way[:s], *pairs, self.floor, rows)) > len(rows.kinds):
-            rows = CollisionRows.room(count)
-        return rows.where(slice(count)).joined(on_planes.where(on_planes.ends < least))
+        return rows.joined(on_planes.where(on_planes.ends < least))
 
     def intersect(self, x: NDArray[np.float64]) -> bool:
         """Whether any two triangles that may not cross do so at x."""
         return intersects(self.mesh, self.points(x)[: len(self.mesh.points)])
+
+
+@dataclass(frozen=True, eq=False)
+class StepAlong:
+    """How far everything may go along ways from `points` (s + 3 h, 3); see `Along`."""
+
+    collisions: Collisions
+    points: NDArray[np.float64]
+    surfaces: Along
+
+    def largest_step(self, direction: NDArray[np.float64]) -> tuple[float, list[int]]:
+        """How far along `direction` (n, 3), at most 1, nothing touches; the points of the pair that allows no more."""
+        planes, s = self.collisions.half_spaces, len(self.collisions.mesh.points)
+        way = planes.points.positions(direction)
+        step, row = planes.largest_step(self.points, way)
+        pair = [] if row < 0 else planes.tets[row, [3, 0]].tolist()
+        if step > 0.0:
+            limit = self.surfaces.largest_step(step * way[:s])
+            step *= limit.step
+            pair = list(limit.points) or pair
+        return step, pair
 
 
 # The barrier between bodies and obstacles: an energy that grows without bound as surfaces come together.

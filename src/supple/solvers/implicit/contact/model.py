@@ -50,6 +50,11 @@ class ContactModel:
         """(p, p) of friction."""
         return self.table.friction
 
+    @property
+    def searches(self) -> int:
+        """How many have been made."""
+        return self.collisions.finder.searches + self.direct_way.searches
+
     def frictions(
         self,
         barrier: Barrier,
@@ -72,10 +77,6 @@ class ContactModel:
         weights = slips.forces / forces[rough] * barrier.stiffness * contacts.weights[rough]
         press = Press(contacts.distances[rough], weights, self.scales.dhat, barrier.soft)
         return [Friction(points.points, slips, self.scales.friction_velocity * duration, press)]
-
-    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:
-        """How far along `direction` (n, 3), at most 1, nothing touches, and two points of what would touch."""
-        return self.collisions.largest_step(x, direction)
 
     def vertices(self, points: Sequence[int] | NDArray[np.int32]) -> NDArray[np.int32]:
         """The vertices that points are combinations of."""

@@ -119,11 +119,15 @@ class DirectionFinder:
     forcing: float = _LOOSEST
     last_norm: float = 0.0
 
-    def find(self, here: Model) -> Direction | None:
-        """The direction from a point whose Hessian is in `tools.hessian`; None where no system could be solved."""
+    def find(self, here: Model, similar: Direction | None = None) -> Direction | None:
+        """The direction from a point whose Hessian is in `tools.hessian`; None where no system could be solved.
+
+        similar : the direction of a similar system, where the search for the solution begins
+        """
         tools = self.tools
         gradient = tools.freed(here.gradient)
-        vector, report = self._solve(gradient)
+        start = None if similar is None else (similar.vector, similar.linear.first_norm)
+        vector, report = self._solve(gradient, start)
         while vector is None and self.policy.now is not ProjectedTerms.ALL:
             self.policy.step_back(bool(tools.hessian.couplings))
             self.objective.model(here.positions, tools.hessian, self.policy.now)
@@ -162,7 +166,9 @@ class DirectionFinder:
     def _convex(self) -> bool:
         return self.policy.now is ProjectedTerms.ALL
 
-    def _solve(self, gradient: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, LinearReport]:
+    def _solve(
+        self, gradient: NDArray[np.float64], start: tuple[NDArray[np.float64], float] | None = None
+    ) -> tuple[NDArray[np.float64] | None, LinearReport]:
         with self.tools.clock.of("linear_solve"):
             self.tools.linear_solver.assemble(self.tools.hessian)
-            return self.tools.linear_solver.solve(-gradient, self.forcing, self._convex)
+            return self.tools.linear_solver.solve(-gradient, self.forcing, self._convex, start)

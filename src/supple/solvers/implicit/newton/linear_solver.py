@@ -59,6 +59,7 @@ class LinearSolver:
     matrix : the sparse part; low_rank : (k, rows, 3) vectors g, of which g g^T is added to it
     age, fresh_iterations : the number of runs of CG on the present coarse level (-1: none), and the iterations of the
         first one
+    solves : how many systems have been solved
     pace : the number of threads of an iteration, one or `most_threads`, chosen by its time without the linear solve,
         whose work varies
     """
@@ -76,6 +77,7 @@ class LinearSolver:
     low_rank: NDArray[np.float64] = field(init=False)
     age: int = -1
     fresh_iterations: int = 0
+    solves: int = 0
     pace: ThreadTuner = field(init=False)
     most_threads: int = 1
 
@@ -148,7 +150,11 @@ class LinearSolver:
                 self.age = -1
 
     def solve(
-        self, force: NDArray[np.float64], tolerance: float, convex: bool = True
+        self,
+        force: NDArray[np.float64],
+        tolerance: float,
+        convex: bool = True,
+        start: tuple[NDArray[np.float64], float] | None = None,
     ) -> tuple[NDArray[np.float64] | None, LinearReport]:
         """Solve H p = force.
 
@@ -157,6 +163,8 @@ class LinearSolver:
         force : (n, 3), of which the free rows are read; tolerance : relative, for CG
         convex : whether the Hessian is known to be positive semi-definite. Where that is not known, every method checks
             it: CG the curvature along its directions, the factorization the signs of all eigenvalues
+        start : (n, 3) the solution of a similar system, and its report's `first_norm`, to which the tolerance is
+            relative then
 
         Returns
         -------
@@ -164,25 +172,34 @@ class LinearSolver:
             solved, or was found to be indefinite
         """
         began = perf_counter()
-        p, report = self._solve(force, tolerance, convex)
+        self.solves += 1
+        p, report = self._solve(force, tolerance, convex, start)
         self.pace.untimed += perf_counter() - began
         if p is not None and self.reduction is not None:
             self.reduction.welding.follow(p)
         return p, report
 
     def _solve(
-        self, force: NDArray[np.float64], tolerance: float, convex: bool
+        self,
+        force: NDArray[np.float64],
+        tolerance: float,
+        convex: bool,
+        start: tuple[NDArray[np.float64], float] | None,
     ) -> tuple[NDArray[np.float64] | None, LinearReport]:
         b = force[self.order.vertices]
-        x = np.zeros_like(b)
+        x, reference = np.zeros_like(b), 0.0
         p = np.zeros_like(force)
         if len(b) == 0 or not b.any():
             return p, LinearReport("none", 0, 0.0)
         first_norm = 0.0
         iterations = 0
         if self.kind != "direct":
+            rest = b
+            if start is not None:
+                begun, reference = start[0][self.order.vertices], start[1]
+                rest = b - self._product(begun)
             most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
-            result = self._conjugate_gradients(b, x, tolerance, most)
+            result = self._conjugate_gradients(rest, x, tolerance, most, reference)
             if result.indefinite and not convex:
                 return None, LinearReport("pcg", result.iterations, result.first_norm)
             if not result.converged and self.age > 0:
@@ -190,12 +207,12 @@ class LinearSolver:
                 iterations += result.iterations
                 self.preconditioner.update(self.matrix)
                 self.age = -1
-                result = self._conjugate_gradients(b, x, tolerance, most)
+                result = self._conjugate_gradients(rest, x, tolerance, most, reference)
             iterations += result.iterations
-            first_norm = result.first_norm
+            first_norm = max(result.first_norm, reference)
             self._age_by(result.iterations)
             if result.converged or (self.kind == "pcg" and np.isfinite(x).all() and x.any()):
-                p[self.order.vertices] = x
+                p[self.order.vertices] = x if start is None else begun + x
                 return p, LinearReport("pcg", iterations, first_norm)
             if self.kind == "pcg":
                 return None, LinearReport("pcg", iterations, first_norm)
@@ -207,10 +224,17 @@ class LinearSolver:
         p[self.order.vertices] = solution
         return p, LinearReport("direct", iterations, first_norm)
 
+    def _product(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of the matrix with x (rows, 3)."""
+        out = (self.preconditioner.pattern.to_scipy(self.matrix) @ x.ravel()).reshape(-1, 3)
+        for g in self.low_rank:
+            out += g * np.vdot(g, x)
+        return out
+
     def _conjugate_gradients(
-        self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int
+        self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int, reference: float
     ) -> CGResult:
-        return conjugate_gradients(self.preconditioner, b, x, tolerance, most, self.low_rank)
+        return conjugate_gradients(self.preconditioner, b, x, tolerance, most, self.low_rank, reference)
 
     def _age_by(self, iterations: int) -> None:
         """After a run of CG: keep the coarse level unless it has become too old."""

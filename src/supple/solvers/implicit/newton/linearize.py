@@ -30,8 +30,8 @@ from supple.solvers.implicit.step_limits import StepLimits
 # Up to this many iterations are linearizations. A step that is cut takes all of them.
 FEW = 3
 
-# Of one linearization: how often what a direction runs into is added to its linear system.
-_MOST_ROUNDS = 3
+# Linear systems of one linearization: the first, and those that are solved again with what a direction runs into.
+_MOST_SYSTEMS = 3
 # Of the matrix's usual diagonal: as stiff as rows may be with this tolerance of conjugate gradients.
 _ROW_STIFFNESS = 100.0
 _ROW_TOLERANCE = 1e-3
@@ -52,8 +52,9 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
     rows: list[NewtonRow] = []
     if not np.isfinite(here.energy):
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
+    last_system = tools.linear_solver.solves + _MOST_SYSTEMS * problem.max_iterations
     for iteration in tools.linear_solver.iterations(FEW):
-        solved = _direction(directions, here, limits, approach)
+        solved = _direction(directions, here, approach, last_system)
         if solved is None:
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         here, found = solved
@@ -67,6 +68,7 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
         whole = min(limit.step, step) >= _LEAST_STEP
         last = problem.convergence.is_short(found.length) or step == 0.0
         last = last or (whole and iteration + 1 >= problem.max_iterations) or iteration + 1 == FEW
+        last = last or tools.linear_solver.solves >= last_system
         if not last and problem.renewed is not None:
             objective = directions.objective = problem.renewed(end)
         here = objective.model(end, None if last else hessian, policy.now)
@@ -89,22 +91,25 @@ def _row_stiffness(tools: Tools) -> float:
 
 
 def _direction(
-    directions: DirectionFinder, here: Model, limits: StepLimits, approach: Approach | None
+    directions: DirectionFinder, here: Model, approach: Approach | None, last_system: int
 ) -> tuple[Model, Direction] | None:
     """A direction from a point, and the objective there: with rows for what it would run into, so that contact does not
-    cut it, and with no more friction than Coulomb's law allows."""
+    cut it, and with no more friction than Coulomb's law allows.
+
+    last_system : the number of the system that is not solved again
+    """
+    solver = directions.tools.linear_solver
+    last_system = min(last_system, solver.solves + _MOST_SYSTEMS)
     found, objective = directions.find(here), directions.objective
     couplings = directions.tools.hessian.couplings
     known, x = len(couplings), here.positions
     sliding = [Sliding.of(term) for term in objective.terms if isinstance(term, Friction)]
-    for _ in range(_MOST_ROUNDS):
-        if found is None:
-            break
+    while found is not None and solver.solves < last_system:
         more = [each.with_more(x, found.vector) for each in sliding]
         again = any(each is not None for each in more)
         sliding = [each or old for each, old in zip(more, sliding, strict=True)]
-        if approach is not None and limits.largest_step(x, found.vector).step < 1.0:
-            approach = approach.with_more(x, found.vector)
+        if approach is not None and (pushing := approach.with_more(x, found.vector)) is not None:
+            approach = pushing
             again = again or len(approach.rows.kinds) > 0
         if not again:
             break
@@ -116,7 +121,7 @@ def _direction(
             each.add_gradient(x, gradient)
         directions.objective = replace(objective, terms=[*objective.terms, *corrections])
         directions.forcing = _ROW_TOLERANCE
-        found = directions.find(replace(here, gradient=gradient))
+        found = directions.find(replace(here, gradient=gradient), found)
     directions.objective = objective
     if found is None:
         return None

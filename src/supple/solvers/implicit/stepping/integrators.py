@@ -14,6 +14,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,9 +82,14 @@ class History:
 
 
 class Integrator(ABC):
-    """A method; immutable."""
+    """A method; immutable.
+
+    precise_below : length of a step [s] below which the default tolerance of velocities falls with its square, as the
+        errors of the method do; that of a second-order method is less than that of backward Euler
+    """
 
     name: str
+    precise_below: ClassVar[float] = 1.0 / 15.0
 
     @property
     def without_history(self) -> Integrator | None:
@@ -117,6 +123,8 @@ class Integrator(ABC):
 @dataclass(frozen=True)
 class BackwardEuler(Integrator):
     """x = x_n + h v, v = v_n + h a. First order, stable for every step, loses energy."""
+
+    precise_below = 1.0 / 60.0
 
     name = "backward_euler"
 

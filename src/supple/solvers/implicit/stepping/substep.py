@@ -35,7 +35,8 @@ from supple.solvers.implicit.stepping.works import makes_energy, works_of_step
 from supple.solvers.implicit.stepping.workspace import Workspace
 
 # The defaults of `Implicit.tolerance`. Halving the first is meant to move results by less than 1e-4; an equilibrium has
-# no later steps that would make up for the rest.
+# no later steps that would make up for the rest. What is left is an error of the velocity in every step. It falls with
+# the square of the step, as shorter steps would otherwise add more of it, but not to less than round-off leaves.
 _DYNAMIC_TOLERANCE = 1e-3
 _STATIC_TOLERANCE = 1e-9
 
@@ -73,7 +74,10 @@ class StepSettings:
         static = isinstance(self.integrator, Static)
         if self.tolerance is not None:
             return float(self.tolerance) * workspace.diagonal * (1.0 if static else h)
-        length = (_STATIC_TOLERANCE if static else _DYNAMIC_TOLERANCE * h) * workspace.diagonal
+        length, coarse = _STATIC_TOLERANCE, _DYNAMIC_TOLERANCE * h
+        if not static:
+            length = min(max(length, coarse * (h / self.integrator.precise_below) ** 2), coarse)
+        length *= workspace.diagonal
         contact = workspace.contact
         if contact is not None:
             length = min(length, _DHAT_SHARE * contact.scales.dhat)

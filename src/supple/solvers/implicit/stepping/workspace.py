@@ -50,6 +50,11 @@ class Workspace:
         self.conservation = Conservation.of(self.system, self.elasticity, self.stitches, self.tools.free_motion)
 
     @property
+    def counts(self) -> tuple[int, int]:
+        """How many linear systems have been solved, and how many searches for contacts made."""
+        return self.tools.linear_solver.solves, 0 if self.contact is None else self.contact.searches
+
+    @property
     def bodies_end(self) -> int:
         """The first vertex that is an obstacle's."""
         obstacles = () if self.contact is None else self.contact.obstacles
