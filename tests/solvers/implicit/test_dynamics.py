@@ -1,5 +1,6 @@
 """Implicit time integration against mechanics: free fall, momenta, energies, orders of convergence."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -7,9 +8,12 @@ import pytest
 from tests.scenes import at_start, converged
 
 import supple as sp
+from supple.model.system import build_system
 from supple.runtime import parallel_kernel
 from supple.solvers.implicit import solver
 from supple.solvers.implicit.solver import Implicit
+from supple.solvers.implicit.stepping.integrators import integrator_of
+from supple.solvers.implicit.stepping.substep import StepSettings
 
 DYNAMIC = ("backward_euler", "bdf2", "newmark")
 
@@ -152,8 +156,6 @@ def test_a_restart_without_memory_begins_bdf2_with_backward_euler():
     frames = run(scene, Implicit(integrator="bdf2"), 0.01, 3)
     again = run(scene, Implicit(integrator="bdf2"), 0.01, 1, start=frames[1])[-1]
     assert np.array_equal(again.positions["cube"], frames[2].positions["cube"])
-    from dataclasses import replace
-
     bare = replace(frames[1].state, memory=None)
     euler = run(scene, Implicit(), 0.01, 1, start=bare)[-1]
     restarted = run(scene, Implicit(integrator="bdf2"), 0.01, 1, start=bare)[-1]
@@ -179,3 +181,34 @@ def test_same_bits_on_one_and_two_threads(monkeypatch):
         numba.set_num_threads(before)
     assert found[0].positions.tobytes() == found[1].positions.tobytes()
     assert found[0].velocities.tobytes() == found[1].velocities.tobytes()
+
+
+def test_a_spinning_box_turns_over_as_exactly_with_the_default_tolerance_as_with_a_tight_one():
+    """About the middle axis, what Newton's method leaves grows exponentially: with 1e-3 1/s in steps of 1/240 s to .024
+    rad/s, which is more than in steps of 1/120 s."""
+    ends = []
+    for tolerance in (None, 1e-9):
+        box = sp.RigidBody(
+            "box", sp.shapes.box((0.1, 0.23, 0.31), (1, 1, 1)), density=1000.0, angular_velocity=(0.02, 6.0, 0.03)
+        )
+        scene = sp.Scene([box], gravity=(0, 0, 0))
+        *_, last = sp.simulate(scene, Implicit(integrator="bdf2", tolerance=tolerance), 1 / 240, 590)
+        pose = last.poses["box"]
+        ends.append(pose.rotation.T @ pose.angular_velocity)
+    assert ends[0][1] < -3.0  # it has turned over
+    assert np.abs(ends[1] - ends[0]).max() < 1e-5
+
+
+@pytest.mark.parametrize(("integrator", "fine"), [("backward_euler", 1 / 60), ("bdf2", 1 / 15)])
+def test_the_default_tolerance_of_velocities_falls_with_the_square_of_short_steps(integrator, fine):
+    method = integrator_of(integrator)
+    settings = StepSettings(method, None, 1e-4, 120, 0.1, 0.1)
+    system = build_system(sp.Scene([cube()]))
+    workspace = Implicit(integrator=integrator, contact=None).prepare(system)
+    speeds = [settings.shortest(workspace, h, ()) / h / workspace.diagonal for h in (2 * fine, fine, fine / 2)]
+    assert speeds == pytest.approx([1e-3, 1e-3, 2.5e-4])
+    shortest = [settings.shortest(workspace, h, ()) / workspace.diagonal for h in (1e-4, 1e-7)]
+    assert shortest == pytest.approx([1e-9, 1e-10])  # round-off, and never looser than 1e-3 1/s
+    # Without a history, BDF2 is backward Euler.
+    euler = replace(settings, integrator=integrator_of("backward_euler"))
+    assert settings.shortest(workspace, 0.01, None) == euler.shortest(workspace, 0.01, None)

@@ -50,7 +50,6 @@ def conjugate_gradients(
     tolerance: float,
     max_iterations: int,
     low_rank: NDArray[np.float64] = NOTHING_MORE,
-    reference: float = 0.0,
 ) -> CGResult:
     """Solve (A + sum g g^T) x = b.
 
@@ -62,7 +61,6 @@ def conjugate_gradients(
     max_iterations : stop there, converged or not
     low_rank : (k, n, 3) the vectors g. The preconditioner becomes the inverse of M + sum g g^T, so that k costs no
         iterations
-    reference : the tolerance is relative to this norm, where it is larger than that of b
     """
     order = preconditioner.order
     solution = np.zeros_like(x)
@@ -82,9 +80,7 @@ def conjugate_gradients(
         more = (low, np.zeros_like(low), np.zeros_like(low), np.zeros_like(low), np.eye(len(low)))
         _prepare(*inverse, *more)
     rhs = b[order.rows]
-    iterations, converged, indefinite, first = _solve(
-        *inverse, rhs, solution, tolerance, reference, max_iterations, more
-    )
+    iterations, converged, indefinite, first = _solve(*inverse, rhs, solution, tolerance, max_iterations, more)
     x[order.rows] = solution
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
 
@@ -151,20 +147,7 @@ def _prepare(clusters, lower, upper, diagonal, inverse, coarse_groups, first, co
 
 @njit(cache=True, rows=_SHARED_FROM)
 def _solve(
-    clusters,
-    lower,
-    upper,
-    diagonal,
-    inverse,
-    coarse_groups,
-    first,
-    coarse,
-    rhs,
-    x,
-    tolerance,
-    reference,
-    max_iterations,
-    more,
+    clusters, lower, upper, diagonal, inverse, coarse_groups, first, coarse, rhs, x, tolerance, max_iterations, more
 ):
     low, W, Y, UY, S_inverse = more
     sums = np.zeros(len(clusters[1]) - 1)
@@ -210,7 +193,7 @@ def _solve(
         norm = rz**0.5 if rz > 0.0 else 0.0
         if iteration == 0:
             first_norm = norm
-        if norm <= tolerance * max(first_norm, reference):
+        if norm <= tolerance * first_norm:
             return iteration, rz >= 0.0, not rz >= 0.0, first_norm
         if iteration == max_iterations or not rz < np.inf:
             break

@@ -49,7 +49,7 @@ def test_the_tet_that_would_invert_is_named_by_its_body(limits):
     ("way", "step", "reason"),
     [
         (-1.0, 0.18, "contact of body 'lower' and obstacle 'floor'"),
-        (1.0, 0.09, "contact of body 'lower' and body 'upper'"),
+        (1.0, 0.1, "contact of body 'lower' and body 'upper'"),
     ],
 )
 def test_surfaces_that_would_touch_are_named(limits, way: float, step: float, reason: str):
@@ -57,7 +57,8 @@ def test_surfaces_that_would_touch_are_named(limits, way: float, step: float, re
     direction = np.zeros_like(x)
     direction[guard.guard.system.bodies[0].vertices, 1] = way
     found = guard.largest_step(x, direction)
-    assert found.step == pytest.approx(step, rel=0.01)
+    near = guard.contact.collisions.finder.dhat if way > 0.0 else 0.0  # surfaces that are far apart come as near
+    assert found.step == pytest.approx(step - near, rel=1e-3)
     assert (found.tet, found.reason) == (-1, reason)
 
 

@@ -78,6 +78,10 @@ class ContactModel:
         press = Press(contacts.distances[rough], weights, self.scales.dhat, barrier.soft)
         return [Friction(points.points, slips, self.scales.friction_velocity * duration, press)]
 
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:
+        """How far along `direction` (n, 3), at most 1, nothing touches, and two points of what would touch."""
+        return self.collisions.along(x, direction).largest_step(direction)
+
     def vertices(self, points: Sequence[int] | NDArray[np.int32]) -> NDArray[np.int32]:
         """The vertices that points are combinations of."""
         return self.collisions.half_spaces.points.taken(np.asarray(points)).vertices

@@ -119,15 +119,11 @@ class DirectionFinder:
     forcing: float = _LOOSEST
     last_norm: float = 0.0
 
-    def find(self, here: Model, similar: Direction | None = None) -> Direction | None:
-        """The direction from a point whose Hessian is in `tools.hessian`; None where no system could be solved.
-
-        similar : the direction of a similar system, where the search for the solution begins
-        """
+    def find(self, here: Model) -> Direction | None:
+        """The direction from a point whose Hessian is in `tools.hessian`; None where no system could be solved."""
         tools = self.tools
         gradient = tools.freed(here.gradient)
-        start = None if similar is None else (similar.vector, similar.linear.first_norm)
-        vector, report = self._solve(gradient, start)
+        vector, report = self._solve(gradient)
         while vector is None and self.policy.now is not ProjectedTerms.ALL:
             self.policy.step_back(bool(tools.hessian.couplings))
             self.objective.model(here.positions, tools.hessian, self.policy.now)
@@ -166,9 +162,7 @@ class DirectionFinder:
     def _convex(self) -> bool:
         return self.policy.now is ProjectedTerms.ALL
 
-    def _solve(
-        self, gradient: NDArray[np.float64], start: tuple[NDArray[np.float64], float] | None = None
-    ) -> tuple[NDArray[np.float64] | None, LinearReport]:
+    def _solve(self, gradient: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, LinearReport]:
         with self.tools.clock.of("linear_solve"):
             self.tools.linear_solver.assemble(self.tools.hessian)
-            return self.tools.linear_solver.solve(-gradient, self.forcing, self._convex, start)
+            return self.tools.linear_solver.solve(-gradient, self.forcing, self._convex)

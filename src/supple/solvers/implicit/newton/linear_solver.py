@@ -150,11 +150,7 @@ class LinearSolver:
                 self.age = -1
 
     def solve(
-        self,
-        force: NDArray[np.float64],
-        tolerance: float,
-        convex: bool = True,
-        start: tuple[NDArray[np.float64], float] | None = None,
+        self, force: NDArray[np.float64], tolerance: float, convex: bool = True
     ) -> tuple[NDArray[np.float64] | None, LinearReport]:
         """Solve H p = force.
 
@@ -163,8 +159,6 @@ class LinearSolver:
         force : (n, 3), of which the free rows are read; tolerance : relative, for CG
         convex : whether the Hessian is known to be positive semi-definite. Where that is not known, every method checks
             it: CG the curvature along its directions, the factorization the signs of all eigenvalues
-        start : (n, 3) the solution of a similar system, and its report's `first_norm`, to which the tolerance is
-            relative then
 
         Returns
         -------
@@ -173,33 +167,25 @@ class LinearSolver:
         """
         began = perf_counter()
         self.solves += 1
-        p, report = self._solve(force, tolerance, convex, start)
+        p, report = self._solve(force, tolerance, convex)
         self.pace.untimed += perf_counter() - began
         if p is not None and self.reduction is not None:
             self.reduction.welding.follow(p)
         return p, report
 
     def _solve(
-        self,
-        force: NDArray[np.float64],
-        tolerance: float,
-        convex: bool,
-        start: tuple[NDArray[np.float64], float] | None,
+        self, force: NDArray[np.float64], tolerance: float, convex: bool
     ) -> tuple[NDArray[np.float64] | None, LinearReport]:
         b = force[self.order.vertices]
-        x, reference = np.zeros_like(b), 0.0
+        x = np.zeros_like(b)
         p = np.zeros_like(force)
         if len(b) == 0 or not b.any():
             return p, LinearReport("none", 0, 0.0)
         first_norm = 0.0
         iterations = 0
         if self.kind != "direct":
-            rest = b
-            if start is not None:
-                begun, reference = start[0][self.order.vertices], start[1]
-                rest = b - self._product(begun)
             most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
-            result = self._conjugate_gradients(rest, x, tolerance, most, reference)
+            result = self._conjugate_gradients(b, x, tolerance, most)
             if result.indefinite and not convex:
                 return None, LinearReport("pcg", result.iterations, result.first_norm)
             if not result.converged and self.age > 0:
@@ -207,12 +193,12 @@ class LinearSolver:
                 iterations += result.iterations
                 self.preconditioner.update(self.matrix)
                 self.age = -1
-                result = self._conjugate_gradients(rest, x, tolerance, most, reference)
+                result = self._conjugate_gradients(b, x, tolerance, most)
             iterations += result.iterations
-            first_norm = max(result.first_norm, reference)
+            first_norm = result.first_norm
             self._age_by(result.iterations)
             if result.converged or (self.kind == "pcg" and np.isfinite(x).all() and x.any()):
-                p[self.order.vertices] = x if start is None else begun + x
+                p[self.order.vertices] = x
                 return p, LinearReport("pcg", iterations, first_norm)
             if self.kind == "pcg":
                 return None, LinearReport("pcg", iterations, first_norm)
@@ -224,17 +210,10 @@ class LinearSolver:
         p[self.order.vertices] = solution
         return p, LinearReport("direct", iterations, first_norm)
 
-    def _product(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of the matrix with x (rows, 3)."""
-        out = (self.preconditioner.pattern.to_scipy(self.matrix) @ x.ravel()).reshape(-1, 3)
-        for g in self.low_rank:
-            out += g * np.vdot(g, x)
-        return out
-
     def _conjugate_gradients(
-        self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int, reference: float
+        self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int
     ) -> CGResult:
-        return conjugate_gradients(self.preconditioner, b, x, tolerance, most, self.low_rank, reference)
+        return conjugate_gradients(self.preconditioner, b, x, tolerance, most, self.low_rank)
 
     def _age_by(self, iterations: int) -> None:
         """After a run of CG: keep the coarse level unless it has become too old."""

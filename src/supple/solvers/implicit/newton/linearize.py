@@ -121,7 +121,7 @@ def _direction(
             each.add_gradient(x, gradient)
         directions.objective = replace(objective, terms=[*objective.terms, *corrections])
         directions.forcing = _ROW_TOLERANCE
-        found = directions.find(replace(here, gradient=gradient), found)
+        found = directions.find(replace(here, gradient=gradient))
     directions.objective = objective
     if found is None:
         return None

@@ -69,14 +69,18 @@ class StepSettings:
         """Whether a step is a few linearizations, and not a minimization."""
         return self.max_iterations <= FEW
 
-    def shortest(self, workspace: Workspace, h: float) -> float:
-        """The length of Newton's step [m] below which the minimum of a step of h [s] is reached."""
+    def shortest(self, workspace: Workspace, h: float, memory: object) -> float:
+        """The length of Newton's step [m] below which the minimum of a step of h [s] is reached.
+
+        memory : of the integrator, None where a history begins
+        """
         static = isinstance(self.integrator, Static)
         if self.tolerance is not None:
             return float(self.tolerance) * workspace.diagonal * (1.0 if static else h)
         length, coarse = _STATIC_TOLERANCE, _DYNAMIC_TOLERANCE * h
         if not static:
-            length = min(max(length, coarse * (h / self.integrator.precise_below) ** 2), coarse)
+            method = (self.integrator.without_history if memory is None else None) or self.integrator
+            length = min(max(length, coarse * (h / method.precise_below) ** 2), coarse)
         length *= workspace.diagonal
         contact = workspace.contact
         if contact is not None:
@@ -123,7 +127,8 @@ def take_substep(
     ):
         return taken
     balance = taken.works, taken.residual, taken.actuators
-    if not makes_energy(state, taken.state, *balance, settings.shortest(workspace, h) / h, workspace):
+    open_speed = settings.shortest(workspace, h, state.memory) / h
+    if not makes_energy(state, taken.state, *balance, open_speed, workspace):
         return taken
     again = _take(state, end, h, replace(settings, integrator=method), workspace, False)
     assert again is not None
@@ -162,7 +167,7 @@ def _take(
     problem = Problem(
         contact.with_contact(_with_joints(base, joints), state.positions),
         plan.scale,
-        Convergence(settings.shortest(workspace, h), settings.force_tolerance),
+        Convergence(settings.shortest(workspace, h, state.memory), settings.force_tolerance),
         settings.max_iterations,
         workspace.diagonal,
         contact.friction_is_outdated,
