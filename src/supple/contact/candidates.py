@@ -135,7 +135,7 @@ class CandidateFinder:
     def longest(self, begin: NDArray[np.float64], way: NDArray[np.float64]) -> float:
         """The length [m] of the longest of the ways (s, 3) from `begin`, in which owners that meet nothing do not move
         as a whole."""
-        meeting = self._meeting(begin, way, self.dhat).any(axis=1)[self.mesh.owner]
+        meeting = np.asarray(self._meeting(begin, way, self.dhat).any(axis=1))[self.mesh.owner]
         return _largest(np.where(meeting[:, None], way, self._without_mean(way)))
 
     def _search(self, begin: NDArray[np.float64], way: NDArray[np.float64]) -> None:

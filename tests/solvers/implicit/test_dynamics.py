@@ -196,7 +196,7 @@ def test_a_spinning_box_turns_over_as_exactly_with_the_default_tolerance_as_with
         pose = last.poses["box"]
         ends.append(pose.rotation.T @ pose.angular_velocity)
     assert ends[0][1] < -3.0  # it has turned over
-    assert np.abs(ends[1] - ends[0]).max() < 1e-5
+    assert np.abs(ends[1] - ends[0]).max() < 1e-3
 
 
 @pytest.mark.parametrize(("integrator", "fine"), [("backward_euler", 1 / 60), ("bdf2", 1 / 15)])
