@@ -36,11 +36,11 @@ Arrays = Mapping[str, NDArray[Any]]
 
 def kinds_by_name() -> dict[str, type]:
     """All kinds that are defined so far, also those of a user; of two with one name ours, or else the latest."""
-    found: dict[str, type] = {}
+    classes: dict[str, type] = {}
     for kind in _below(Kind):
-        if _is_ours(kind) or not _is_ours(found.get(kind.__name__, kind)):
-            found[kind.__name__] = kind
-    return found
+        if _is_ours(kind) or not _is_ours(classes.get(kind.__name__, kind)):
+            classes[kind.__name__] = kind
+    return classes
 
 
 def _is_ours(kind: type) -> bool:

@@ -45,11 +45,11 @@ class Described(ABCMeta):
 
 def written_types(described: type) -> dict[str, Any]:
     """By name, the types of a class's fields with their validators, as they are written."""
-    found: dict[str, Any] = {}
+    hints: dict[str, Any] = {}
     for base in reversed(described.__mro__):
         names = {"__annotations__": base.__dict__.get("_written", {}), "__module__": base.__module__}
-        found |= get_type_hints(type(base.__name__, (), names), include_extras=True)
-    return found
+        hints |= get_type_hints(type(base.__name__, (), names), include_extras=True)
+    return hints
 
 
 class _WithoutForms(ast.NodeTransformer):

@@ -41,15 +41,15 @@ def _docstring(kind: type | Callable[..., Any]) -> str:
 
 def descriptions(kind: type | Callable[..., Any]) -> dict[str, str]:
     """By name of the parameter, its text on one line; a class's own docstring comes before those of its bases."""
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     for base in reversed(kind.__mro__) if isinstance(kind, type) else (kind,):
         _, *parts = _HEADING.split(_docstring(base))
         for heading, body in zip(parts[::2], parts[1::2], strict=True):
             if heading == "Parameters":
                 for match in _ITEM.finditer(body):
                     text = " ".join(match[2].split()).removesuffix(".")
-                    found |= dict.fromkeys(match[1].split(", "), text)
-    return found
+                    by_name |= dict.fromkeys(match[1].split(", "), text)
+    return by_name
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Declared:
 @cache
 def declared(kind: type | Callable[..., Any]) -> Mapping[str, Declared]:
     """The declared fields of a class, or parameters of a function, by name, in their order."""
-    texts, found = descriptions(kind), {}
+    texts, fields_by_name = descriptions(kind), {}
     for name, hint, default in _fields(kind) if isinstance(kind, type) else _parameters(kind):
         validators = (
             [one for one in get_args(hint) if isinstance(one, Validator)] if get_origin(hint) is Annotated else []
@@ -79,8 +79,8 @@ def declared(kind: type | Callable[..., Any]) -> Mapping[str, Declared]:
             required = name in getattr(kind, "required", ())
             optional = not required and (default is None or type(None) in get_args(get_args(hint)[0]))
             default = MISSING if required else default
-            found[name] = Declared(validators[0], default, texts.get(name, ""), optional)
-    return found
+            fields_by_name[name] = Declared(validators[0], default, texts.get(name, ""), optional)
+    return fields_by_name
 
 
 def _fields(kind: type) -> Iterator[tuple[str, Any, Any]]:
@@ -131,8 +131,8 @@ class Kind(metaclass=Described):
             given = [key for key in self.exactly_one if getattr(self, key) is not None]
             if len(given) != 1:
                 *others, last = self.exactly_one
-                found = " and ".join(given) or "none of them"
-                raise self.error(f"{self.label}: {found} given; give exactly one of {', '.join(others)} and {last}")
+                text = " and ".join(given) or "none of them"
+                raise self.error(f"{self.label}: {text} given; give exactly one of {', '.join(others)} and {last}")
 
     @property
     def word(self) -> str:

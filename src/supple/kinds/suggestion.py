@@ -16,7 +16,7 @@ def suggestion(name: str, known: Sequence[str]) -> str:
     """The known name most similar to `name`, or a list of known names."""
     name = _SYMBOLS.get(name, name) if _SYMBOLS.get(name) in known else name
     written = (name, name.lower().replace("-", "_").replace(" ", "_"))
-    near = next((found for one in written if (found := difflib.get_close_matches(one, known, n=1, cutoff=0.6))), None)
+    near = next((close for one in written if (close := difflib.get_close_matches(one, known, n=1, cutoff=0.6))), None)
     if near:
         return f"did you mean {near[0]!r}?"
     listed = ", ".join(map(repr, known[:12]))

@@ -249,7 +249,7 @@ def _solved(family: Family, curves: Sequence[Curve], scale: float, confidence: f
     accurate = {"method": "lm", "x_scale": "jac", "xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
     starts = list(family.starts(residuals, units))
     rough = [least_squares(residuals, start, method="lm", max_nfev=_ROUGH) for start in starts]
-    best = least_squares(residuals, min(rough, key=lambda found: found.cost).x, **accurate)
+    best = least_squares(residuals, min(rough, key=lambda solution: solution.cost).x, **accurate)
     freedom = len(best.fun) - len(best.x)
     R = np.linalg.qr(best.jac, mode="r")
     if np.linalg.cond(R) > 1e12:

@@ -162,8 +162,8 @@ def _column(cells: list[str], kinds: dict) -> _Column | None:
 
 def _unit(cell: str, named: bool = False) -> str:
     """The unit in brackets after a name, or in a cell of its own."""
-    found = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", cell)
-    return found[1] if found else "" if named else cell
+    unit = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", cell)
+    return unit[1] if unit else "" if named else cell
 
 
 def _is_number(cell: str, separator: str) -> bool:

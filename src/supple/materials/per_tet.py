@@ -135,13 +135,13 @@ class TetMaterial:
     @property
     def flowing_laws(self) -> tuple[tuple[LawTets, slice], ...]:
         """Those that flow, each with its rows of the internal variables: point after point, tet after tet."""
-        found: list[tuple[LawTets, slice]] = []
+        laws: list[tuple[LawTets, slice]] = []
         begin = 0
         for tets in self.laws:
             if tets.flow is not None:
-                found.append((tets, slice(begin, begin + len(tets.rows) * tets.points)))
-                begin = found[-1][1].stop
-        return tuple(found)
+                laws.append((tets, slice(begin, begin + len(tets.rows) * tets.points)))
+                begin = laws[-1][1].stop
+        return tuple(laws)
 
     def with_laws(self, *laws: LawTets) -> TetMaterial:
         """These tets with more laws."""

@@ -47,17 +47,17 @@ class CableReading:
 def cavity_readings(details: SolverDetails) -> dict[str, CavityReading]:
     """By name, those of a solver's details."""
     pressures = details.cavity_pressure
-    found = {n: CavityReading(pressures[n], details.cavity_volume[n], details.cavity_work[n]) for n in pressures}
-    return Named("cavity", found)
+    readings = {n: CavityReading(pressures[n], details.cavity_volume[n], details.cavity_work[n]) for n in pressures}
+    return Named("cavity", readings)
 
 
 def cable_readings(details: SolverDetails) -> dict[str, CableReading]:
     """By name, those of a solver's details."""
-    found: dict[str, CableReading] = Named("cable", {})
+    readings: dict[str, CableReading] = Named("cable", {})
     for name, length in details.cable_length.items():
         tensions = [value for key, value in details.cable_tension.items() if key.rpartition(".")[0] == name]
-        found[name] = CableReading(tuple(tensions), length, details.cable_work[name])
-    return found
+        readings[name] = CableReading(tuple(tensions), length, details.cable_work[name])
+    return readings
 
 
 def start_of(system: System) -> list[list[NDArray[np.float64]]]:
@@ -79,13 +79,13 @@ def actuator_fields(
     Each is an array (p,) for the parts of the coordinate.
     """
     names = ("cavity_pressure", "cavity_volume", "cavity_work", "cable_tension", "cable_length", "cable_work")
-    found: dict[str, dict[str, float]] = {name: {} for name in names}
+    by_field: dict[str, dict[str, float]] = {name: {} for name in names}
     for actuator, Q, s, work in zip(system.actuators, forces, parts, works, strict=True):
         if actuator.kind == "cavity":
-            found["cavity_pressure"][actuator.name] = float(Q[0])
-            found["cavity_volume"][actuator.name] = float(s[0])
+            by_field["cavity_pressure"][actuator.name] = float(Q[0])
+            by_field["cavity_volume"][actuator.name] = float(s[0])
         else:
-            found["cable_tension"] |= {f"{actuator.name}.{k}": max(-float(value), 0.0) for k, value in enumerate(Q)}
-            found["cable_length"][actuator.name] = float(s.sum())
-        found[f"{actuator.kind}_work"][actuator.name] = float(work.sum())
-    return found
+            by_field["cable_tension"] |= {f"{actuator.name}.{k}": max(-float(value), 0.0) for k, value in enumerate(Q)}
+            by_field["cable_length"][actuator.name] = float(s.sum())
+        by_field[f"{actuator.kind}_work"][actuator.name] = float(work.sum())
+    return by_field

@@ -29,12 +29,12 @@ def crushed_tets(system: System, state: State) -> NDArray[np.int64]:
     for part in system.bodies:
         if too_soft(system, part):
             limits[part.tets] = HELD
-    found = (limits > J) & ~infinite_when_flat(system.laws_at(state.time).material)
-    if found.any():
+    crushed = (limits > J) & ~infinite_when_flat(system.laws_at(state.time).material)
+    if crushed.any():
         begun = _ratios(system, system.start_states[0]) < limits
         for part in system.bodies:
-            found[part.tets] &= not begun[part.tets].any()
-    rows = np.flatnonzero(found)
+            crushed[part.tets] &= not begun[part.tets].any()
+    rows = np.flatnonzero(crushed)
     return rows[np.argsort(J[rows])]
 
 

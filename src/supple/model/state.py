@@ -114,12 +114,12 @@ class ContactPoints:
     def by_pair(self) -> dict[tuple[str, str], NDArray[np.float64]]:
         """`force_between` of every two that touch, in both orders: by (on, by), (3,) [N]."""
         low, high = np.minimum(self.first, self.second), np.maximum(self.first, self.second)
-        found = {}
+        forces = {}
         for a, b in np.unique(np.column_stack([low, high])[low != high], axis=0):
             on, by = self.names[a], self.names[b]
-            found[on, by] = self.force_between(on, by)
-            found[by, on] = -found[on, by]
-        return found
+            forces[on, by] = self.force_between(on, by)
+            forces[by, on] = -forces[on, by]
+        return forces
 
     def on_vertices(self, forces: NDArray[np.float64], count: int) -> NDArray[np.float64]:
         """(count, 3) the sums on the System's points of forces (k, 3) of the contacts, such as `forces` [N]."""

@@ -184,29 +184,29 @@ class KernelCache(_Cache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         # Numba's own cache also imports all that a compilation needs: a tenth of the time to a first frame.
         rtsys.initialize(target_context)
-        found = None
+        compiled = None
         if kernel_folder.shipped_target() is not None:
             shipped = self._entry(sig, kernel_folder.shipped_target())
-            found = _rebuilt(kernel_folder.read(kernel_folder.SHIPPED / shipped), target_context)
+            compiled = _rebuilt(kernel_folder.read(kernel_folder.SHIPPED / shipped), target_context)
         path = kernel_folder.kernel_folder() / self._entry(sig, target_context.codegen().magic_tuple())
-        if found is None:
-            found = self._own(path, target_context)
-        self._tell("compiling" if found is None else "loaded", sig)
-        return found
+        if compiled is None:
+            compiled = self._own(path, target_context)
+        self._tell("compiling" if compiled is None else "loaded", sig)
+        return compiled
 
     def _own(self, path: Path, target_context: Any) -> Any:
         """The kernel from the user's folder; None where it must be compiled here, and is locked for that."""
-        found = _rebuilt(kernel_folder.read(path), target_context)
-        if found is None and path not in self._locks:
+        compiled = _rebuilt(kernel_folder.read(path), target_context)
+        if compiled is None and path not in self._locks:
             lock, waited = kernel_folder.lock(path)
             if lock is not None:
                 self._locks[path] = lock
-            found = _rebuilt(kernel_folder.read(path), target_context) if waited else None
-            if found is not None:
+            compiled = _rebuilt(kernel_folder.read(path), target_context) if waited else None
+            if compiled is not None:
                 self._unlock(path)
-        if found is not None:
+        if compiled is not None:
             kernel_folder.note_use(path)
-        return found
+        return compiled
 
     def save_overload(self, sig: Any, data: Any) -> None:
         path = kernel_folder.kernel_folder() / self._entry(sig, data.codegen.magic_tuple())

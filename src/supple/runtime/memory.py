@@ -17,8 +17,8 @@ def available_bytes() -> int | None:
     The smallest of what the machine has free, what the limits of the container leave, and what the limit of the
     process (`ulimit -v`) leaves.
     """
-    found = [_of_machine(), *_of_containers(), _of_process()]
-    known = [max(0, number) for number in found if number is not None]
+    limits = [_of_machine(), *_of_containers(), _of_process()]
+    known = [max(0, number) for number in limits if number is not None]
     return min(known) if known else None
 
 

@@ -100,7 +100,7 @@ def moduli_at_rest(expression: Any, of: str, names: tuple[str, ...], rows: NDArr
     """(k, 2) shear and bulk modulus [Pa] of rows of parameters (k, q); nothing is compiled."""
     function = derivatives(expression, of, names)
     different, which = np.unique(rows, axis=0, return_inverse=True)
-    found = []
+    moduli = []
     for row in different.tolist():
         if of == "stretches":
             values = [float(value) for value in function(1.0, 1.0, 1.0, *row)]
@@ -110,8 +110,8 @@ def moduli_at_rest(expression: Any, of: str, names: tuple[str, ...], rows: NDArr
             _, W1, W2, WJ, h11, h22, hJJ, h2J, h1J, h12 = values
             mu = 2.0 * (W1 + W2)
             lam = 4.0 * W2 + 4.0 * h11 + 16.0 * h12 + 16.0 * h22 + 4.0 * h1J + 8.0 * h2J + hJJ + WJ
-        found.append((mu, lam + 2.0 * mu / 3.0))
-    return np.array(found)[which.ravel()]
+        moduli.append((mu, lam + 2.0 * mu / 3.0))
+    return np.array(moduli)[which.ravel()]
 
 
 @dataclass(frozen=True, eq=False)

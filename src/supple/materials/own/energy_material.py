@@ -199,15 +199,15 @@ class EnergyMaterial(ByLaw):
 
     def _measured_moduli(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """(2, k) from stresses of small shears and dilations: differences of fourth order."""
-        E, found = np.eye(3), []
+        E, stresses = np.eye(3), []
         for part, factor in ((np.outer(E[0], E[1]) + np.outer(E[1], E[0]), 8.0), (E, 18.0)):
             slopes = []
             for strain in (5e-4, 1e-3):
                 ends = (np.tile(E + sign * strain * part, (len(rows), 1, 1)) for sign in (1.0, -1.0))
                 more, less = (self.law().models(F, rows, False, False)[1] for F in ends)
                 slopes.append(np.einsum("kij,ij->k", more - less, part) / (factor * strain))
-            found.append((4.0 * slopes[0] - slopes[1]) / 3.0)
-        return np.array(found)
+            stresses.append((4.0 * slopes[0] - slopes[1]) / 3.0)
+        return np.array(stresses)
 
     def law(self) -> OwnLaw | FormulaLaw:
         return self._law  # pyright: ignore[reportAttributeAccessIssue]

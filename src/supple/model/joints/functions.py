@@ -63,15 +63,15 @@ def derivatives(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> V
 def evaluated(functions: NDArray[np.int64], vectors: NDArray[np.float64], *, second: bool) -> Values:
     """The same, with second derivatives or none."""
     count = len(functions)
-    found = Values(np.zeros(count), np.zeros((count, 4, 3)), np.zeros((count if second else 0, 4, 3, 4, 3)))
-    _evaluate(functions, vectors, found)
+    values = Values(np.zeros(count), np.zeros((count, 4, 3)), np.zeros((count if second else 0, 4, 3, 4, 3)))
+    _evaluate(functions, vectors, values)
     for k, form in enumerate(FORMS.values()):
         rows = functions == k
         if form.of is not None and rows.any():
-            for array, own in zip(found, form.of(vectors[rows]), strict=True):
+            for array, own in zip(values, form.of(vectors[rows]), strict=True):
                 if len(array):
                     array[rows] = own
-    return found
+    return values
 
 
 def turns(functions: NDArray[np.int64]) -> NDArray[np.bool_]:
