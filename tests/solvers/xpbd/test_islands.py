@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.solvers.xpbd.contact import row_solver
+from supple.solvers.xpbd.contact.solve import solve
 
 RUBBER = sp.StableNeoHookean(youngs=2e5, poisson=0.3)
 # Contact is chaotic: where one box starts 1e-9 m off, places differ by 8e-9 m after this time, after a second by 1 mm.
@@ -50,3 +52,24 @@ def test_bodies_far_away_change_a_heap_by_no_more_than_round_off(alone, kind):
         return
     assert moved < TINY
     assert moved < 0.1 * np.abs(ends(heap(off=TINY)) - alone).max()
+
+
+def test_soft_rows_of_bodies_with_bones_are_solved_as_other_soft_rows(monkeypatch):
+    """A stack of three. Rows on rigid bodies, which nothing else corrects, are more exact: 63 % reach the limit."""
+    sweeps, bodies, welds = [], [], []
+
+    def counting(*arguments):
+        sweeps.append(solve(*arguments))
+        return sweeps[-1]
+
+    monkeypatch.setattr(row_solver, "solve", counting)
+    for k in range(3):
+        y = 0.051 + 0.1021 * k
+        core = sp.shapes.box_surface((0.04, 0.04, 0.04), (1, 1, 1))
+        bodies.append(sp.Body(f"flesh{k}", sp.shapes.box((0.1,) * 3, (4, 4, 4)), RUBBER, position=(0, y, 0)))
+        bodies.append(sp.RigidBody(f"bone{k}", core, density=2e3, position=(0, y, 0)))
+        welds.append(sp.Weld(f"flesh{k}", f"bone{k}", sp.InBox((-0.03, y - 0.03, -0.03), (0.03, y + 0.03, 0.03))))
+    pair = sp.ContactPair("bone*", "*", collide=False)
+    scene = sp.Scene(bodies, obstacles=[sp.HalfSpace(friction=0.5, name="floor")], welds=welds, contact_pairs=[pair])
+    list(sp.simulate(scene, sp.XPBD(substeps=30, sleep_after=None), 1 / 60, 5))
+    assert np.mean([count == row_solver.MOST_RIGID_SWEEPS for count, _ in sweeps]) < 0.45
