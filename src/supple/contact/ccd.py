@@ -240,8 +240,12 @@ class Along:
         self._finder, self._points, self._kept = finder, points, Kept(floor, finder.dhat)
         self._finite, self._all = bool(np.isfinite(way).all()), None
         if self._finite:
-            edges, longest = finder.mesh.edge_lengths, finder.longest(points, way)
+            edges = finder.mesh.edge_lengths
             piece = _PIECE * float(edges.mean()) if len(edges) else np.inf
+            # Relative to its owner, a point goes twice as far at most.
+            longest = 2.0 * float(np.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)))
+            if longest > piece:
+                longest = finder.longest(points, way)
             self._count = max(1, int(np.ceil(min(longest / piece, _MOST_PIECES))))
             self._complete = longest <= self._count * piece
             # A complete way must give exactly 1: count * (1 / count) can be slightly less.
