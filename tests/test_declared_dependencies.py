@@ -27,6 +27,7 @@ IMPORT_NAMES = {
 BY_TRIMESH = {"lxml", "networkx"}  # imported by it where it reads 3MF
 # Used as those that need them do, in the versions that these allow: not listed again.
 BROUGHT = {"PIL": "matplotlib", "llvmlite": "numba", "rich": "cyclopts", "websockets": "viser"}
+PARTS = {"mpl_toolkits": "matplotlib"}  # names beside its own that a package installs
 MOST = 16  # packages that a plain install asks for
 # Development tools that are run, or loaded by pytest; no test imports them.
 TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-cov", "pytest-xdist", "ruff"}
@@ -48,7 +49,8 @@ def imported_packages(folder):
             else:
                 continue
             for name in names:
-                found.setdefault(name.partition(".")[0], f"{path.relative_to(folder)}:{node.lineno}")
+                package = name.partition(".")[0]
+                found.setdefault(PARTS.get(package, package), f"{path.relative_to(folder)}:{node.lineno}")
     return {name: place for name, place in found.items() if name not in sys.stdlib_module_names | OWN}
 
 

@@ -77,7 +77,7 @@ def test_a_recording_grows_only_with_its_frames(tmp_path):
         sizes[steps] = path.stat().st_size
     points, tets = 16, 12
     driven = 7 * (len(scene.obstacles) + len(scene.pins))
-    numbers = 3 * (3 + 3 + 2) + 60 + driven  # vectors by name, and single numbers of a report
+    numbers = 3 * (3 + 3 + 2) + 62 + driven  # vectors by name, and single numbers of a report
     assert sizes[40] - sizes[20] <= 20 * 8 * (6 * points + tets + 12 * 2 + numbers + recording_module.MESSAGE_BYTES / 8)
 
 

@@ -224,7 +224,8 @@ PIN = sp.Pin("palm")
         (lambda: sp.Scene([body()], pins=[PIN, PIN]), "is already held by another pin"),
         (
             lambda: sp.Scene([body()], soft_targets=[sp.SoftTarget("palm", [0], 1.0)]),
-            "soft target of body 'palm': soft targets pull soft bodies; move a rigid one with a Pin or a Force",
+            "soft target of body 'palm': body 'palm' is rigid; soft targets pull soft bodies; "
+            "move a rigid one with a Pin or a Force",
         ),
     ],
 )
