@@ -23,7 +23,7 @@ import numpy as np
 from scipy.optimize import curve_fit
 
 import supple as sp
-from benchmarks.published import publish
+from benchmarks.publishing import publish
 from benchmarks.table import Table
 
 # Wider than thick: of a square beam, both bending modes have nearly the same frequency, and beat.

@@ -17,7 +17,7 @@ import numpy as np
 
 import supple as sp
 from benchmarks.measuring import PEERS_PYTHON, peers_installed, run_json
-from benchmarks.published import publish
+from benchmarks.publishing import publish
 from benchmarks.table import Table
 from supple.results.check.checker import check_series
 from supple.results.check.series import SeriesMetadata

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.measuring import run_json
-from benchmarks.published import publish
+from benchmarks.publishing import publish
 from benchmarks.table import Table
 
 HERE = Path(__file__).parent

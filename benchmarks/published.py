@@ -1,55 +1,169 @@
-"""Tables of the documentation: a benchmark writes `docs/figures/NAME.json`, and the table of the page that shows it."""
+"""Published cases: what their sources give, and what Supple gives on two meshes.
+
+usage: python -m benchmarks.published [NAME ...] [--publish | --page]
+
+Solves the cases of tests/published, or those named, prints each value beside its reference, and draws each case into
+out/published (extra: video). With --publish, figures and pictures go to docs/, and docs/validation/published.md shows
+them; with --page, nothing is solved and the page is written from the figures that are there.
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
+import tempfile
+import time
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import numpy as np
+from PIL import Image
+from tests.published.case import Case, Solution, as_one_step, modules
+
+import supple as sp
 from benchmarks.measuring import ROOT
-from benchmarks.table import table_text
+from benchmarks.publishing import DOCS
+from benchmarks.table import Table, circumstances, measured_on
 from supple.runtime.replacing import whole_file
+from supple.simulate import first_frame
 
-DOCS = ROOT / "docs"
-
-
-# The page that shows a table, by the name between the marks, which is that of the file.
-SHOWN = {
-    "quadratic_tets": "theory/locking.md",
-    "checked_results": "learn/check_your_simulator.md",
-    "checked_results_short": "../README.md",
-    **dict.fromkeys(
-        ("startup", "hanging_beam", "work_precision", "implicit_scaling", "automatic_substeps"),
-        "validation/benchmarks.md",
-    ),
+PAGE = DOCS / "validation" / "published.md"
+FIGURES = DOCS / "figures" / "published"
+PICTURES = DOCS / "images" / "published"
+COLUMNS = {
+    "case": "",
+    "quantity": "",
+    "reference": "",
+    "coarse": "",
+    "fine": "",
+    "error": ".2%",
+    "bound": ".1%",
+    "elements": "",
+    "seconds": "",
 }
+BEGIN, END = "<!-- cases -->\n", "<!-- end of cases -->"
 
 
-def publish(name: str, figures: Any) -> None:
-    """Write the figures of this name, and the table that shows them."""
-    path, page = file_of(name), DOCS / SHOWN[name]
-    path.parent.mkdir(exist_ok=True)
-    _write(path, json.dumps(figures, indent=1) + "\n")
-    _write(page, with_table(page.read_text(encoding="utf-8"), name))
-    print(f"written: {path.name}, {page.name}")
+def number(value: Any) -> str:
+    """A value with five digits, or a vector of such."""
+    parts = [f"{float(part):.5g}" for part in np.atleast_1d(value)]
+    return parts[0] if len(parts) == 1 else f"({', '.join(parts)})"
 
 
-def _write(path: Path, text: str) -> None:
+def measure(name: str, module: ModuleType, table: Table) -> tuple[dict[str, Any], Solution]:
+    """Solve a case on both meshes; its figures, and the solution on the finer one."""
+    case: Case = module.CASE
+    solutions, seconds = [], []
+    for mesh in case.meshes:
+        began = time.process_time()
+        solutions.append(case.solve(mesh))
+        seconds.append(time.process_time() - began)
+    elements = [f"{sum(len(body.mesh.tets) for body in one.frame.system.scene.bodies):,}" for one in solutions]
+    first = len(table.rows)
+    for key, reference in case.references.items():
+        coarse, fine = (one.values[key] for one in solutions)
+        table.add(
+            case.title,
+            f"{key} [{reference.unit}]",
+            number(reference.value),
+            number(coarse),
+            number(fine),
+            reference.error(fine),
+            reference.bound,
+            " / ".join(elements),
+            " / ".join(f"{spent:.1f}" for spent in seconds),
+        )
+    figures = circumstances() | {"supple": sp.__version__, "columns": COLUMNS, "rows": table.rows[first:]}
+    figures["versions"]["NumPy"] = np.__version__
+    return figures, solutions[1]
+
+
+def draw(case: Case, solution: Solution, path: Path) -> None:
+    """The picture of a case, by the library's own export, seen from `direction` of its look."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    frame = as_one_step(solution.frame)
+    x = np.concatenate(list(frame.positions.values()))
+    middle, reach = (x.max(axis=0) + x.min(axis=0)) / 2, float(np.linalg.norm(np.ptp(x, axis=0)))
+    look: dict[str, Any] = {"size": (480, 300), "surface": "tets", **(case.look or {})}
+    direction = np.asarray(look.pop("direction", (0.5, 0.4, 1.0)), dtype=float)
+    look |= {"target": tuple(middle), "eye": tuple(middle + 1.5 * reach * direction / np.linalg.norm(direction))}
+    with tempfile.TemporaryDirectory() as folder:
+        recorder = sp.Recorder(Path(folder) / "case.vtkhdf")
+        recorder.begin(first_frame(frame.system.scene, frame.system.start_states[0]), frame.time or 1.0, 1)
+        recorder.write(frame)
+        recorder.end()
+        sp.read_recording(Path(folder) / "case.vtkhdf").export("png", path, **look)
+    Image.open(path).quantize(256).save(path, optimize=True)
+
+
+def measured_names() -> list[str]:
+    """The cases that have figures."""
+    return sorted(path.stem for path in FIGURES.glob("*.json"))
+
+
+def with_cases(page: str) -> str:
+    """The text of the page, with table and descriptions of all measured cases between the two marks."""
+    figures = {name: json.loads((FIGURES / f"{name}.json").read_text(encoding="utf-8")) for name in measured_names()}
+    lines = [f"| {' | '.join(COLUMNS)} |", "|" + "---|" * len(COLUMNS)]
+    for name, of_case in figures.items():
+        for row in of_case["rows"]:
+            texts = [
+                text if isinstance(text, str) else f"{text:{form}}"
+                for text, form in zip(row, COLUMNS.values(), strict=True)
+            ]
+            lines.append(f"| [{texts[0]}](#{name}) | {' | '.join(texts[1:])} |")
+    for name, module in modules().items():
+        if name in figures:
+            lines += ["", *described(name, module, figures[name])]
+    pattern = f"{re.escape(BEGIN)}.*?{re.escape(END)}"
+    changed, count = re.subn(pattern, lambda _: BEGIN + "\n" + "\n".join(lines) + f"\n\n{END}", page, flags=re.S)
+    assert count == 1, f"the page needs the marks {BEGIN.strip()} and {END}"
+    return changed
+
+
+def described(name: str, module: ModuleType, figures: dict[str, Any]) -> list[str]:
+    """The lines of a case: problem, picture, command, and what is not like the source."""
+    case: Case = module.CASE
+    versions = ", ".join(f"{key} {version}" for key, version in figures["versions"].items())
+    return [
+        f'<h3 id="{name}">{case.title}</h3>',
+        "",
+        str(module.__doc__).strip(),
+        *([case.differs] if case.differs else []),
+        "",
+        f"![{case.title}](../images/published/{name}.png)",
+        "",
+        f"`python -m benchmarks.published {name}`. {measured_on(figures)} Supple {figures['supple']}, {versions}.",
+    ]
+
+
+def write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as fresh:
         fresh.write_text(text, encoding="utf-8")
 
 
-def file_of(name: str) -> Path:
-    """Where the figures of this name are."""
-    return DOCS / "figures" / f"{name}.json"
+def main(names: list[str], publish: bool, page_only: bool) -> None:
+    """Solve, print and draw; see the top of this file."""
+    cases = modules()
+    if unknown := [name for name in names if name not in cases]:
+        raise SystemExit(f"unknown: {', '.join(unknown)}; known are {', '.join(cases)}")
+    table = Table("Published cases; seconds of the processor", COLUMNS)
+    for name in [] if page_only else names or list(cases):
+        figures, solution = measure(name, cases[name], table)
+        draw(cases[name].CASE, solution, (PICTURES if publish else ROOT / "out" / "published") / f"{name}.png")
+        if publish:
+            write(FIGURES / f"{name}.json", json.dumps(figures, indent=1) + "\n")
+    if publish or page_only:
+        write(PAGE, with_cases(PAGE.read_text(encoding="utf-8")))
 
 
-def with_table(page: str, name: str) -> str:
-    """The text of a page, with the table of the file between the two marks."""
-    begin, end = f"<!-- figures: {name} -->\n", "<!-- end of figures -->"
-    text = table_text(json.loads(file_of(name).read_text(encoding="utf-8")))
-    pattern = f"{re.escape(begin)}.*?{re.escape(end)}"
-    changed, count = re.subn(pattern, lambda _: f"{begin}\n{text}\n\n{end}", page, flags=re.S)
-    assert count == 1, f"the page of {name} needs the marks {begin.strip()} and {end}"
-    return changed
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description="Solve published cases.")
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--publish", action="store_true")
+    parser.add_argument("--page", action="store_true")
+    given = parser.parse_args()
+    main(given.names, given.publish, given.page)

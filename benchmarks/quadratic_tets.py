@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import supple as sp
-from benchmarks.published import publish
+from benchmarks.publishing import publish
 from benchmarks.table import Table
 
 STATIC = sp.Implicit(integrator="static", contact=None)

@@ -11,7 +11,7 @@ import sys
 import tempfile
 from typing import Any
 
-from benchmarks.published import publish
+from benchmarks.publishing import publish
 from benchmarks.table import Table
 
 FIRST_STEP = """

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.measuring import PEERS_PYTHON, alternate, peers_installed, run_json
-from benchmarks.published import publish
+from benchmarks.publishing import publish
 from benchmarks.table import Table
 
 HERE = Path(__file__).parent

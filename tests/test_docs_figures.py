@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from benchmarks import published
+from benchmarks import publishing
 from benchmarks.table import Table, table_text
 
 ROOT = Path(__file__).parents[1]
@@ -20,20 +20,20 @@ def beyond_figures(page: str) -> str:
     return re.sub(SHOWN, "", page, flags=re.S)
 
 
-@pytest.mark.parametrize("name", published.SHOWN)
+@pytest.mark.parametrize("name", publishing.SHOWN)
 def test_a_page_shows_its_files(name):
-    page = (published.DOCS / published.SHOWN[name]).read_text(encoding="utf-8")
-    assert published.with_table(page, name) == page
+    page = (publishing.DOCS / publishing.SHOWN[name]).read_text(encoding="utf-8")
+    assert publishing.with_table(page, name) == page
 
 
 def test_every_file_is_shown():
-    assert {path.stem for path in (published.DOCS / "figures").glob("*.json")} == set(published.SHOWN)
+    assert {path.stem for path in (publishing.DOCS / "figures").glob("*.json")} == set(publishing.SHOWN)
 
 
-@pytest.mark.parametrize("name", published.SHOWN)
+@pytest.mark.parametrize("name", publishing.SHOWN)
 def test_between_the_marks_is_a_caption_and_a_table(name):
     """Benchmarks rewrite tables, and no prose."""
-    text = table_text(json.loads(published.file_of(name).read_text(encoding="utf-8")))
+    text = table_text(json.loads(publishing.file_of(name).read_text(encoding="utf-8")))
     caption, empty, *rows = text.splitlines()
     assert "2026-" in caption
     assert empty == ""
@@ -46,7 +46,8 @@ def test_marks_of_a_page_name_parts_that_belong_there(page):
     text = page.read_text(encoding="utf-8")
     found = re.findall(SHOWN, text, flags=re.S)
     assert len(found) == len(re.findall("<!-- *figures", text)) == len(re.findall("<!-- *end of figures", text))
-    assert set(found) == {name for name, shown in published.SHOWN.items() if (published.DOCS / shown).resolve() == page}
+    shown = {name: (publishing.DOCS / path).resolve() for name, path in publishing.SHOWN.items()}
+    assert set(found) == {name for name, path in shown.items() if path == page}
 
 
 def test_the_page_of_benchmarks_has_no_figures_of_its_own():
@@ -59,14 +60,14 @@ def test_the_page_of_benchmarks_has_no_figures_of_its_own():
 
 
 def test_a_file_without_the_key_of_a_table_is_an_error(monkeypatch, tmp_path):
-    monkeypatch.setattr(published, "DOCS", tmp_path)
+    monkeypatch.setattr(publishing, "DOCS", tmp_path)
     page = "<!-- figures: startup -->\n<!-- end of figures -->\n"
     with pytest.raises(FileNotFoundError):
-        published.with_table(page, "startup")
+        publishing.with_table(page, "startup")
     (tmp_path / "figures").mkdir()
     (tmp_path / "figures" / "startup.json").write_text('{"date": "2026-01-31", "load": "0.1", "cores": 2}')
     with pytest.raises(KeyError, match="columns"):
-        published.with_table(page, "startup")
+        publishing.with_table(page, "startup")
 
 
 def test_rows_become_a_table(capsys):
@@ -84,16 +85,16 @@ def test_rows_become_a_table(capsys):
 
 
 def test_figures_become_tables(monkeypatch, tmp_path):
-    monkeypatch.setattr(published, "DOCS", tmp_path)
+    monkeypatch.setattr(publishing, "DOCS", tmp_path)
     page = tmp_path / "validation" / "benchmarks.md"
     page.parent.mkdir()
     page.write_text("before\n<!-- figures: startup -->\nold\n<!-- end of figures -->\nafter\n", encoding="utf-8")
     table = Table("startup", {"name": "", "s": ".2f"}, threads=1)
     table.add("import", 0.5)
-    published.publish("startup", table.figures())
+    publishing.publish("startup", table.figures())
     text = page.read_text(encoding="utf-8")
     assert text.startswith("before\n")
     assert text.endswith("after\n")
     assert "| import | 0.50 |" in text
     assert "old" not in text
-    assert published.with_table(text, "startup") == text
+    assert publishing.with_table(text, "startup") == text

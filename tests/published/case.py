@@ -1,0 +1,134 @@
+"""What a published case is: a problem of the literature, the values that its source gives, and how Supple solves it.
+
+Each other file of this folder that is not a test has one `CASE`, and its docstring states the problem and its source.
+`python -m benchmarks.published NAME` runs it alone and draws it.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import supple as sp
+from supple.numerics.quadratic_shape_functions import reference_gradients
+
+STATIC = sp.Implicit(integrator="static", contact=None)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A value of the source.
+
+    Attributes
+    ----------
+    value : a number, or a vector
+    unit : of it, for the table
+    bound : largest error at the finer mesh, as a share of `scale`; coarse : the same at the coarser mesh
+    scale : what errors are relative to; None for the length of `value`
+    """
+
+    value: float | tuple[float, ...]
+    unit: str
+    bound: float = 0.01
+    coarse: float = 0.03
+    scale: float | None = None
+
+    def error(self, ours: ArrayLike) -> float:
+        """The relative error of our value."""
+        difference = float(np.linalg.norm(np.asarray(ours) - np.asarray(self.value)))
+        return difference / (self.scale or float(np.linalg.norm(self.value)))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a case gives on one mesh.
+
+    Attributes
+    ----------
+    values : ours, by the names of the case's references
+    frame : the frame of the picture; its scene has the elements that are counted
+    """
+
+    values: Mapping[str, float | NDArray[np.float64]]
+    frame: sp.Frame
+
+
+@dataclass(frozen=True)
+class Case:
+    """A published problem.
+
+    Attributes
+    ----------
+    title : with the number of a load or variant
+    source : author and year, or the collection
+    references : by quantity
+    solve : the solution on a mesh
+    meshes : arguments of `solve`: the coarser mesh of `make test`, and the finer one
+    differs : what is not like the source, in one or two sentences; empty where nothing is
+    order : least order of convergence of the first quantity between the two meshes, where the reference is exact and
+        the finer mesh has `refined` times as many elements along each edge
+    look : options of the picture, as those of `supple picture`
+    """
+
+    title: str
+    source: str
+    references: Mapping[str, Reference]
+    solve: Callable[[Any], Solution]
+    meshes: tuple[Any, Any]
+    differs: str = ""
+    order: float | None = None
+    refined: float = 2.0
+    look: Mapping[str, Any] | None = None
+
+
+def modules() -> dict[str, ModuleType]:
+    """The modules of all cases by their name, in alphabetical order."""
+    names = sorted(path.stem for path in Path(__file__).parent.glob("*.py"))
+    cases = [name for name in names if name != "case" and not name.startswith("test_")]
+    return {name: importlib.import_module(f"tests.published.{name}") for name in cases}
+
+
+def equilibria(scene: sp.Scene, steps: int = 1) -> list[sp.Frame]:
+    """The equilibria at the times 1 / steps, 2 / steps, ..., 1 s; loads and pins are functions of time."""
+    return list(sp.simulate(scene, STATIC, 1.0 / steps, steps, strict=True))
+
+
+def mapped_box(divisions: tuple[int, int, int], place: Callable[[NDArray[np.float64]], ArrayLike]) -> sp.TetMesh:
+    """Quadratic tets of the unit cube from 0 to 1 with `place` (k, 3) -> (k, 3) applied to all nodes."""
+    unit = sp.shapes.box((1.0, 1.0, 1.0), divisions, order=2)
+    return sp.TetMesh(place(unit.vertices + 0.5), unit.nodes)
+
+
+def triangles_where(mesh: sp.TetMesh, inside: ArrayLike) -> NDArray[np.int64]:
+    """Rows of the surface's triangles of which all corners are vertices `inside` (n,), a mask."""
+    return np.flatnonzero(np.asarray(inside)[mesh.surface.triangles].all(axis=1))
+
+
+def nearest(mesh: sp.TetMesh, place: ArrayLike) -> int:
+    """The vertex that is nearest to a place (3,)."""
+    return int(np.linalg.norm(mesh.vertices - np.asarray(place), axis=1).argmin())
+
+
+def cauchy_at(frame: sp.Frame, name: str, vertex: int) -> NDArray[np.float64]:
+    """(3, 3) Cauchy stress at a corner of quadratic tets [Pa]: the mean over the tets that meet there."""
+    body = next(body for body in frame.system.scene.bodies if body.name == name)
+    rest, nodes = body.mesh.vertices, body.mesh.nodes
+    rows, corner = np.nonzero(nodes[:, :4] == vertex)
+    gradients = reference_gradients(np.eye(4)[corner])
+    Dm = np.einsum("mai,maj->mij", rest[nodes[rows]], gradients)
+    Ds = np.einsum("mai,maj->mij", frame.positions[name][nodes[rows]], gradients)
+    F = Ds @ np.linalg.inv(Dm)
+    P = np.array([body.material.first_piola(f) for f in F])  # pyright: ignore[reportAttributeAccessIssue]
+    return np.mean(P @ np.swapaxes(F, 1, 2) / np.linalg.det(F)[:, None, None], axis=0)
+
+
+def as_one_step(frame: sp.Frame) -> sp.Frame:
+    """The frame as the first one after the start."""
+    return replace(frame, index=1)

@@ -1,0 +1,54 @@
+"""Every published case stays within its bounds of the values that its source gives, and the page shows each."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks import published
+from tests.published.case import modules
+
+CASES = modules()
+NAMES = sorted(CASES)
+
+
+def errors(case, mesh):
+    """The relative error of each quantity."""
+    solution = case.solve(mesh)
+    assert set(solution.values) == set(case.references)
+    return {name: reference.error(solution.values[name]) for name, reference in case.references.items()}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_coarser_mesh_is_within_its_bounds(name):
+    case = CASES[name].CASE
+    found = errors(case, case.meshes[0])
+    assert {key: error for key, error in found.items() if not error <= case.references[key].coarse} == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_the_finer_mesh_is_within_its_bounds_and_has_the_order(name):
+    case = CASES[name].CASE
+    found = errors(case, case.meshes[1])
+    assert {key: error for key, error in found.items() if not error <= case.references[key].bound} == {}
+    if case.order is not None:
+        first = next(iter(case.references))
+        before = errors(case, case.meshes[0])[first]
+        assert np.log(before / found[first]) / np.log(case.refined) >= case.order
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_case_is_one_short_file_and_states_its_source(name):
+    text = Path(str(CASES[name].__file__)).read_text(encoding="utf-8")
+    case = CASES[name].CASE
+    assert text.count("\n") <= 120
+    assert case.source.rpartition(" ")[0].split(",")[0] in str(CASES[name].__doc__).replace("\n", " ")
+    assert all(reference.bound <= 0.03 for reference in case.references.values())
+
+
+def test_the_page_shows_every_case():
+    page = published.PAGE.read_text(encoding="utf-8")
+    assert published.with_cases(page) == page
+    assert published.measured_names() == NAMES
+    for name in NAMES:
+        assert (published.PICTURES / f"{name}.png").is_file()
