@@ -6,6 +6,7 @@ from .app.runs.run_folder import RunFolder as RunFolder
 from .app.scene_file.loader import Run as Run
 from .app.scene_file.loader import load_run as load_run
 from .app.scene_file.loader import load_scene as load_scene
+from .app.studies.modes import modes as modes
 from .app.studies.study import sweep as sweep
 from .errors import MeshError as MeshError
 from .errors import OutputError as OutputError

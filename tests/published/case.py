@@ -132,3 +132,17 @@ def cauchy_at(frame: sp.Frame, name: str, vertex: int) -> NDArray[np.float64]:
 def as_one_step(frame: sp.Frame) -> sp.Frame:
     """The frame as the first one after the start."""
     return replace(frame, index=1)
+
+
+def held_along(axis: int, name: str, mesh: sp.TetMesh, vertices: ArrayLike, stiffness: float) -> list[sp.Spring]:
+    """Springs [N/m], a thousand sizes of the mesh long, that hold vertices of a body along one axis alone."""
+    away = 1000.0 * float(np.ptp(mesh.vertices, axis=0).max()) * np.eye(3)[axis]
+    places = {int(v): tuple(mesh.vertices[v] + away) for v in np.asarray(vertices)}
+    return [sp.Spring((name, v), (None, there), stiffness=stiffness) for v, there in places.items()]
+
+
+def as_bent(modes: Any, mode: int, amplitude: float) -> sp.Frame:
+    """The frame of soft bodies that a mode displaces by at most `amplitude` [m]."""
+    frame = modes.frame
+    x = frame.state.positions + amplitude * np.concatenate(list(modes.shape(mode).values()))
+    return as_one_step(replace(frame, state=replace(frame.state, time=1.0, positions=x)))

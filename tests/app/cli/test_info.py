@@ -189,3 +189,14 @@ def test_materials_with_other_parameters_show_their_moduli_of_small_strains(rows
     moduli = f"(small strains: E = {9 * 2e6 * 2e5 / 6.2e6:.6g} Pa, nu = {(6e6 - 4e5) / 12.4e6:.6g})"
     assert rows["body quick"].startswith(f"MooneyRivlin {moduli}, ")
     assert rows["body slow"].startswith(f"Viscoelastic MooneyRivlin {moduli}, ")
+
+
+def test_the_frequencies_of_a_scene(rows_of, tmp_path):
+    (tmp_path / "s.yaml").write_text(
+        "bodies: [{name: cube, shape: {kind: box, size: [1, 1, 2]}, "
+        "material: {kind: arap, youngs: 1e4, poisson: 0.2, density: 500}}]\n"
+        "pins: [{body: cube, vertices: [0, 1, 2, 3]}]\n"
+    )
+    scene = sp.load_scene(tmp_path / "s.yaml")
+    assert rows_of("s.yaml", "--modes", "1")["frequencies"] == f"{sp.modes(scene, 1).frequencies[0]:.6g} Hz"
+    assert "frequencies" not in rows_of("s.yaml")

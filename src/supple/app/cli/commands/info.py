@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import Confine
+from supple.app.cli.arguments import Confine, whole_number
 from supple.app.cli.console import print_table
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from supple.model.state import State
     from supple.model.system import System
     from supple.scene.body import PlacedBody
+    from supple.scene.scene import Scene
 
 SCENE_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
@@ -29,7 +30,12 @@ EXTRAS = ("pymeshfix", "pycollada", "loky", "usd-core", "pyvista")
 
 
 def info(
-    file: Path | None = None, /, *, time: Annotated[bool, Parameter(negative="")] = False, confine: Confine = False
+    file: Path | None = None,
+    /,
+    *,
+    time: Annotated[bool, Parameter(negative="")] = False,
+    modes: Annotated[int | None, Parameter(converter=whole_number)] = None,
+    confine: Confine = False,
 ) -> None:
     """Print what a file contains: counts, sizes, quality, problems. Without a file: versions, platform and threads.
 
@@ -39,6 +45,8 @@ def info(
         A scene (.yaml), a robot (.urdf), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
     time
         Of a scene: simulate its first frames, and print how long one takes. The first run of a solver compiles it.
+    modes
+        Of a scene: the frequencies of this many natural modes about its start.
     confine
         Of a scene: read meshes from the folder of its file, and folders below, only.
     """
@@ -52,7 +60,7 @@ def info(
         return
     suffix = file.suffix.lower()
     if suffix in SCENE_FILES:
-        _scene(file, time, confine)
+        _scene(file, time, modes, confine)
     elif suffix in RECORDINGS:
         _recording(file)
     else:
@@ -149,7 +157,7 @@ def _mesh(file: Path, suffix: str) -> None:
     print_table(rows, str(file))
 
 
-def _scene(file: Path, timed: bool, confine: bool) -> None:
+def _scene(file: Path, timed: bool, modes: int | None, confine: bool) -> None:
     from supple.app.cli.console import reading
     from supple.app.scene_file.loader import load_run
     from supple.model.system import build_system, initial_state
@@ -166,6 +174,7 @@ def _scene(file: Path, timed: bool, confine: bool) -> None:
         ("memory", f"about {run.chosen_solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
         ("intersections", _start_problem(system, start)),
         ("each frame", _frame_time(run) if timed else "--time simulates the first ones, and says how long one takes"),
+        *_frequencies(scene, start, modes),
         *_described(system, system.split(start.positions)),
     ]
     print_table(rows, str(file))
@@ -229,6 +238,15 @@ def _frame_time(run: Run) -> str:
     seconds = min(report.wall_seconds for report in reports[1:] or reports)
     whole = seconds * run.steps
     return f"{1e3 * seconds:.3g} ms at the start; {run.steps} steps take about {whole:.3g} s if all are like these"
+
+
+def _frequencies(scene: Scene, start: State, count: int | None) -> list[tuple[str, str]]:
+    """Of the natural modes, where they are asked for."""
+    from supple.app.studies.modes import modes
+
+    if count is None:
+        return []
+    return [("frequencies", "\n".join(f"{f:.6g} Hz" for f in modes(scene, count, start=start).frequencies))]
 
 
 # Of the surface: below it, a few thin parts such as edges of a wedge are not worth a warning.

@@ -64,7 +64,7 @@ class JointPotential(ContactPotential):
         geometry = self.geometry
         if not len(self.laws.table):
             return
-        at = derivatives(geometry.functions, self._arguments(x))
+        at = derivatives(geometry.functions, self.arguments(x))
         g = self._law_values(x)
         count = len(at.value)
         first = _sum(self.laws, self.laws.efforts(g, self.law_multipliers), count)
@@ -84,7 +84,7 @@ class JointPotential(ContactPotential):
 
     def coordinates(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s,) values of the functions."""
-        g = values(self.geometry.functions, self._arguments(x))
+        g = values(self.geometry.functions, self.arguments(x))
         return np.where(turns(self.geometry.functions), self.start + wrapped(g - self.start), g)
 
     def renewed(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -133,7 +133,7 @@ class JointPotential(ContactPotential):
         blocks = total[:, :, :, None, None] * np.eye(3)
         return _couplings(self.geometry, np.arange(len(total)), blocks)
 
-    def _arguments(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def arguments(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s, 4, 3) the vectors of the functions."""
         return self.geometry.at(self.geometry.arguments, x, self._offsets[1])
 
@@ -147,7 +147,7 @@ class JointPotential(ContactPotential):
         if not len(self.laws.table):
             return linear, np.zeros((0, 4, 3)), np.zeros(0)
         first = _sum(self.laws, self.efforts(x), count)
-        at = derivatives(self.geometry.functions, self._arguments(x))
+        at = derivatives(self.geometry.functions, self.arguments(x))
         return linear, first[:, None, None] * at.gradient, first
 
 

@@ -157,7 +157,7 @@ def _take(
     mu = workspace.elasticity.material.mu
     actuators = actuators_at(system, state.positions, (state.time, middle), plan.scale, mu)
     terms = [*actuators, *drags_at(system, state, *plan.motion(state), middle)]
-    base = _objective(elasticity, state.positions, middle, plan, forces, workspace, terms)
+    base = stored_and_loaded(elasticity, state.positions, middle, plan, forces, workspace, terms)
     onset = settings.barrier_onset
     barriers = (inversion_barrier(workspace.elasticity, guard.guarded, onset), guard.quadratic_barrier(onset))
     base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
@@ -233,7 +233,7 @@ def _with_joints(objective: Objective, joints: JointStep | None) -> Objective:
     return objective if joints is None else replace(objective, terms=[*objective.terms, joints.potential])
 
 
-def _objective(
+def stored_and_loaded(
     elasticity: Elasticity,
     x: NDArray[np.float64],
     time: float,
