@@ -106,6 +106,12 @@ def mapped_box(divisions: tuple[int, int, int], place: Callable[[NDArray[np.floa
     return sp.TetMesh(place(unit.vertices + 0.5), unit.nodes)
 
 
+def graded(s: NDArray[np.float64], cells: int, power: float) -> NDArray[np.float64]:
+    """Places from 0 to 1 of nodes at `s`, so that cells grow from 0 on and their middle nodes stay in their middles."""
+    corners = np.linspace(0.0, 1.0, cells + 1)
+    return np.interp(s, corners, corners**power)
+
+
 def triangles_where(mesh: sp.TetMesh, inside: ArrayLike) -> NDArray[np.int64]:
     """Rows of the surface's triangles of which all corners are vertices `inside` (n,), a mask."""
     return np.flatnonzero(np.asarray(inside)[mesh.surface.triangles].all(axis=1))
@@ -146,3 +152,13 @@ def as_bent(modes: Any, mode: int, amplitude: float) -> sp.Frame:
     frame = modes.frame
     x = frame.state.positions + amplitude * np.concatenate(list(modes.shape(mode).values()))
     return as_one_step(replace(frame, state=replace(frame.state, time=1.0, positions=x)))
+
+
+def rollers(name: str, mesh: sp.TetMesh, axis: int, plane: ArrayLike, youngs: float) -> sp.SoftTarget:
+    """Holds the vertices of a `plane` (n,), a mask, along an axis: a plane of symmetry.
+
+    The springs are a thousand times as stiff as a cube of the material with the body's diagonal as its edge: what is
+    held moves by a thousandth of the strain times the square of an element's share of the diagonal.
+    """
+    size = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    return sp.SoftTarget(name, np.flatnonzero(plane), stiffness=1e3 * youngs * size * np.eye(3)[axis])

@@ -4,7 +4,7 @@ in plane stress, 23.96, is that of refined meshes.
 """
 
 import numpy as np
-from tests.published.case import Case, Reference, Solution, equilibria, mapped_box, triangles_where
+from tests.published.case import Case, Reference, Solution, equilibria, graded, mapped_box, triangles_where
 
 import supple as sp
 
@@ -15,8 +15,8 @@ def panel(cells, thickness):
     """The panel in cells^2 cells, smaller towards the clamp and the sides, where stresses are singular."""
 
     def place(x):
-        s, t = x[:, 0] ** 1.5, x[:, 1]
-        t = np.where(t < 0.5, 0.5 * (2 * t) ** 1.5, 1 - 0.5 * np.maximum(2 * (1 - t), 0.0) ** 1.5)
+        s, half = graded(x[:, 0], cells, 1.5), graded(1 - np.abs(2 * x[:, 1] - 1), cells // 2, 1.5) / 2
+        t = np.where(x[:, 1] < 0.5, half, 1 - half)
         return np.column_stack([48 * s, 44 * s + t * (44 - 28 * s), thickness * (x[:, 2] - 0.5)])
 
     return mapped_box((cells, cells, 1), place)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.kinds.checks import float_array
+from supple.kinds.checks import finite_vector, float_array
 from supple.kinds.validators import POSITIVE, BodyName, Name, Validator
 from supple.scene.motion import Motion, MotionValidator
 from supple.scene.selection import OnVertices, Selection, Vertices
@@ -101,6 +101,19 @@ class Force(OnVertices):
         return np.asarray(self.force)
 
 
+@dataclass(frozen=True)
+class AlongAxes(Validator):
+    """A number above zero, or three along x, y and z, zero or more, not all of them zero."""
+
+    def checked(self, value: Any, what: str) -> float | NDArray[np.float64]:
+        if np.ndim(value) == 0:
+            return POSITIVE.checked(value, what)
+        given = finite_vector(value, what)
+        if (given < 0.0).any() or not given.any():
+            raise SceneError(f"{what} is {given.tolist()}; no number may be below zero, and one must be above")
+        return given
+
+
 _PULLED = BodyName(soft=True, why="soft targets pull soft bodies; move a rigid one with a Pin or a Force")
 
 
@@ -112,7 +125,8 @@ class SoftTarget(OnVertices):
     ----------
     body : name of the body.
     vertices : indices into the body's mesh, or an `InBox`.
-    stiffness : of each vertex's spring [N/m].
+    stiffness : of each vertex's spring [N/m]; (3,) of springs along x, y and z, zero where it moves freely: (0, 0, 1e9)
+        is a roller, or a plane of symmetry.
     motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex.
     name : appears in messages.
 
@@ -125,6 +139,6 @@ class SoftTarget(OnVertices):
 
     body: Annotated[str, _PULLED]
     vertices: Annotated[Selection, Vertices()]
-    stiffness: Annotated[float, POSITIVE]
+    stiffness: Annotated[float | ArrayLike, AlongAxes()]
     motion: Annotated[Motion, MotionValidator()] = None
     name: Annotated[str | None, Name()] = None

@@ -176,3 +176,23 @@ def test_a_pin_moves_where_forces_are_far_from_balanced():
     scene = sp.Scene([bar], pins=[pin], gravity=(0, -9.81, 3.0))
     (frame,) = sp.simulate(scene, sp.Implicit(integrator="static", contact=None, max_substeps=1), dt=1.0, steps=1)
     assert frame.report.status == "converged", frame.report.message
+
+
+@pytest.mark.parametrize("solver", [sp.Implicit(integrator="static", contact=None), sp.XPBD(substeps=30, contact=None)])
+def test_springs_along_one_axis_are_rollers(solver):
+    """A cube on three planes of symmetry is pulled: it narrows freely along them, as the law of small strains says."""
+    mesh = sp.shapes.box((1, 1, 1), (2, 2, 2))
+    body = sp.Body("cube", mesh, sp.StableNeoHookean(youngs=1e5, poisson=0.4, damping=0.05, density=100))
+    sides = [np.flatnonzero(mesh.vertices[:, k] < -0.5 + 1e-9) for k in range(3)]
+    rollers = [sp.SoftTarget("cube", sides[k], stiffness=1e8 * np.eye(3)[k]) for k in range(3)]
+    pull = sp.Traction("cube", (100.0, 0, 0), sp.InBox((0.49, -1, -1), (1, 1, 1)))
+    scene = sp.Scene([body], soft_targets=rollers, loads=[pull], gravity=(0, 0, 0))
+    *_, frame = sp.simulate(scene, solver, 0.05, 40 if isinstance(solver, sp.XPBD) else 1)
+    strain = np.ptp(frame.positions["cube"], axis=0) - 1.0
+    np.testing.assert_allclose(strain, [1e-3, -4e-4, -4e-4], rtol=0.05 if isinstance(solver, sp.XPBD) else 2e-3)
+
+
+@pytest.mark.parametrize("stiffness", [(0, 0, 0), (1, -1, 0), (1, 2), 0.0])
+def test_springs_that_pull_nowhere_are_refused(stiffness):
+    with pytest.raises(sp.SceneError, match="stiffness"):
+        SoftTarget("weight", [0], stiffness=stiffness)

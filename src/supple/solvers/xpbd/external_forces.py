@@ -85,7 +85,7 @@ class ExternalForces:
         for target in self._targets:
             places = np.ascontiguousarray(target.targets(at.time))
             forces = np.zeros_like(places)
-            stiffness = target.target.stiffness
+            stiffness = np.broadcast_to(target.target.stiffness, 3).copy()
             _pull(at.points, at.velocities, at.origins, target.vertices, places, stiffness, at.h, forces)
             self.acting.append(("soft_targets", target.vertices, forces))
 
@@ -103,9 +103,9 @@ def _push(points, velocities, forces, h):
 def _pull(points, velocities, origins, vertices, places, stiffness, h, forces):
     for k in range(len(vertices)):
         i = vertices[k]
-        pull = points[i, 3] * stiffness * h * h
         for j in range(3):
-            forces[k, j] = (places[k, j] - origins[i, j] - points[i, j]) * stiffness / (1.0 + pull)
+            pull = points[i, 3] * stiffness[j] * h * h
+            forces[k, j] = (places[k, j] - origins[i, j] - points[i, j]) * stiffness[j] / (1.0 + pull)
             change = h * points[i, 3] * forces[k, j]
             points[i, j] += h * change
             velocities[i, j] += change

@@ -15,7 +15,7 @@ from supple.mesh.primitives.shape import SHAPES
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.contact_pairs import NameList
-from supple.scene.forces import ForceValidator
+from supple.scene.forces import AlongAxes, ForceValidator
 from supple.scene.inputs import MotorInput
 from supple.scene.loads.load import Rows
 from supple.scene.loads.muscle import ForceLength
@@ -93,6 +93,7 @@ _plain(validators.Extents, Extents)
 _plain(validators.Limits, Annotated[list[Number], Field(min_length=2, max_length=2)])
 _plain(Directions, Vector)
 _plain(ForceValidator, Vector)
+_plain(AlongAxes, Positive | Annotated[list[NonNegative], Field(min_length=3, max_length=3)])
 _plain(ForceLength, ForceLengthModel)
 _plain(NameList, Names)
 _plain(PointValidator, PointModel)

@@ -13,11 +13,12 @@ from supple.solvers.implicit.energies.potential import HessianBlocks, Potential,
 
 @dataclass(frozen=True, eq=False)
 class VertexPotential(Potential):
-    """sum_i (k_i |d_i|^2 / 2 - f_i . d_i), d = x - o.
+    """sum_i (sum_j k_ij d_ij^2 / 2 - f_i . d_i), d = x - o.
 
     Parameters
     ----------
-    origin : (n, 3) o [m]; stiffness : (n,) k [N/m], zero or more; forces : (n, 3) f [N]; work : see `Potential`
+    origin : (n, 3) o [m]; stiffness : (n, 3) k along x, y and z [N/m], zero or more; forces : (n, 3) f [N]
+    work : see `Potential`
     """
 
     origin: NDArray[np.float64]
@@ -34,7 +35,7 @@ class VertexPotential(Potential):
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         for k in range(3):
-            out.vertices[:, k, k] += self.stiffness
+            out.vertices[:, k, k] += self.stiffness[:, k]
 
 
 def inertia(masses: NDArray[np.float64], predicted: NDArray[np.float64], scale: float) -> VertexPotential:
@@ -48,7 +49,7 @@ def inertia(masses: NDArray[np.float64], predicted: NDArray[np.float64], scale: 
     Source: Li, Jiang, Luo, "Physics-Based Simulation", chapter "Optimization Framework": the incremental potential,
     here divided by h^2 so that it is an energy and its gradient a force.
     """
-    return VertexPotential(predicted, masses / scale, np.zeros_like(predicted))
+    return VertexPotential(predicted, np.repeat(masses[:, None] / scale, 3, axis=1), np.zeros_like(predicted))
 
 
 @njit(cache=True)
@@ -57,7 +58,7 @@ def _energy(x, origin, stiffness, forces):
     for i in range(len(x)):
         for k in range(3):
             d = x[i, k] - origin[i, k]
-            total += (0.5 * stiffness[i] * d - forces[i, k]) * d
+            total += (0.5 * stiffness[i, k] * d - forces[i, k]) * d
     return total
 
 
@@ -65,4 +66,4 @@ def _energy(x, origin, stiffness, forces):
 def _add_gradient(x, origin, stiffness, forces, out):
     for i in range(len(x)):
         for k in range(3):
-            out[i, k] += stiffness[i] * (x[i, k] - origin[i, k]) - forces[i, k]
+            out[i, k] += stiffness[i, k] * (x[i, k] - origin[i, k]) - forces[i, k]

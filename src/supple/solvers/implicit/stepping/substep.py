@@ -248,7 +248,7 @@ def stored_and_loaded(
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
     if forces.any():
-        terms.append(VertexPotential(x, np.zeros(len(x)), forces))
+        terms.append(VertexPotential(x, np.zeros_like(x), forces))
     terms += soft_targets_at(system, time)
     terms += pressures_at(system, x, time)
     terms += springs_at(system, time)

@@ -38,7 +38,11 @@ def drags_at(
     for load in system.loads:
         if isinstance(load, DragLoad):
             c = load.coefficients(x, v, time)
-            found.append(VertexPotential(x, rate * c, c[:, None] * (load.value(time) - begun), "wind"))
+            found.append(
+                VertexPotential(
+                    x, np.repeat(rate * c[:, None], 3, axis=1), c[:, None] * (load.value(time) - begun), "wind"
+                )
+            )
     return found
 
 

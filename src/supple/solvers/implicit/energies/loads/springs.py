@@ -22,7 +22,7 @@ def soft_targets_at(system: System, time: float) -> list[VertexPotential]:
     for part in system.soft_targets:
         places = np.zeros((n, 3))
         places[part.vertices] = part.targets(time)
-        stiffness = np.zeros(n)
+        stiffness = np.zeros((n, 3))
         np.add.at(stiffness, part.vertices, part.target.stiffness)
         found.append(VertexPotential(places, stiffness, np.zeros((n, 3)), "soft_targets"))
     return found
