@@ -56,7 +56,7 @@ class Solution:
     frame : the frame of the picture; its scene has the elements that are counted
     """
 
-    values: Mapping[str, float | NDArray[np.float64]]
+    values: Mapping[str, Any]
     frame: sp.Frame
 
 

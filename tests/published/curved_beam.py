@@ -44,6 +44,6 @@ CASE = Case(
         "across the plane": Reference(0.5022, "in"),
     },
     solve=solve,
-    meshes=((24, 2, 2), (48, 6, 4)),
+    meshes=((24, 2, 2), (64, 6, 4)),
     differs="The bound is the scatter of the sources: 1.35 and 0.78 %.",
 )

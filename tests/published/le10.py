@@ -33,9 +33,9 @@ def solve(divisions):
 CASE = Case(
     title="Thick plate (LE10)",
     source="NAFEMS 1990",
-    references={"stress": Reference(-5.38, "MPa", coarse=0.06)},
+    references={"stress": Reference(-5.38, "MPa")},
     solve=solve,
-    meshes=((8, 4, 2), (16, 10, 4)),
-    differs="The whole pressure acts in one step of large displacements; the deflection is a thousandth of the thickness.",
+    meshes=((8, 4, 2), (16, 10, 6)),
+    differs="Displacements may be large; they are a thousandth of the thickness.",
     look={"color": "von_mises"},
 )
