@@ -23,6 +23,7 @@ from .materials.elastic import StableNeoHookean as StableNeoHookean
 from .materials.elastic import StVenantKirchhoff as StVenantKirchhoff
 from .materials.elastic_tets.regions import Regions as Regions
 from .materials.fit import fit_material as fit_material
+from .materials.guccione import Guccione as Guccione
 from .materials.holzapfel_gasser_ogden import HolzapfelGasserOgden as HolzapfelGasserOgden
 from .materials.j2_plastic import J2Plastic as J2Plastic
 from .materials.own.energy_material import EnergyMaterial as EnergyMaterial

@@ -151,6 +151,7 @@ def test_every_material_reads_back_to_the_last_bit(tmp_path, kind):
         "Yeoh": {"c10": 1e4, "c20": 1e2, "bulk": 1e6},
         "Ogden": {"mu": [1e4, -1e3], "alpha": [2.0, -2.0], "bulk": 1e6},
         "HolzapfelGasserOgden": {"c10": 1e4, "k1": 1e4, "k2": 1.0, "directions": DIRECTIONS[:, None], "bulk": 1e6},
+        "Guccione": {"c": 2e3, "bf": 8.0, "bt": 2.0, "bfs": 4.0, "directions": DIRECTIONS, "bulk": 1e6},
         "EnergyMaterial": {"psi": "c * (I1 - 3 - 2 * log(J))", "parameters": {"c": 1e4}, "bulk": 1e5},
         "J2Plastic": {"youngs": 1e5, "poisson": 0.3, "yield_stress": 1e3},
         "Viscoelastic": {"material": RUBBER, "prony": [(0.5, 0.1)]},

@@ -13,6 +13,7 @@ from supple.errors import SceneError
 from supple.kinds.validators import ListOf, OneOf
 from supple.materials.by_law import small_strains
 from supple.materials.elastic import ELASTIC_MATERIALS
+from supple.materials.guccione import Guccione
 from supple.materials.holzapfel_gasser_ogden import HolzapfelGasserOgden
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.j2_plastic import J2Plastic
@@ -30,6 +31,7 @@ UNRELAXED: tuple[type[Hyperelastic], ...] = (
     Yeoh,
     Ogden,
     HolzapfelGasserOgden,
+    Guccione,
     EnergyMaterial,
 )
 
