@@ -140,13 +140,6 @@ def as_one_step(frame: sp.Frame) -> sp.Frame:
     return replace(frame, index=1)
 
 
-def held_along(axis: int, name: str, mesh: sp.TetMesh, vertices: ArrayLike, stiffness: float) -> list[sp.Spring]:
-    """Springs [N/m], a thousand sizes of the mesh long, that hold vertices of a body along one axis alone."""
-    away = 1000.0 * float(np.ptp(mesh.vertices, axis=0).max()) * np.eye(3)[axis]
-    places = {int(v): tuple(mesh.vertices[v] + away) for v in np.asarray(vertices)}
-    return [sp.Spring((name, v), (None, there), stiffness=stiffness) for v, there in places.items()]
-
-
 def as_bent(modes: Any, mode: int, amplitude: float) -> sp.Frame:
     """The frame of soft bodies that a mode displaces by at most `amplitude` [m]."""
     frame = modes.frame
@@ -162,3 +155,32 @@ def rollers(name: str, mesh: sp.TetMesh, axis: int, plane: ArrayLike, youngs: fl
     """
     size = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     return sp.SoftTarget(name, np.flatnonzero(plane), stiffness=1e3 * youngs * size * np.eye(3)[axis])
+
+
+# Mechanisms of rigid bodies have no elastic error, so that the accuracy of XPBD changes nothing.
+DYNAMIC = {"Implicit": sp.Implicit(integrator="bdf2", contact=None), "XPBD": sp.XPBD(contact=None)}
+
+
+def simulated(scene: sp.Scene, solver: Any, dt: float, time: float) -> list[sp.Frame]:
+    """The frames from dt to about `time` [s], all of which converged."""
+    return list(sp.simulate(scene, solver, dt, round(time / dt), strict=True))
+
+
+def rod(name: str, begin: ArrayLike, end: ArrayLike, width: float = 0.1, mass: float = 1.0, **values: Any) -> Any:
+    """A rigid prism of square section between two places (3,) [m]."""
+    a, b = np.asarray(begin, dtype=float), np.asarray(end, dtype=float)
+    length = float(np.linalg.norm(b - a))
+    x, along = np.array([1.0, 0.0, 0.0]), (b - a) / length
+    turn, cosine = np.cross(x, along), float(along[0])
+    sine = float(np.linalg.norm(turn))
+    axis = turn / sine if sine > 1e-9 else np.array([0.0, 0.0, 1.0])
+    shape = sp.shapes.box_surface((length, width, width), (1, 1, 1))
+    rotation = np.arctan2(sine, cosine) * axis
+    return sp.RigidBody(name, shape, mass=mass, position=(a + b) / 2, rotation=rotation, **values)
+
+
+def crossings(times: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:
+    """When values (n,) change their sign [s], by lines between times (n,)."""
+    t, y = np.asarray(times), np.asarray(values)
+    k = np.flatnonzero(y[1:] * y[:-1] < 0.0)
+    return t[k] + (t[k + 1] - t[k]) * y[k] / (y[k] - y[k + 1])

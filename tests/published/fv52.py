@@ -6,7 +6,7 @@ SDLS502 takes these as its reference).
 """
 
 import numpy as np
-from tests.published.case import Case, Reference, Solution, as_bent, held_along, mapped_box
+from tests.published.case import Case, Reference, Solution, as_bent, mapped_box
 
 import supple as sp
 
@@ -17,9 +17,10 @@ HOLD = 1e13  # N/m of a node
 def plate(divisions, *held):
     """A scene whose nodes are held along z, x and y where three masks of their places (k, 3) say so."""
     mesh = mapped_box(divisions, lambda x: (x - 0.5) * (10.0, 10.0, 1.0))
-    loads = []
-    for axis, chosen in zip((2, 0, 1), held, strict=False):
-        loads += held_along(axis, "plate", mesh, np.flatnonzero(chosen(mesh.vertices)), HOLD)
+    loads = [
+        sp.SoftTarget("plate", np.flatnonzero(chosen(mesh.vertices)), stiffness=HOLD * np.eye(3)[axis])
+        for axis, chosen in zip((2, 0, 1), held, strict=False)
+    ]
     return sp.Scene([sp.Body("plate", mesh, STEEL)], loads=loads, gravity=(0, 0, 0))
 
 

@@ -31,6 +31,7 @@ from supple.scene.joints.welding import Welding, weld_together
 from supple.scene.loads.cable import Cable
 from supple.scene.loads.cavity import Cavity
 from supple.scene.loads.load import Load
+from supple.scene.loads.spring import Spring
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
@@ -104,7 +105,6 @@ class Scene(Showable, metaclass=Described):
         if not self.bodies:
             raise SceneError("scene: bodies are missing; give at least one")
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
-        object.__setattr__(self, "bodies", with_stiffness(self.bodies, np.asarray(self.gravity)))
         object.__setattr__(self, "obstacles", _all_named(self.obstacles, [body.name for body in self.bodies]))
         object.__setattr__(self, "joints", _all_named(self.joints, []))
         object.__setattr__(self, "welds", _all_named(self.welds, []))
@@ -136,6 +136,8 @@ class Scene(Showable, metaclass=Described):
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
         self._check_skins()
+        pull = sum(load.pull_at_start(self.bodies) for load in self.loads if isinstance(load, Spring))
+        object.__setattr__(self, "bodies", with_stiffness(self.bodies, np.asarray(self.gravity), pull))
 
     def _facts(self) -> dict[str, str]:
         facts = {"bodies": short_list(body.name for body in self.bodies)}

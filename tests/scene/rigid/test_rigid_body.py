@@ -160,6 +160,12 @@ def test_the_default_stiffness_follows_the_heaviest_load():
     assert kappa(soft()) < kappa(sp.Body("stiff", soft().mesh, sp.StableNeoHookean(youngs=1e9, poisson=0.3)))
     assert sp.Scene([body(BOX, velocity=(100, 0, 0))]).bodies[0].kappa > 5.0 * alone
     assert sp.Scene([body(BOX, stiffness=7.0)]).bodies[0].kappa == 7.0
+    ends = (alone_body := body(BOX)).name, (None, (0.0, 1.0, 0.0))
+    slack, tense = (sp.Spring((ends[0], 0), ends[1], stiffness=1e6, rest_length=rest) for rest in (None, 0.0))
+    assert kappa(loads=[slack]) == alone
+    distance = np.linalg.norm(alone_body.place(alone_body.points)[0] - (0.0, 1.0, 0.0))
+    length, volume = np.linalg.norm(np.ptp(alone_body.points, axis=0)), alone_body.properties.volume
+    assert kappa(loads=[tense]) - alone == pytest.approx(1e6 * distance * length / volume / 4e-3)
     # In millimetres, with the density that keeps the weight per area: the same shapes under the same load.
     small = sp.RigidBody("small", BOX.transformed(scale=1e-3), density=1e5)
     assert sp.Scene([small]).bodies[0].kappa == pytest.approx(alone)

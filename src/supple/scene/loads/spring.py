@@ -13,7 +13,7 @@ from supple.errors import SceneError
 from supple.kinds.validators import NON_NEGATIVE, POSITIVE, Name
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Load
-from supple.scene.loads.over_time import OverTime, OverTimeOf
+from supple.scene.loads.over_time import OverTime, OverTimeOf, script_of
 from supple.scene.loads.points import Point, PointValidator, point_corners
 
 LENGTH = OverTimeOf(bounds=NON_NEGATIVE)
@@ -60,3 +60,15 @@ class Spring(Load):
     ) -> tuple[str | None, NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
         """One end; see `point_corners`."""
         return point_corners(getattr(self, key), bodies, f"{self.label}: {key}")
+
+    def pull_at_start(self, bodies: Sequence[PlacedBody]) -> float:
+        """The size of its force where the scene places everything [N]."""
+        if self.rest_length is None:
+            return 0.0
+        ends = []
+        for key in ("first", "second"):
+            name, corners, weights, beyond = self.corners(key, bodies)
+            body = next((one for one in bodies if one.name == name), None)
+            ends.append(beyond if body is None else weights @ body.place(body.mesh.vertices)[corners])
+        length = float(np.linalg.norm(ends[0] - ends[1]))
+        return self.stiffness * abs(length - float(script_of(self, "rest_length")(0.0)))

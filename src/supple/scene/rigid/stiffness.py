@@ -7,7 +7,8 @@ of `ERROR`. The load is the sum of
     g L M / V     the weight of everything in the scene, of mass M, on two opposite ends of the body of diagonal L;
     rho v^2       for impacts and spin, with v^2 the largest square of a velocity at the start plus that of a fall from
                   `_FALL` diagonals, taken `_IMPACT` times, since an impact takes a short time;
-    `_SOFT` E     of the stiffest soft body, which can be pressed against it.
+    `_SOFT` E     of the stiffest soft body, which can be pressed against it;
+    F L / V       of the springs, F the sum of their forces at the start, on two opposite ends.
 
 Without gravity, that of the earth is assumed. These are scales, not bounds: a solver reports the error.
 """
@@ -29,8 +30,13 @@ _SOFT = 0.1
 _EARTH = 9.81
 
 
-def with_stiffness(bodies: Sequence[PlacedBody], gravity: NDArray[np.float64]) -> tuple[PlacedBody, ...]:
-    """The bodies, of which rigid ones without a stiffness of their own have the scene's."""
+def with_stiffness(
+    bodies: Sequence[PlacedBody], gravity: NDArray[np.float64], pull: float = 0.0
+) -> tuple[PlacedBody, ...]:
+    """The bodies, of which rigid ones without a stiffness of their own have the scene's.
+
+    pull : sum of the forces of springs [N]
+    """
     if not any(isinstance(body, RigidBody) and body.stiffness is None for body in bodies):
         return tuple(bodies)
     g = float(np.linalg.norm(gravity)) or _EARTH
@@ -42,7 +48,7 @@ def with_stiffness(bodies: Sequence[PlacedBody], gravity: NDArray[np.float64]) -
         if isinstance(body, RigidBody) and body.stiffness is None:
             length, volume = _diagonal(body), body.properties.volume
             impact = _IMPACT * body.properties.mass / volume * (squared + 2.0 * g * _FALL * length)
-            body = body.with_stiffness((g * length * total / volume + impact + _SOFT * soft) / (4.0 * ERROR))
+            body = body.with_stiffness(((g * total + pull) * length / volume + impact + _SOFT * soft) / (4.0 * ERROR))
         made.append(body)
     return tuple(made)
 
