@@ -1,5 +1,5 @@
-"""The 45 degree bend of Bathe and Bolourchi (1979) under five times their largest load, 3,000 lb. The reference is that of
-later papers on geometrically exact beams; it could not be checked against a print.
+"""The 45 degree bend of Bathe and Bolourchi (1979) under five times their largest load, 3,000 lb. The reference is
+that of later papers on geometrically exact beams; it could not be checked against a print.
 """
 
 import numpy as np

@@ -38,4 +38,5 @@ CASE = Case(
     references={"sinks by": Reference(0.81061, "L"), "nearer by": Reference(0.55500, "L")},
     solve=solve,
     meshes=((24, 1, 1), (48, 2, 2)),
+    order=2.0,
 )
