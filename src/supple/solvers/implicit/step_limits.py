@@ -17,6 +17,13 @@ from supple.solvers.implicit.timings import Clock
 _MOST_ROUNDS = 12
 
 
+def are_in_pieces(vertices: NDArray[np.int32], pieces: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(n,) which vertices are in a piece of one of the given ones (k,), where `pieces` (n,) has the numbers."""
+    chosen = np.zeros(int(pieces.max(initial=0)) + 1, dtype=np.bool_)
+    chosen[pieces[vertices]] = True
+    return chosen[pieces]
+
+
 class StepLimit(NamedTuple):
     """The largest step that is allowed, and what allows no more.
 
@@ -86,12 +93,12 @@ class StepLimits:
             if limit.step == 1.0:
                 break
             if limit.tet >= 0:
-                meeting = pieces[self.guard.system.tets[limit.tet, :1]]
+                meeting = self.guard.system.tets[limit.tet, :1]
             elif limit.points and self.contact is not None:
-                meeting = pieces[self.contact.vertices(limit.points)]
+                meeting = self.contact.vertices(limit.points)
             else:
                 break
-            free = np.isin(pieces, meeting)
+            free = are_in_pieces(meeting, pieces)
             taken[free] *= limit.step * (share[free] if isinstance(share, np.ndarray) else share)
             limit = self._largest_step(x, taken * direction, along)
         taken *= limit.step

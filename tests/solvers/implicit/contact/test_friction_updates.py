@@ -19,8 +19,9 @@ class Push:
 def outdated(now, taken_at, unbalanced, wanted=None):
     """Whether forces that are `now` times those of the last update are too far away from them."""
     scales = SimpleNamespace(stiffness=1.0, dhat=1.0)
+    collisions = SimpleNamespace(forget_weights=lambda: None)
     model = SimpleNamespace(
-        coefficients=np.ones((1, 1)), friction_iterations=wanted, scales=scales, collisions=SimpleNamespace()
+        coefficients=np.ones((1, 1)), friction_iterations=wanted, scales=scales, collisions=collisions
     )
     x = np.ones((1, 3))
     step: Any = ContactStep(model, x, (0.0, 1.0), 1.0)  # pyright: ignore[reportArgumentType]

@@ -67,8 +67,11 @@ class Collisions:
         """Contacts at x (n, 3) keep their weights wherever they go (see `KnownWeights`)."""
         found = self._at(x)
         known = self._known.with_more(found.new).with_planes(found.planes)
-        if known is not self._known:
-            self._known, self._found = known, None
+        if known is self._known:
+            return
+        # Weights that were all unknown are those of the contacts that were found; a plane's depends on what is known.
+        same = not len(self._known.codes) and not len(found.planes)
+        self._known, self._found = known, found._replace(new=KnownWeights.none()) if same else None
 
     def _at(self, x: NDArray[np.float64]) -> Found:
         points, s = self.points(x), len(self.mesh.points)

@@ -16,9 +16,9 @@ from supple.contact.mesh.obstacles import ObstacleRange, obstacle_positions, wit
 from supple.contact.passing import Passing
 from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
-from supple.mesh.topology import graph_components
 from supple.model.stitched_points import stitched_state
 from supple.model.system import System, initial_state
+from supple.numerics.joined_sets import unite
 from supple.scene.contact_pairs import PairTable, pair_table
 from supple.solvers.implicit.contact.collisions import Barrier, Collisions
 from supple.solvers.implicit.contact.friction import Friction, Press
@@ -92,8 +92,9 @@ class ContactModel:
         one, other = sides(contacts.kinds, contacts.points)
         between = np.maximum(points.owner[one], points.owner[other]) < self.mesh.body_count
         piece = pieces[points.points.vertices[points.points.start[:-1]]]
-        count = int(pieces.max(initial=0)) + 1
-        return graph_components(count, piece[one[between]], piece[other[between]])[pieces]
+        root = np.arange(int(pieces.max(initial=0)) + 2, dtype=np.int32)
+        unite(one[between], other[between], piece, root)
+        return root[pieces]
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every vertex is in front of every plane."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
-from supple.numerics.joined_sets import root_of
+from supple.numerics.joined_sets import unite
 from supple.numerics.sparse.couplings import Couplings
 from supple.runtime.kernel_cache import njit
 
@@ -65,7 +65,7 @@ class FreeMotion:
         held = len(self.totals)
         root = np.arange(held + 1, dtype=np.int32)
         for part in couplings:
-            _unite(part.rows, part.columns, self.piece, root)
+            unite(part.rows, part.columns, self.piece, root)
         free = np.flatnonzero(root != root[held])
         _, joined = np.unique(root[free], return_inverse=True)
         number = np.full(held + 1, -1, dtype=np.int32)
@@ -82,19 +82,6 @@ class FreeMotion:
         """
         if len(self.totals):
             _correct(self.piece, self.masses, self.totals, gradient, scale, direction)
-
-
-@njit(cache=True)
-def _unite(rows, columns, piece, root):
-    """Join the pieces of coupled vertices. The last one stands for all that is held; `root` names one of each set."""
-    held = len(root) - 1
-    for t in range(len(rows)):
-        i, j = piece[rows[t]], piece[columns[t]]
-        if i != j:
-            a, b = root_of(root, held if i < 0 else i), root_of(root, held if j < 0 else j)
-            root[min(a, b)] = max(a, b)
-    for k in range(held):
-        root[k] = root_of(root, k)
 
 
 @njit(cache=True)

@@ -77,7 +77,7 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
         if last:
             break
     exact = barrier is None or barrier.collisions.smallest_distance(here.positions) >= barrier.soft
-    if exact and is_converged(problem, found.length, here, tools, found.touching):
+    if exact and is_converged(replace(problem, objective=objective), found.length, here, tools, found.touching):
         return Outcome(Status.CONVERGED, here, "", rows)
     text = (
         f"{len(rows)} linearization{'s' * (len(rows) > 1)}; the last step was {found.length:.2e} m, converged is "

@@ -77,6 +77,8 @@ class ContactStep:
     def __post_init__(self) -> None:
         if self.model is not None:
             self.model.collisions.floor = _FLOOR * self.model.scales.dhat if self.linearized else 0.0
+            # Weights stay during the step: with those of every minimum in turn, the minima can alternate.
+            self.model.collisions.forget_weights()
         self.stiffness = self.model.scales.stiffness * self.weight if self.model is not None else 0.0
 
     def with_contact(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
@@ -84,9 +86,6 @@ class ContactStep:
         self.objective = objective
         if self.model is None:
             return objective
-        if self.barrier is None:
-            # Weights stay during the step: with those of every minimum in turn, the minima can alternate.
-            self.model.collisions.forget_weights()
         soft = _SOFT * self.model.scales.dhat if self.linearized else 0.0
         self.barrier = Barrier(self.model.collisions, self.stiffness, soft)
         self.frictions = self.model.frictions(self.barrier, x, self.start, self.times[1] - self.times[0])

@@ -25,7 +25,7 @@ from supple.solvers.implicit.newton.linearize import FEW, linearize
 from supple.solvers.implicit.newton.minimize import Convergence, Outcome, Problem, minimize
 from supple.solvers.implicit.newton.objective import Objective
 from supple.solvers.implicit.newton.trace import NewtonRow
-from supple.solvers.implicit.step_limits import StepLimits
+from supple.solvers.implicit.step_limits import StepLimits, are_in_pieces
 from supple.solvers.implicit.stepping.contact_step import ContactStep
 from supple.solvers.implicit.stepping.dirichlet import move_pins
 from supple.solvers.implicit.stepping.integrators import Integrator, Plan, Static
@@ -164,8 +164,12 @@ def _take(
     times = state.time, end
     joints = None if workspace.joints is None else JointStep.of(workspace.joints, state, times, plan.scale)
     contact = ContactStep(workspace.contact, state.positions, times, plan.contact_weight, settings.linearized)
+    still = np.array_equal(targets, state.positions[tools.pinned])
+    objective = _with_joints(base, joints)
+    if not (still and settings.linearized):  # a linearization has the contact of where it begins
+        objective = contact.with_contact(objective, state.positions)
     problem = Problem(
-        contact.with_contact(_with_joints(base, joints), state.positions),
+        objective,
         plan.scale,
         Convergence(settings.shortest(workspace, h, state.memory), settings.force_tolerance),
         settings.max_iterations,
@@ -176,7 +180,7 @@ def _take(
     tools.linear_solver.begin_step()
     x = state.positions
     rows: list[NewtonRow] = []
-    if np.array_equal(targets, x[tools.pinned]):
+    if still:
         ahead = _without_elasticity(system, x, plan, forces, tools.pinned)
         if settings.linearized:
             x = _linearized_at(x, ahead, plan.predicted, limits)
@@ -295,7 +299,7 @@ def _linearized_at(
     place, share = x, np.ones((len(x), 1))
     if contact is not None:
         touching = contact.vertices(np.unique(contact.collisions.at(x).points))
-        share[np.isin(pieces, pieces[touching])] = 0.5
+        share[are_in_pieces(touching, pieces)] = 0.5
         ahead = np.where(share == 1.0, ahead, inertial)
     for _ in range(_MOST_APPROACHES):
         way, limit = limits.shortened(place, ahead - place, share)
