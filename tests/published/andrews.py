@@ -3,6 +3,8 @@ the first body makes two and a half turns in .03 s. Schiehlen (1990) made it a t
 it, and the angles at .03 s are those of the Test Set for IVP Solvers (Mazzia, Magherini 2008), problem "Andrews".
 """
 
+from typing import Any
+
 import numpy as np
 from tests.published.case import DYNAMIC, Case, Reference, Solution, simulated
 
@@ -56,7 +58,8 @@ def solve(dt):
     hook = B + SC * -g2 + SD * g1
     spring = sp.Spring(("K3", tuple(hook - centers[2])), (None, (XC, YC, 0.0)), stiffness=4530.0, rest_length=0.07785)
     scene = sp.Scene(bodies, joints=joints, loads=[spring], gravity=(0, 0, 0))
-    values, frame = {}, None
+    values: dict[str, Any] = {}
+    frame: Any = None
     for name, solver in DYNAMIC.items():
         frames = simulated(scene, solver, dt, 0.03)
         frame = frames[-1]

@@ -3,6 +3,8 @@ with c = sqrt(E / rho) and returns as one of tension, so that the contact lasts 
 rho c v A, and the bar leaves with the speed that it had, without vibration.
 """
 
+from typing import Any
+
 import numpy as np
 from tests.published.case import Case, Reference, Solution, crossings
 
@@ -24,7 +26,8 @@ def solve(cells):
     bar = sp.Body("bar", mesh, material, position=(LENGTH / 2 + 0.002, 0, 0), velocity=(-SPEED, 0, 0))
     wall = sp.HalfSpace(name="wall", point=(0, 0, 0), normal=(1, 0, 0))
     scene = sp.Scene([bar], obstacles=[wall], gravity=(0, 0, 0))
-    dt, values, frame = LASTS / (2 * cells), {}, None
+    dt, values = LASTS / (2 * cells), {}
+    frame: Any = None
     for name, solver in SOLVERS.items():
         frames = list(sp.simulate(scene, solver, dt, round((0.03 + 1.3 * LASTS) / dt)))
         momenta = np.array([f.report.linear_momentum[0] for f in frames]) / (MASS * SPEED)

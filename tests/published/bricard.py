@@ -3,6 +3,8 @@ its two rods. Grubler's formula gives no degree of freedom, and Bricard (1897) f
 of benchmarks, A04, lets it fall for 10 s under gravity of 9.81 m/s^2 along -y; its energy must not change.
 """
 
+from typing import Any
+
 import numpy as np
 from tests.published.case import DYNAMIC, Case, Reference, Solution, rod, simulated
 
@@ -22,7 +24,8 @@ def solve(setting):
     ]
     scene = sp.Scene(rods, joints=joints, gravity=(0, -9.81, 0))
     (free,) = sp.modes(scene, 1).frequencies  # asked for two, it says that there is one
-    values, frame = {"frequency of its one motion": free}, None
+    values: dict[str, Any] = {"frequency of its one motion": free}
+    frame: Any = None
     for name, solver in DYNAMIC.items():
         frames = simulated(scene, solver, dt, end)
         energies = [f.report.energy for f in frames]

@@ -3,6 +3,8 @@ fall. The double pendulum is a standard problem of multibody dynamics (IFToMM 20
 its equations of Lagrange by SciPy's Runge-Kutta method of order 8 with a tolerance of 1e-10.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.integrate import solve_ivp
 from tests.published.case import DYNAMIC, Case, Reference, Solution, rod, simulated
@@ -28,7 +30,8 @@ def solve(dt):
     bodies = [rod("upper", (0, 0, 0), (1, 0, 0), WIDTH), rod("lower", (1, 0, 0), (2, 0, 0), WIDTH)]
     joints = [sp.HingeJoint("upper", None, point=(0, 0, 0)), sp.HingeJoint("lower", "upper", point=(1, 0, 0))]
     scene = sp.Scene(bodies, joints=joints, gravity=(0, -G, 0))
-    values, frame = {}, None
+    values: dict[str, Any] = {}
+    frame: Any = None
     for name, solver in DYNAMIC.items():
         *_, frame = simulated(scene, solver, dt, END)
         pose = frame.poses["lower"]

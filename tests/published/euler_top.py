@@ -3,6 +3,8 @@ its equations; Landau and Lifshitz, "Mechanics", section 37, have the solution: 
 Jacobi's elliptic functions cn, sn and dn of the time.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.special import ellipj
 from tests.published.case import DYNAMIC, Case, Reference, Solution, simulated
@@ -30,7 +32,8 @@ def solve(dt):
     scene = sp.Scene(
         [sp.RigidBody("top", box, mass=6.0, inertia=(I1, I2, I3), angular_velocity=SPIN)], gravity=(0, 0, 0)
     )
-    values, frame = {}, None
+    values: dict[str, Any] = {}
+    frame: Any = None
     for name, solver in DYNAMIC.items():
         *_, frame = simulated(scene, solver, dt, END)
         pose = frame.poses["top"]

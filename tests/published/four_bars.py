@@ -4,6 +4,8 @@ IFToMM's library of benchmarks, A02 (2006), asks for no change of energy. The re
 the equation of the branch on which the links stay parallel, by SciPy's Runge-Kutta method of order 8.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.integrate import solve_ivp
 from tests.published.case import DYNAMIC, Case, Reference, Solution, rod, simulated
@@ -22,7 +24,8 @@ def solve(dt):
     joints = [sp.HingeJoint(f"u{k}", None, point=(k, 0, 0), name=f"foot {k}") for k in range(3)]
     joints += [sp.HingeJoint(f"l{k}", f"u{k + j}", point=(k + j, 1, 0)) for k in range(2) for j in range(2)]
     scene = sp.Scene([*uprights, *levels], joints=joints, gravity=(0, -G, 0))
-    values, frame = {}, None
+    values: dict[str, Any] = {}
+    frame: Any = None
     for name, solver in DYNAMIC.items():
         frames = simulated(scene, solver, dt, END)
         energies = [f.report.energy for f in frames]

@@ -4,6 +4,8 @@ only nutates, and with .8 times it falls. The largest tilts are those of the equ
 Runge-Kutta method of order 8.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.integrate import solve_ivp
 from tests.published.case import DYNAMIC, Case, Reference, Solution, simulated
@@ -33,7 +35,8 @@ def largest_tilt(spin):
 def solve(dt):
     disk = sp.shapes.cylinder_surface(0.2, 0.02, 0.02)
     along = np.array([np.sin(TILT), np.cos(TILT), 0.0])
-    values, frame = {}, None
+    values: dict[str, Any] = {}
+    frame: Any = None
     for share in SHARES:
         top = sp.RigidBody(
             "top", disk, mass=MASS, inertia=(ACROSS, ABOUT, ACROSS), position=ARM * along, rotation=(0, 0, -TILT),

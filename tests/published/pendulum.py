@@ -3,6 +3,8 @@ IFToMM's library of benchmarks, A01 (2006), has this as its first problem. The e
 sqrt(J / (m g L)), with the complete elliptic integral K and the moment of inertia J about the hinge.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.special import ellipk
 from tests.published.case import DYNAMIC, Case, Reference, Solution, crossings, simulated
@@ -16,7 +18,8 @@ def solve(dt):
     cube = sp.shapes.box_surface((SIDE, SIDE, SIDE), (1, 1, 1))
     ball = sp.RigidBody("mass", cube, mass=1.0, position=(-1, 0, 0))
     scene = sp.Scene([ball], joints=[sp.HingeJoint("mass", None, point=(0, 0, 0))], gravity=(0, -G, 0))
-    values, frame = {}, None
+    values: dict[str, Any] = {}
+    frame: Any = None
     for name, solver in DYNAMIC.items():
         frames = simulated(scene, solver, dt, 2.0)
         lowest = crossings([f.time for f in frames], [f.poses["mass"].translation[0] for f in frames])

@@ -2,6 +2,8 @@
 then on its speed is 5/7 of the first, whatever the friction is.
 """
 
+from typing import Any
+
 import numpy as np
 from tests.published.case import Case, Reference, Solution
 
@@ -21,7 +23,8 @@ def solve(setting):
     low = float(ball.place(ball.points)[:, 1].min())
     plane = sp.HalfSpace(name="plane", point=(0, low - 1e-4, 0), normal=(0, 1, 0), friction=MU)
     scene = sp.Scene([ball], obstacles=[plane], gravity=(0, -G, 0))
-    values, frame = {}, None
+    values: dict[str, Any] = {}
+    frame: Any = None
     for name, solver in SOLVERS.items():
         frames = list(sp.simulate(scene, solver, dt, round(0.13 / dt)))
         values[f"speed, {name}"] = np.mean([f.poses["ball"].velocity[0] for f in frames[-len(frames) // 6 :]]) / SPEED
