@@ -62,8 +62,9 @@ class Spring(Load):
         return point_corners(getattr(self, key), bodies, f"{self.label}: {key}")
 
     def pull_at_start(self, bodies: Sequence[PlacedBody]) -> float:
-        """The size of its force where the scene places everything [N]."""
-        if self.rest_length is None:
+        """The size of its force where the scene places everything [N]; zero where a function gives the rest length,
+        whose values a recording has only of its frames."""
+        if self.rest_length is None or callable(self.rest_length):
             return 0.0
         ends = []
         for key in ("first", "second"):
