@@ -19,6 +19,7 @@ from supple.runtime.kernel_cache import KERNELS
 
 PATH = Path(__file__).with_name("kernels.json")
 _ARRAY, _NAMED, _TUPLE, _OMITTED = "array", "named", "tuple", "omitted"
+_RECORD, _NESTED, _STRUCT = "record", "nested", "struct"
 
 
 @cache
@@ -77,6 +78,8 @@ def from_json(signature: list[Any]) -> tuple[types.Type, ...]:
 
 
 def _type_as_json(one: Any) -> Any:
+    if isinstance(one, types.NestedArray):
+        return [_NESTED, _type_as_json(one.dtype), list(one.shape)]
     if isinstance(one, types.Array) and one.aligned:
         return [_ARRAY, _type_as_json(one.dtype), one.ndim, one.layout, one.mutable]
     if isinstance(one, types.BaseNamedTuple):
@@ -85,6 +88,13 @@ def _type_as_json(one: Any) -> Any:
         return [_NAMED, f"{of.__module__}:{of.__qualname__}", [_type_as_json(part) for part in named.types]]
     if isinstance(one, (types.UniTuple, types.Tuple)):
         return [_TUPLE, [_type_as_json(part) for part in one.types]]
+    if isinstance(one, types.Record):
+        fields = [[name, _type_as_json(f.type), f.offset, f.alignment] for name, f in one.fields.items()]
+        return [_RECORD, fields, one.size, one.aligned]
+    if isinstance(one, types.StructRef):
+        shared: Any = one
+        of, fields = type(one), [[name, _type_as_json(part)] for name, part in shared._fields]
+        return [_STRUCT, f"{of.__module__}:{of.__qualname__}", fields]
     if isinstance(one, types.Omitted) and isinstance(one.value, (int, float, str, type(None))):
         return [_OMITTED, one.value]
     if isinstance(one, (types.Number, types.Boolean, types.NoneType)):
@@ -103,6 +113,18 @@ def _type_from_json(one: Any) -> Any:
         return types.Array(_type_from_json(dtype), ndim, layout, readonly=not mutable)
     if kind == _OMITTED:
         return types.Omitted(values[0])
+    if kind == _RECORD:
+        fields, size, is_aligned = values
+        parts = [
+            (name, {"type": _type_from_json(part), "offset": offset, "alignment": alignment, "title": None})
+            for name, part, offset, alignment in fields
+        ]
+        return types.Record(parts, size, is_aligned)
+    if kind == _NESTED:
+        return types.NestedArray(_type_from_json(values[0]), tuple(values[1]))
+    if kind == _STRUCT:
+        module, _, name = values[0].partition(":")
+        return getattr(import_module(module), name)([(field, _type_from_json(part)) for field, part in values[1]])
     parts = [_type_from_json(part) for part in values[-1]]
     if kind == _TUPLE:
         return types.BaseTuple.from_types(parts)

@@ -18,6 +18,7 @@ class ExternalForces:
 
     Attributes
     ----------
+    push, pull : whether any change a prediction, and whether any act after constraints
     acting : the forces of the present substep: the name of their work, their vertices, and (k, 3) [N]
     """
 
@@ -28,6 +29,7 @@ class ExternalForces:
         self._pushes = [load for load in loads if not isinstance(load, (PointSpring, GrownTets, DragLoad))]
         self._need_places = not all(isinstance(load, DeadLoad) for load in self._pushes)
         self._targets = system.soft_targets
+        self.push, self.pull = bool(self._pushes or self._drags), bool(self._springs or self._targets)
         self.acting: list[tuple[str, NDArray[np.integer] | slice, NDArray[np.float64]]] = []
 
     def add_forces(self, at: Substep) -> None:

@@ -27,8 +27,8 @@ def _predict_block(points, previous, velocities, gravity, h, low, high):
 
 
 @njit(cache=True, parallel=True, rows=0)
-def predict(points, previous, velocities, gravity, h):
-    """Begin a substep: x_n = x, v += h g, x += h v.
+def predict(points, previous, velocities, gravity, h, count):
+    """Begin a substep of the first `count` rows: x_n = x, v += h g, x += h v.
 
     Parameters
     ----------
@@ -37,23 +37,23 @@ def predict(points, previous, velocities, gravity, h):
     gravity : (3,) [m/s^2]
     h : length of the substep [s]
     """
-    for block in prange((len(points) + BLOCK - 1) // BLOCK):
+    for block in prange((count + BLOCK - 1) // BLOCK):
         low = block * BLOCK
-        _predict_block(points, previous, velocities, gravity, h, low, min(low + BLOCK, len(points)))
+        _predict_block(points, previous, velocities, gravity, h, low, min(low + BLOCK, count))
 
 
 @njit(cache=True)
-def update_velocities(points, previous, velocities, h):
-    """v = (x - x_n) / h."""
-    for i in range(len(points)):
+def update_velocities(points, previous, velocities, h, count):
+    """v = (x - x_n) / h, of the first `count` rows."""
+    for i in range(count):
         for j in range(3):
             velocities[i, j] = (points[i, j] - previous[i, j]) / h
 
 
 @njit(cache=True)
-def first_lost(points, velocities):
-    """The first vertex whose position or velocity is not finite, or whose position is beyond `FARTHEST`; or -1."""
-    for i in range(len(points)):
+def first_lost(points, velocities, count):
+    """The first of `count` rows whose position or velocity is not finite, or is beyond `FARTHEST`; or -1."""
+    for i in range(count):
         for j in range(3):
             if not (abs(points[i, j]) <= FARTHEST and np.isfinite(velocities[i, j])):
                 return i

@@ -59,8 +59,8 @@ class MomentumRestore:
         # NumPy counts nothing in integers, with weights too.
         totals = np.bincount(labels[soft], weights=self.masses[soft], minlength=count)
         self.totals = totals.astype(np.float64)
-        self._sums = np.zeros((len(self.blocks), _SUMS))
-        self._motion = np.zeros((count, 9))
+        numbers = self.members, self.blocks, self.totals, self.free
+        self.arrays = self.masses, *numbers, np.zeros((len(self.blocks), _SUMS)), np.zeros((count, 9))
 
     def apply(
         self,
@@ -81,8 +81,7 @@ class MomentumRestore:
         velocities : (n, 3) in: used to predict the positions of the substep; out: at its end [m/s].
         h : length of the substep [s].
         """
-        work = self.members, self.blocks, self.totals, self.free, self._sums, self._motion
-        _restore(points, previous, velocities, h, self.masses, *work)
+        restore_momenta(points, previous, velocities, h, *self.arrays)
 
 
 @njit
@@ -190,7 +189,7 @@ def _move_block(points, velocities, h, members, low, high, motion):
 
 
 @njit(cache=True, parallel=True, rows=0)
-def _restore(points, previous, velocities, h, masses, members, blocks, totals, free, sums, motion):
+def restore_momenta(points, previous, velocities, h, masses, members, blocks, totals, free, sums, motion):
     for b in prange(len(blocks)):
         _sum_block(points, previous, velocities, h, masses, members, blocks[b, 1], blocks[b, 2], sums[b])
     _rigid_corrections(blocks, totals, sums, motion)

@@ -124,7 +124,7 @@ class Sleep:
         poses = self._poses_at(time)
         if memory is None or memory.scene != self._scene or not np.array_equal(memory.poses, poses):
             none = np.full(len(self._starts), AWAKE, dtype=np.int64)
-            return SleepMemory(none, np.full(len(none), time), x, LoadedRows.none(), self._scene, poses)
+            return SleepMemory(none, np.full(len(none), time), x, LoadedRows.room(0), self._scene, poses)
         if not np.array_equal(self._poses_at(time + dt), poses):
             return self.woken(memory, memory.asleep)
         changed = self._largest(np.maximum(np.abs(x - memory.places), np.abs(v))) > 0.0

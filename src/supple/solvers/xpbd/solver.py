@@ -175,7 +175,8 @@ class XPBD(Solver):
             joints=JointProjection(system, layout, rigid),
             sets=sets,
             damping=make_damping(inner, layout, inverse_masses),
-            momentum=MomentumRestore(inner) if self.momentum_restore else None,
+            momentum=MomentumRestore(inner),
+            restores=self.momentum_restore,
             contact=contact,
             loads=ExternalForces(inner),
             actuators=ActuatorProjection(inner),
@@ -225,7 +226,7 @@ class XPBD(Solver):
         overlaps = overlaps_of(ws, state.time, sleep)
         while True:
             advance(ws, state, dt, used.count, memory, overlaps, sleep)
-            lost = first_lost(ws.points, ws.velocities)
+            lost = first_lost(ws.points, ws.velocities, len(ws.points))
             if lost < 0:
                 disturbed = disturbed_bodies(ws, time, sleep)
                 if disturbed.any():

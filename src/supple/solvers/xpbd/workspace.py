@@ -30,9 +30,27 @@ from supple.solvers.xpbd.external_forces import ExternalForces
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.moment import Moment, Substep
 from supple.solvers.xpbd.momentum import MomentumRestore
+from supple.solvers.xpbd.record import (
+    COUNTS,
+    LOADED,
+    SMALLEST,
+    VALUES,
+    List,
+    ListsInUse,
+    Motion,
+    Numbers,
+    Pinned,
+    Record,
+    Rigid,
+    Solving,
+    Surface,
+    Touching,
+    Volumes,
+)
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection
 from supple.solvers.xpbd.sleep import Sleep
+from supple.solvers.xpbd.stages import Stages, stages
 from supple.solvers.xpbd.substeps import SubstepChoice
 from supple.solvers.xpbd.sweeps.ordering import Layout, reordered
 from supple.solvers.xpbd.welded_masses import WeldedMasses
@@ -54,6 +72,7 @@ class XPBDWorkspace:
     previous : (n, 3) positions at the beginning of the substep [m]
     velocities, origins : (n, 3); world : (n, 3) positions in the world at the ends of frames [m]
     sound : (m,) the tets that keep their volume positive; bounds : (m,) scratch memory
+    counts, values : see `Record`
     """
 
     system: System
@@ -63,7 +82,8 @@ class XPBDWorkspace:
     joints: JointProjection
     sets: list[ConstraintSet]
     damping: Damping | None
-    momentum: MomentumRestore | None
+    momentum: MomentumRestore
+    restores: bool
     contact: Contact
     loads: ExternalForces
     actuators: ActuatorProjection
@@ -87,6 +107,8 @@ class XPBDWorkspace:
     world: NDArray[np.float64] = field(init=False)
     sound: NDArray[np.bool_] = field(init=False)
     bounds: NDArray[np.float64] = field(init=False)
+    counts: NDArray[np.int64] = field(init=False)
+    values: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
         n, m, nodes = len(self.system.masses), len(self.system.tets), self.contact.nodes
@@ -94,6 +116,13 @@ class XPBDWorkspace:
         self.points, self.previous, self.velocities = nodes.x[:n], nodes.begin[:n], nodes.v[:n]
         self.origins, self.world = np.zeros((n, 3)), np.zeros((n, 3))
         self.sound, self.bounds = np.ones(m, dtype=np.bool_), np.zeros(m)
+        self.counts, self.values = np.zeros(COUNTS, dtype=np.int64), np.zeros(VALUES)
+        count, rigid = len(nodes.x), self.rigid
+        loose, before = np.where(rigid.joined, 0.0, 1.0), np.zeros((len(rigid), 4, 3))
+        self._rigid = Rigid(rigid.control, rigid.masses, loose, rigid.welds, *nodes.embedded, before, nodes.movers)
+        before, expected, base = np.zeros((3, count, 3))
+        self._scratch = before, expected, base, np.zeros((n, 3)), np.zeros(count, dtype=np.bool_)
+        self.grows = self.system.laws_at(0.0).growth is not None
 
     def with_loads(self, system: System) -> XPBDWorkspace:
         """The workspace for a system that differs only by its loads on vertices and its soft targets."""
@@ -140,6 +169,40 @@ class XPBDWorkspace:
         self.works.begin_frame(self.velocities)
         self.stitch_forces.begin_frame()
         self.rigid.begin_frame(self.velocities)
+        self.counts[:], self.values[:] = 0, 0.0
+        self.counts[LOADED], self.values[SMALLEST] = self.contact.lists.loaded, np.inf
+
+    def record(self, targets: NDArray[np.float64], recovered: float, h: float) -> Record:
+        """What the stages of substeps of h [s] work on, as it is at present; the parameters are those of `Record`."""
+        contact, nodes, system, points = self.contact, self.contact.nodes, self.system, self.system.points
+        lists, simplices = contact.lists, contact.surface.simplices
+        moving = nodes.x, nodes.begin, nodes.v, nodes.impulses
+        return Record(
+            Motion(*moving, *self._scratch, self.origins, system.masses, system.gravity),
+            Pinned(system.pinned_vertices, targets),
+            Volumes(contact.tets, self.sound),
+            self._rigid,
+            Surface(
+                *(contact.faces, simplices.first, simplices.owner, nodes.origin, contact.rates, contact.surface.points),
+                *((points.start, points.vertices, points.weights), simplices.nodes, contact.spins),
+            ),
+            *self.touching(),
+            ListsInUse(List(*lists.wide.arrays), List(*lists.tight.arrays), lists.deviations, lists.margins),
+            Numbers(contact.slack, recovered, contact.solver.tolerances(h)),
+            self.counts,
+            self.values,
+        )
+
+    def touching(self) -> tuple[Touching, Solving]:
+        """What is renewed with the lists of pairs."""
+        contact, pairs = self.contact, self.contact.lists.pairs
+        room = contact.rows, contact.solver.islands, contact.marks, contact.cuts, contact.log
+        walls = contact.walls[2], contact.shapes.owners
+        return Touching(pairs, contact.near, contact.chosen, *walls), Solving(*room)
+
+    def stages(self) -> Stages:
+        """The compiled stages of the scene, with the pairs of its list at present."""
+        return stages(len(self.rigid) > 0, len(self.contact.lists.pairs) > 0)
 
     def substep(self, time: float, h: float) -> Substep:
         """The arrays of a substep of h [s] that ends at `time` [s]."""

@@ -44,7 +44,7 @@ def potentials(system, x, seed):
     return {
         "elasticity": elasticity,
         "inertia": inertia(system.masses, x + 0.01 * rng.normal(size=(n, 3)), 1e-4),
-        "vertices": VertexPotential(x, np.arange(n, dtype=np.float64), rng.normal(size=(n, 3))),
+        "vertices": VertexPotential(x, np.arange(3.0 * n).reshape(n, 3), rng.normal(size=(n, 3))),
         "damping": Damping(viscosity, StrainRate(60.0, viscosity.strains(x + 0.01 * rng.normal(size=(n, 3))))),
     }
 

@@ -7,10 +7,10 @@ import pytest
 
 import supple as sp
 from supple.mesh import shapes
-from supple.solvers.xpbd.contact import row_solver
-from supple.solvers.xpbd.frame import advance as advance_module
-from supple.solvers.xpbd.frame import substep as substep_module
 from supple.solvers.xpbd.frame import volumes
+from supple.solvers.xpbd.frame.substep import Substeps
+from supple.solvers.xpbd.record import CUTS
+from supple.solvers.xpbd.workspace import XPBDWorkspace
 
 FLOOR = sp.HalfSpace(name="floor", friction=0.5)
 
@@ -109,19 +109,19 @@ class Watch:
         self.crossing: list[int] = []
         self.least: list[float] = []
         self.cut = self.crushed = 0
-        substep = substep_module.substep
+        run = Substeps.run
 
-        def checked(ws, damping, targets, end, h, last) -> None:
-            substep(ws, damping, targets, end, h, last)
+        def checked(substeps: Substeps, k: int) -> bool:
+            known, ws = run(substeps, k), substeps.ws
             asleep = np.zeros(len(ws.system.bodies), dtype=np.bool_)
-            found = ws.assessment.surfaces.find(np.ascontiguousarray(ws.points[:, :3] + ws.origins), end, asleep)
+            found = ws.assessment.surfaces.find(np.ascontiguousarray(ws.points[:, :3] + ws.origins), ws.time, asleep)
             self.crossing.append(sum(item.pairs for item in found))
             edges = ws.points[ws.system.tets[:, 1:], :3] - ws.points[ws.system.tets[:, :1], :3]
             self.least.append(float((np.linalg.det(edges) / (6.0 * ws.system.rest_volumes)).min()))
-            counts = ws.contact.counts
-            self.cut, self.crushed = max(self.cut, counts.cut), max(self.crushed, counts.crushed)
+            self.cut, self.crushed = max(self.cut, int(ws.counts[CUTS])), max(self.crushed, ws.contact.crushed)
+            return known
 
-        monkeypatch.setattr(advance_module, "substep", checked)
+        monkeypatch.setattr(Substeps, "run", checked)
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,8 @@ class Watch:
 def test_nothing_crosses_and_no_tet_turns_over_without_any_push(
     monkeypatch: pytest.MonkeyPatch, make: Callable[[], sp.Scene], frames: int
 ) -> None:
-    monkeypatch.setattr(row_solver, "solve", lambda *_: (0, 0.0))
+    stages = XPBDWorkspace.stages
+    monkeypatch.setattr(XPBDWorkspace, "stages", lambda ws: stages(ws)._replace(solve_rows=lambda *_: None))
     monkeypatch.setattr(volumes, "MOST_PROJECTIONS", 0)
     watch = Watch(monkeypatch)
     for _ in sp.simulate(make(), sp.XPBD(substeps=12), dt=1 / 60, steps=frames):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.check.frame_check import FrameCheck
+from supple.results.check.geometry.containment import is_inside
 from supple.results.check.geometry.vectors import area_vectors
 from supple.results.check.report import CheckResult
 from supple.results.check.trajectory import Snapshot
@@ -21,8 +22,11 @@ _KINKS = (0.25, 0.5, 0.75)
 # What continues with more of its velocity along the normal of a meeting was not touched. Fast soft balls that meet at
 # 30 degrees to the normal keep up to half. Those that meet at more than 45 degrees keep most of it, and are not judged.
 _GOES_ON, _FRONTAL = 0.8, 0.7
-# Of the time between two frames, to find the moment of a meeting.
-_HALVINGS = 12
+# Of the approach: what changes its velocity by more was pushed, if not by the other one; a third body or a floor hides
+# what happens between two frames.
+_PUSHED = 0.5
+# Of the time between two frames, to find the moment of a meeting. Places on the path between them.
+_HALVINGS, _SAMPLES = 12, 65
 
 Floats = NDArray[np.float64]
 
@@ -127,8 +131,9 @@ class GoingOn(FrameCheck):
 
     Contact bends paths within a frame, so straight ones alone show nothing. But where things meet, it takes their
     approach, and the velocities of both frames are recorded: it fails where two things that continue with their
-    velocity would meet front to front, and in the next frame still have most of their approach along the normal of that
-    meeting. Only things are looked at that move farther in the frame than one of them is thick.
+    velocity would meet front to front, and in the next frame are past each other and still have most of their approach
+    along the normal of that meeting, unless something pushed one of them or their middles go past each other. Only
+    things are looked at that move farther in the frame than one of them is thick.
     """
 
     name = "tunnelling"
@@ -142,7 +147,11 @@ class GoingOn(FrameCheck):
         before = self.last
         if before is None or at.number != before.number + 1:
             return
-        passed = [pair for pair in self._through(before, at) if self._goes_on(before, at, pair)]
+        passed = [
+            pair
+            for pair in self._through(before, at)
+            if self._goes_on(before, at, pair) and self._is_central(before, at, pair)
+        ]
         names = self.of.surfaces.names
         where = f"{names[passed[0][0]]} and {names[passed[0][1]]}, after frame {before.number}" if passed else ""
         self.tally.see(at, float(len(passed)), bool(passed), where)
@@ -183,7 +192,7 @@ class GoingOn(FrameCheck):
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             low, high = (low, middle) if len(met(middle)) else (middle, high)
-        n, closing = np.zeros(3), []
+        n = np.zeros(3)
         first = met(high)
         first = np.where((surfaces.owners[first[:, 0]] == pair[0])[:, None], first, first[:, ::-1])
         x = before.points + high * dt * v0
@@ -191,11 +200,32 @@ class GoingOn(FrameCheck):
             normals = area_vectors(x, surfaces.triangles[rows])
             n += sign * (normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]).sum(axis=0)
         n /= max(float(np.linalg.norm(n)), 1e-300)
-        for v in (v0, v1):
-            one, other = (v[surfaces.triangles[first[:, k]]].mean(axis=(0, 1)) for k in (0, 1))
-            closing.append((float((other - one) @ n), float(np.linalg.norm(one - other))))
-        (begin, speed), (end, _) = closing
-        return begin > _FRONTAL * speed and end > _GOES_ON * begin
+        # (2, 2, 3) velocities of both where they meet, in both frames.
+        v = np.stack([[v[surfaces.triangles[first[:, k]]].mean(axis=(0, 1)) for k in (0, 1)] for v in (v0, v1)])
+        one, other = (at.points[surfaces.triangles[first[:, k]]].mean(axis=(0, 1)) for k in (0, 1))
+        begin, end = (v[:, 1] - v[:, 0]) @ n
+        return bool(
+            (other - one) @ n > 0.0
+            and begin > _FRONTAL * np.linalg.norm(v[0, 1] - v[0, 0])
+            and end > _GOES_ON * begin
+            and (np.abs((v[1] - v[0]) @ n) < _PUSHED * begin).all()
+        )
+
+    def _is_central(self, before: Snapshot, at: Snapshot, pair: tuple[int, int]) -> bool:
+        """Whether the middle of one comes into the other on the straight path, where that has an inside.
+
+        Things that meet with an edge give way sideways, and lose little of their approach.
+        """
+        surfaces = self.of.surfaces
+        rows = [np.flatnonzero(surfaces.owners == k) for k in pair]
+        closed = [surfaces.closed[k] for k in pair]
+        for share in np.linspace(0.0, 1.0, _SAMPLES):
+            x = before.points + share * (at.points - before.points)
+            for one, other in ((0, 1), (1, 0)):
+                middle = x[np.unique(surfaces.triangles[rows[one]])].mean(axis=0)
+                if closed[other] and is_inside(x, middle, surfaces.triangles, rows[other]):
+                    return True
+        return not any(closed)
 
     def _velocities(self, before: Snapshot, at: Snapshot, frame: Snapshot) -> Floats:
         """(n, 3) of all points in one of two frames; those of obstacles are what takes them from one to the other."""

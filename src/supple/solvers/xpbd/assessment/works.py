@@ -13,6 +13,7 @@ from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.assessment.held_forces import HeldForces
 from supple.solvers.xpbd.contact.contact import Contact
 from supple.solvers.xpbd.moment import Substep
+from supple.solvers.xpbd.record import CONTACT_WORK, FRICTION_WORK, UNNAMED_WORK
 
 Floats = NDArray[np.float64]
 Forces = tuple[str, NDArray[np.integer] | slice, Floats]
@@ -63,21 +64,19 @@ class Works:
             add_works(self.by_name, {name: _work(acting, numbers, extended, begun)})
             if held.is_needed:
                 (held.inside if name == "damping" else held.outside)[numbers] += acting
-        on_held, of_contact = 0.0, self._nothing
-        if len(contact.forces.latest.keys):
-            works = contact.forces.works(self.system.points, at.points, at.begun)
-            add_works(self.by_name, works)
-            self.residual -= sum(works.values())
-            if held.is_needed:
-                of_contact = contact.forces.on_vertices(self.system.points, n)
         if held.is_needed:
+            of_contact = contact.forces.on_vertices(self.system.points, n)
             arrays = nodes.impulses, at.points, at.begun, self.system.masses, at.h
-            on_held = _add_contact(of_contact, *arrays, held.outside)
-        self.residual += on_held + _work_of_impulses(at.points, self.system.masses, nodes.impulses, at.begun, at.h)
-        if held.is_needed:
+            self.residual += _add_contact(of_contact, *arrays, held.outside)
             for add_forces in more:
                 add_forces(at, held.outside)
             add_works(self.by_name, held.end_substep(extended, begun, at.velocities, at.h))
+
+    def add_contact(self, values: Floats) -> None:
+        """Add the works of contacts in the substeps of a frame, from the values of its record."""
+        works = {"contact": float(values[CONTACT_WORK]), "friction": float(values[FRICTION_WORK])}
+        add_works(self.by_name, works)
+        self.residual += float(values[UNNAMED_WORK])
 
     def end_frame(self, velocities: Floats, more: Mapping[str, float], dt: float) -> None:
         """End a frame of dt [s] with velocities (n, 3) [m/s], and works that were found elsewhere."""
@@ -112,14 +111,3 @@ def _work(forces, rows, points, begun):
         for j in range(3):
             total += forces[k, j] * (points[i, j] - begun[i, j])
     return total
-
-
-@njit(cache=True)
-def _work_of_impulses(points, masses, impulses, begun, h):
-    """Of changes of velocities (n, 3) of vertices that can move, over their displacements since `begun` in h."""
-    total = 0.0
-    for i in range(len(masses)):
-        if points[i, 3] > 0.0:
-            for j in range(3):
-                total += masses[i] * impulses[i, j] * (points[i, j] - begun[i, j])
-    return total / h

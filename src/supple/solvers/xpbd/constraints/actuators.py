@@ -32,7 +32,12 @@ Floats = NDArray[np.float64]
 
 
 class ActuatorProjection:
-    """The actuators of a system in the substeps of one frame."""
+    """The actuators of a system in the substeps of one frame.
+
+    Attributes
+    ----------
+    within, between : whether there are any within one piece, and others
+    """
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -42,6 +47,7 @@ class ActuatorProjection:
         self._all = [_Projected(each) for each in system.actuators]
         inner = [_is_inner(each, system.joined_components, rigid) for each in system.actuators]
         self._within = [each for each, is_inner in zip(self._all, inner, strict=True) if is_inner]
+        self.within, self.between = any(inner), not all(inner)
         self._between = [each for each, is_inner in zip(self._all, inner, strict=True) if not is_inner]
 
     def begin_frame(self, at: Substep) -> None:

@@ -107,7 +107,7 @@ class StitchForces:
     """
 
     def __init__(self, system: System, sets: list[ConstraintSet]) -> None:
-        self._needed = system.scene.stitching.names.breakable
+        self.needed = system.scene.stitching.names.breakable
         self._others = system.stitching.nodes()[:, 1:] >= 0
         rows = (each.rows for each in sets if isinstance(each, StitchTetConstraints | StitchSpringConstraints))
         self._rows = np.concatenate([np.zeros(0, dtype=np.int64), *rows])
@@ -116,7 +116,7 @@ class StitchForces:
     def begin_frame(self) -> None:
         """Forget the forces of the frame before."""
         self.latest = None
-        if self._needed:
+        if self.needed:
             self.latest = np.full((len(self._others), 3), np.nan)
             self.latest[self._rows] = 0.0
 

@@ -169,7 +169,7 @@ def _plane(base, points, rows, e, n, margin):
     return max(min(where, lowest - margin), highest + margin)
 
 
-@njit(cache=True)
+@njit
 def admit(base, points, movers, rows, count, tets, low, moved, keep, marks, cuts):
     """Shorten motions from `base` (N, 3) in `points` (N, 4) until the guarantee holds; see the module.
 
@@ -277,13 +277,13 @@ def count_crossing(base, points, rows, count):
     return bad
 
 
-@njit(cache=True)
+@njit
 def part(points, movers, loose, pairs, rows, count, most, marks):
     """Part what is through each other by at most `most` [m], and what touches; put nodes back onto walls.
 
     What is apart is never moved farther apart than it has been: that would be energy without a source.
 
-    Velocities do not change. Bodies are shifted by their inverse masses `loose` (b,). Returns how many nodes of
+    Velocities do not change. Bodies are shifted by their inverse masses times `loose` (b,). Returns how many nodes of
     `marks.changed` moved.
     """
     moved = 0
@@ -306,8 +306,8 @@ def part(points, movers, loose, pairs, rows, count, most, marks):
         for i in range(1 if rows.kinds[e] == SHAPE else 4):
             v = rows.nodes[e, i]
             b = movers.bodies.body[v]
-            g = (loose[b] if b >= 0 else points[v, 3]) * rows.weights[e, i] * rows.masses[e] * lack
+            g = (loose[b] * movers.bodies.w[b] if b >= 0 else points[v, 3]) * rows.weights[e, i] * rows.masses[e] * lack
             if rows.kinds[e] == SHAPE and b >= 0:
-                g = lack if loose[b] > 0.0 else 0.0
+                g = lack if loose[b] * movers.bodies.w[b] > 0.0 else 0.0
             moved = _carry(points, points, v, 0.0, g, n, movers, marks, moved, -1)
     return moved

@@ -87,13 +87,17 @@ def push_node(points, bodies, i, f):
         turn_body(bodies, b, cross(row(bodies.arms, i), f))
 
 
-@njit(cache=True)
-def describe(x, control, masses, free, bodies):
-    """Set what bodies have where the substep begins: x (N, >= 3) x_n, control (b, 4) nodes, free (b,)."""
+@njit
+def describe(points, x, control, masses, bodies):
+    """Set what bodies have where the substep begins.
+
+    points : (N, 4), with inverse masses; x : (N, 3) x_n; control : (b, 4) nodes
+    """
     for b in range(len(control)):
         S = inertia_of(x, control, b)[1]
-        bodies.w[b] = 1.0 / masses[b] if free[b] else 0.0
-        f = 4.0 / masses[b] if free[b] else 0.0
+        free = points[control[b, 0], 3] > 0.0
+        bodies.w[b] = 1.0 / masses[b] if free else 0.0
+        f = 4.0 / masses[b] if free else 0.0
         for j in range(3):
             column = solve_symmetric(S, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)))
             for k in range(3):

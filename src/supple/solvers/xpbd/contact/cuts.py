@@ -70,7 +70,7 @@ def share_motion(points, movers, rows, begin, velocities, cuts, count):
                 velocities[v, j] += part * (mean[j] + turned[j] - velocities[v, j])
 
 
-@njit(cache=True)
+@njit
 def keep_spin(begin, points, velocities, h, masses, labels, free, sums):
     """Give back the angular momentum that places took that have moved without a velocity, to free components.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from supple.solvers.xpbd.contact.pairs import SHAPE, is_loaded
 
 
 class LoadedRows(NamedTuple):
-    """Rows that hold a force, see `Rows`.
+    """Rows that hold a force, see `ROW`.
 
     Attributes
     ----------
@@ -33,72 +32,97 @@ class LoadedRows(NamedTuple):
     forces: NDArray[np.float64]
     owners: NDArray[np.int64]
 
-    def chosen(self, kept: NDArray[np.bool_] | NDArray[np.int64]) -> LoadedRows:
+    def chosen(self, kept: NDArray[np.bool_] | NDArray[np.int64] | slice) -> LoadedRows:
         """Those rows (of k,) that are kept."""
         return LoadedRows._make(values[kept] for values in self)
 
-    @staticmethod
-    def none() -> LoadedRows:
-        """No rows."""
-        wide = np.zeros((0, 4), dtype=np.int32), np.zeros((0, 4))
-        three = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
-        return LoadedRows(np.zeros(0, np.int64), *wide, *three, np.zeros((0, 2), np.int64))
+    @classmethod
+    def room(cls, k: int) -> LoadedRows:
+        """For k rows."""
+        wide = np.zeros((k, 4), dtype=np.int32), np.zeros((k, 4))
+        three = np.zeros((k, 3)), np.zeros((k, 3)), np.zeros((k, 3))
+        return cls(np.zeros(k, np.int64), *wide, *three, np.zeros((k, 2), np.int64))
 
 
-@njit(cache=True)
-def loaded_rows(rows, count, pairs, owner, shape_owners, origin, h):
-    """The fields of `LoadedRows` of those of the first rows that have an impulse, in a substep of h [s].
+@njit
+def add_loaded(rows, count, pairs, owner, shape_owners, origin, h, log, first):
+    """Append those of the first rows that have an impulse to the log of `LoadedRows`; returns its new length.
 
-    owner : (N,) of nodes, shape_owners : of shapes; origin : (3,) of places [m]
+    owner : (N,) of nodes, shape_owners : of shapes; origin : (3,) of places [m]; h : of the substep [s]
+    first : how many rows the log has
     """
-    picked = np.empty(count, dtype=np.int64)
-    k = 0
     for e in range(count):
-        if is_loaded(rows.impulses, e):
-            picked[k] = e
-            k += 1
-    keys, owners, places = np.empty(k, dtype=np.int64), np.empty((k, 2), dtype=np.int64), np.zeros((k, 3))
-    nodes, weights = np.empty((k, 4), dtype=np.int32), np.empty((k, 4))
-    normals, forces = np.empty((k, 3)), np.empty((k, 3))
-    for i in range(k):
-        e = picked[i]
+        if not is_loaded(rows.impulses, e):
+            continue
         p = rows.pairs[e]
-        keys[i], owners[i, 0] = pairs.keys[p], owner[rows.nodes[e, 0]]
+        log.keys[first], log.owners[first, 0] = pairs.keys[p], owner[rows.nodes[e, 0]]
         on_shape = rows.kinds[e] == SHAPE
-        owners[i, 1] = shape_owners[pairs.shapes[p]] if on_shape else owner[rows.nodes[e, 3]]
+        log.owners[first, 1] = shape_owners[pairs.shapes[p]] if on_shape else owner[rows.nodes[e, 3]]
         for j in range(4):
-            nodes[i, j], weights[i, j] = rows.nodes[e, j], rows.weights[e, j]
+            log.nodes[first, j], log.weights[first, j] = rows.nodes[e, j], rows.weights[e, j]
         for j in range(3):
-            normals[i, j], forces[i, j] = rows.normals[e, j], rows.impulses[e, j] / (h * h)
-            if on_shape:
-                places[i, j] = rows.places[e, j] + origin[j]
-    return keys, nodes, weights, normals, places, forces, owners
+            log.normals[first, j], log.forces[first, j] = rows.normals[e, j], rows.impulses[e, j] / (h * h)
+            log.places[first, j] = rows.places[e, j] + origin[j] if on_shape else 0.0
+        first += 1
+    return first
 
 
-@dataclass
+@njit
+def works_of(log, first, last, of_point, points, x, begun):
+    """The works of rows of the log along normals, and along surfaces [J].
+
+    of_point : (N,) the system's points, which are `points` (start, vertices, weights)
+    x, begun : (n, >= 3) its vertices when the substep ends and began [m]
+    """
+    start, vertices, shares = points
+    normal = tangential = 0.0
+    for k in range(first, last):
+        a = b = c = 0.0
+        for slot in range(4):
+            i = of_point[log.nodes[k, slot]]
+            if i < 0:
+                continue
+            for m in range(start[i], start[i + 1]):
+                v, w = vertices[m], log.weights[k, slot] * shares[m]
+                a += w * (x[v, 0] - begun[v, 0])
+                b += w * (x[v, 1] - begun[v, 1])
+                c += w * (x[v, 2] - begun[v, 2])
+        force, n, way = row(log.forces, k), row(log.normals, k), (a, b, c)
+        along = dot(force, n) * dot(n, way)
+        normal += along
+        tangential += dot(force, way) - along
+    return normal, tangential
+
+
 class FrameForces:
     """The contact forces in the substeps of one frame, in the numbering of the solver.
 
-    Attributes
+    Parameters
     ----------
     names : of bodies, then of obstacles
     points : (N,) the point of the system that each node is, -1 for others
-    substeps : the rows of those with contact; count : number of substeps
-    latest : of the latest substep
+    log : the rows that pushed, of all substeps, and room for more
+
+    Attributes
+    ----------
+    latest : of the latest substep; rows : of all; count : number of substeps
     standing : of things that sleep with each other and with obstacles, which are those of every substep
     """
 
-    names: tuple[str, ...]
-    points: NDArray[np.int32]
-    substeps: list[LoadedRows] = field(default_factory=list)
-    count: int = 0
-    latest: LoadedRows = field(default_factory=LoadedRows.none)
-    standing: LoadedRows = field(default_factory=LoadedRows.none)
+    def __init__(self, names: tuple[str, ...], points: NDArray[np.int32], log: LoadedRows | None = None) -> None:
+        self.names, self.points = names, points
+        self.log = LoadedRows.room(0) if log is None else log
+        self.rows = self.latest = self.standing = LoadedRows.room(0)
+        self.count = 0
 
-    def end_substep(self, rows: LoadedRows) -> None:
-        """Add the rows that push in a substep."""
-        self.substeps += [rows] if len(rows.keys) else []
-        self.latest, self.count = rows, self.count + 1
+    def end_substeps(self, latest: int, logged: int, count: int) -> None:
+        """Note that `count` substeps have filled `logged` rows of the log, the last one from row `latest` on."""
+        self.rows, self.latest = self.log.chosen(slice(0, logged)), self.log.chosen(slice(latest, logged))
+        self.count = count
+
+    def end_frame(self) -> None:
+        """Keep the rows, as the log is filled again in the next frame."""
+        self.rows = LoadedRows._make(values.copy() for values in self.rows)
 
     def on_vertices(self, points: EmbeddedPoints, count: int) -> NDArray[np.float64]:
         """The forces of the latest substep on the vertices, (count, 3) [N]; `points` are those of the system."""
@@ -107,19 +131,9 @@ class FrameForces:
         points.add_forces(at_points, out)
         return out
 
-    def works(self, points: EmbeddedPoints, x: np.ndarray, begun: np.ndarray) -> dict[str, float]:
-        """Those of the latest substep along normals, `contact`, and along surfaces, `friction` [J].
-
-        points : of the system; x, begun : (n, >= 3) its vertices when the substep ends and began [m]
-        """
-        works, rows = np.zeros(2), self.latest
-        moved = (points.start, points.vertices, points.weights, x, begun)
-        _add_works(self.points, rows.nodes, rows.weights, rows.normals, rows.forces, moved, works)
-        return {"contact": float(works[0]), "friction": float(works[1])}
-
     def pairs(self) -> NDArray[np.int64]:
         """(k, 2) the pairs of bodies and obstacles (counted after the bodies) that push each other."""
-        owners = np.concatenate([rows.owners for rows in (*self.substeps, self.standing)])
+        owners = np.concatenate([rows.owners for rows in (self.rows, self.standing)])
         numbers = np.unique(owners[:, 0] * len(self.names) + owners[:, 1])
         return np.column_stack(np.divmod(numbers, len(self.names)))
 
@@ -131,7 +145,7 @@ class FrameForces:
     def at_rest(self, asleep: NDArray[np.bool_]) -> LoadedRows:
         """The contacts of sleeping bodies (b,) with each other and with obstacles, with their means over the frame."""
         if not asleep.any():
-            return LoadedRows.none()
+            return LoadedRows.room(0)
         still = np.ones(len(self.names), dtype=np.bool_)
         still[: len(asleep)] = asleep
         rows = self._rows()
@@ -185,8 +199,8 @@ class FrameForces:
         )
 
     def _rows(self) -> LoadedRows:
-        parts = [*self.substeps, self.standing._replace(forces=max(self.count, 1) * self.standing.forces)]
-        return LoadedRows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        parts = self.rows, self.standing._replace(forces=max(self.count, 1) * self.standing.forces)
+        return LoadedRows._make(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
 
     def _parts(self, rows: LoadedRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The forces along the normals, and those along the surfaces, as shares of their means over the frame."""
@@ -204,27 +218,6 @@ def add_rows(points, nodes, weights, forces, out):
             if i >= 0:
                 for j in range(3):
                     out[i, j] += weights[k, slot] * forces[k, j]
-
-
-@njit(cache=True)
-def _add_works(points, nodes, weights, normals, forces, moved, works):
-    """Add the works of forces (k, 3) along normals and along surfaces."""
-    start, vertices, shares, x, begun = moved
-    for k in range(len(forces)):
-        a = b = c = 0.0
-        for slot in range(4):
-            i = points[nodes[k, slot]]
-            if i < 0:
-                continue
-            for m in range(start[i], start[i + 1]):
-                v, w = vertices[m], weights[k, slot] * shares[m]
-                a += w * (x[v, 0] - begun[v, 0])
-                b += w * (x[v, 1] - begun[v, 1])
-                c += w * (x[v, 2] - begun[v, 2])
-        force, normal, way = row(forces, k), row(normals, k), (a, b, c)
-        along = dot(force, normal) * dot(normal, way)
-        works[0] += along
-        works[1] += dot(force, way) - along
 
 
 def _same(keys: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -14,23 +14,21 @@ class ListMemory:
 
     Attributes
     ----------
-    points : (k, 2) points and triangles; edges : (l, 2); walls : (m, 2) nodes and shapes
-    reached : (k + l,) see `Pairs` [m]
+    keys, reached : (k,) see `PAIR` [m]
     x, v : (N, 3) where nodes were and how fast, when the list began [m], [m/s]
-    age, until : the time since then, and how long the list holds [s]
+    age, until : the time since then, and how long the list holds [s]; margin : how far nodes may be from there [m]
     collide : (p, p) which things could touch; on_shapes : (p, s) which of them simple shapes
     shapes : (s, ...) the frames and numbers of these, one row each
     excluded : number of pairs of parts that do not collide since they are joined
     """
 
-    points: NDArray[np.int32]
-    edges: NDArray[np.int32]
-    walls: NDArray[np.int32]
+    keys: NDArray[np.int64]
     reached: NDArray[np.float64]
     x: NDArray[np.float64]
     v: NDArray[np.float64]
     age: float
     until: float
+    margin: float
     collide: NDArray[np.bool_]
     on_shapes: NDArray[np.bool_]
     shapes: NDArray[np.float64]
@@ -43,7 +41,7 @@ class ContactMemory:
 
     Attributes
     ----------
-    keys : (k,) the pairs, see `Pairs`; forces : (k, 3) on their first side [N]; normals : (k, 3)
+    keys : (k,) the pairs, see `PAIR`; forces : (k, 3) on their first side [N]; normals : (k, 3)
     positions : (n, 3) of the vertices at the end of that frame [m]
     lists : which pairs may touch; None where none may
     """

@@ -9,7 +9,6 @@ the weights add up to zero.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,52 +20,52 @@ from supple.runtime.kernel_cache import njit
 POINT, EDGES, SHAPE = 0, 1, 2
 # Of `Pairs.near`.
 FAR, NEAR, UNKNOWN = 0, 1, 2
+PART = (1 << 30) - 1
 # Of the gap: what is nearer touches. The cosine of the angle between the normals of what does.
 NIL, OPPOSED = 5e-6, -0.25
 
 
-class Pairs(NamedTuple):
-    """k pairs.
+# A pair: its nodes and kind; of pairs with a shape, the number of that, of pairs with a triangle, that of the triangle;
+# its parts as one number, see `keys_of`, by which pairs are sorted. Whether it pushes: pairs of one body that are near
+# each other at rest are only kept apart. Whether the sides penetrated each other when the frame began: then they are
+# not kept on their sides, but pushed out along the normals at that time. Friction, and the smallest gap
+# of its nodes [m]. The normal as of the latest look, and the impulse with which the next substep begins [kg m]. The
+# largest distance of its rows since it is listed, its gap at most [m]. Whether it may come near while its nodes go on,
+# see `near_pairs`.
+PAIR = np.dtype(
+    [
+        ("keys", np.int64),
+        ("nodes", np.int32, 4),
+        ("shapes", np.int32),
+        ("kinds", np.int8),
+        ("pushes", np.bool_),
+        ("deep", np.bool_),
+        ("near", np.int8),
+        ("friction", np.float64),
+        ("gaps", np.float64),
+        ("normals", np.float64, 3),
+        ("impulses", np.float64, 3),
+        ("reached", np.float64),
+    ],
+    align=True,
+)
 
-    Attributes
-    ----------
-    nodes : (k, 4); kinds : (k,) int8
-    shapes : (k,) of pairs with a shape, its number; of pairs with a triangle, that of the triangle
-    keys : (k,) the parts of the pair as one number, by which impulses are handed on to the next list; of bodies they
-        are the same with other obstacles
-    pushes : (k,) whether the pair pushes; pairs of one body that are near each other at rest are only kept apart
-    deep : (k,) whether the sides were through each other when the frame began; then they are not kept on their sides,
-        but pushed out along the normals at that time
-    friction : (k,) its coefficient; gaps : (k,) the smallest gap of its nodes [m]
-    normals : (k, 3) as of the latest look; impulses : (k, 3) with which the next substep begins [kg m]
-    reached : (k,) the largest distance of the pair's rows so far, its gap at most [m]
-    near : (k,) int8, whether the pair may come near while its nodes go on, see `near_pairs`
-    """
 
-    nodes: NDArray[np.int32]
-    kinds: NDArray[np.int8]
-    shapes: NDArray[np.int32]
-    keys: NDArray[np.int64]
-    pushes: NDArray[np.bool_]
-    deep: NDArray[np.bool_]
-    friction: NDArray[np.float64]
-    gaps: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    impulses: NDArray[np.float64]
-    reached: NDArray[np.float64]
-    near: NDArray[np.int8]
+def pairs_with_keys(keys: NDArray[np.int64]) -> NDArray[np.void]:
+    """(k,) of `PAIR`: room for the pairs with these sorted keys, of which nothing is known."""
+    pairs = np.zeros(len(keys), dtype=PAIR)
+    pairs["keys"], pairs["pushes"], pairs["near"] = keys, True, UNKNOWN
+    return pairs
 
-    @classmethod
-    def room(cls, k: int) -> Pairs:
-        """For k pairs, of which nothing is known."""
-        numbers = (
-            np.zeros((k, 4), np.int32),
-            np.full(k, SHAPE, np.int8),
-            np.full(k, -1, np.int32),
-            np.zeros(k, np.int64),
-        )
-        flags, vectors = (np.empty(k, np.bool_), np.zeros(k, np.bool_)), (np.zeros((k, 3)), np.zeros((k, 3)))
-        return cls(*numbers, *flags, np.empty(k), np.empty(k), *vectors, np.zeros(k), np.full(k, UNKNOWN, np.int8))
+
+def keys_of(kind: int, first: NDArray[np.integer], second: NDArray[np.integer]) -> NDArray[np.int64]:
+    """The keys (k,) of pairs of a kind: of points and triangles, of edges, or of shapes and points."""
+    return np.int64(kind) << 60 | first.astype(np.int64) << 30 | second
+
+
+def parts_of(keys: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """The kinds (k,) and the first and second parts of pairs with these keys."""
+    return keys >> 60, keys >> 30 & PART, keys & PART
 
 
 @njit
@@ -159,41 +158,49 @@ def is_loaded(impulses, k):
 
 
 @njit(cache=True)
-def loaded_pairs(impulses):
-    """The numbers of the pairs that push, from impulses (k, 3)."""
-    return np.array([k for k in range(len(impulses)) if is_loaded(impulses, k)], dtype=np.int64)
+def describe_pairs(pairs, s, shape_friction, old, is_kept):
+    """Fill in what pairs are, and what was known of those of them that are among `old` pairs.
 
-
-@njit(cache=True)
-def describe_pairs(first, points, edges, simplices, pairs):
-    """Fill in what pairs of surfaces are, from row `first` on: nodes, kinds, keys, whether they push, friction, gaps.
-
-    points : (k, 2) points and triangles; edges : (l, 2)
     Pairs of one body push that are farther from each other at rest than twice their gap.
+
+    Parameters
+    ----------
+    s : see `Simplices`; shape_friction : (owners, shapes)
+    is_kept : (o,) of old pairs, whether the new list knows of them what the old one did
     """
-    s = simplices
-    for e in range(len(points) + len(edges)):
-        k = first + e
-        if e < len(points):
-            p, t = points[e, 0], points[e, 1]
-            pairs.nodes[k, 0] = s.nodes[p]
+    o = 0
+    for k in range(len(pairs.keys)):
+        key = pairs.keys[k]
+        kind, first, second = key >> 60, key >> 30 & PART, key & PART
+        pairs.kinds[k] = kind
+        if kind == SHAPE:
+            i = s.nodes[second]
+            pairs.nodes[k, :] = i
+            pairs.shapes[k], pairs.friction[k] = first, shape_friction[s.owner[i], first]
+        elif kind == POINT:
+            pairs.nodes[k, 0], pairs.shapes[k] = s.nodes[first], second
             for j in range(3):
-                pairs.nodes[k, 1 + j] = s.triangles[t, j]
-            pairs.kinds[k], pairs.shapes[k] = POINT, t
-            pairs.keys[k] = np.int64(p) << 31 | t
+                pairs.nodes[k, 1 + j] = s.triangles[second, j]
         else:
-            a, b = edges[e - len(points), 0], edges[e - len(points), 1]
             for j in range(2):
-                pairs.nodes[k, j], pairs.nodes[k, 2 + j] = s.edges[a, j], s.edges[b, j]
-            pairs.kinds[k] = EDGES
-            pairs.keys[k] = -1 - (np.int64(a) << 31 | b)
-        one, other = s.owner[pairs.nodes[k, 0]], s.owner[pairs.nodes[k, 3]]
-        pairs.friction[k], pairs.gaps[k] = s.friction[one, other], np.inf
+                pairs.nodes[k, j], pairs.nodes[k, 2 + j] = s.edges[first, j], s.edges[second, j]
+        pairs.gaps[k] = np.inf
         for i in range(4):
             pairs.gaps[k] = min(pairs.gaps[k], s.gaps[pairs.nodes[k, i]])
-        pairs.pushes[k] = True
-        if one == other:
-            _, r = weights_of(s.rest, pairs.nodes, k, pairs.kinds[k])
+        one, other = s.owner[pairs.nodes[k, 0]], s.owner[pairs.nodes[k, 3]]
+        if kind != SHAPE:
+            pairs.friction[k] = s.friction[one, other]
+        while o < len(old.keys) and old.keys[o] < key:
+            o += 1
+        known = o < len(old.keys) and old.keys[o] == key
+        if known:
+            for j in range(3):
+                pairs.normals[k, j], pairs.impulses[k, j] = old.normals[o, j], old.impulses[o, j]
+            pairs.reached[k], pairs.deep[k] = old.reached[o], old.deep[o]
+        if known and is_kept[o]:
+            pairs.near[k], pairs.pushes[k] = old.near[o], old.pushes[o]
+        elif kind != SHAPE and one == other:
+            _, r = weights_of(s.rest, pairs.nodes, k, kind)
             pairs.pushes[k] = dot(r, r) > (2.0 * pairs.gaps[k]) ** 2
 
 
@@ -235,21 +242,7 @@ def mean_square_speed(v, pairs):
     return total / max(count, 1)
 
 
-@njit(cache=True)
-def copy_pairs(old, rows, new, first):
-    """Copy pairs to the rows from `first` on."""
-    for m in range(len(rows)):
-        k, o = first + m, rows[m]
-        for i in range(4):
-            new.nodes[k, i] = old.nodes[o, i]
-        for j in range(3):
-            new.normals[k, j], new.impulses[k, j] = old.normals[o, j], old.impulses[o, j]
-        new.kinds[k], new.shapes[k], new.keys[k], new.near[k] = old.kinds[o], old.shapes[o], old.keys[o], old.near[o]
-        new.pushes[k], new.deep[k] = old.pushes[o], old.deep[o]
-        new.friction[k], new.gaps[k], new.reached[k] = old.friction[o], old.gaps[o], old.reached[o]
-
-
-@njit(cache=True)
+@njit
 def near_pairs(x, v, pairs, time, reach, moved, out):
     """List the pairs that may come nearer than their gap and `reach` while their nodes go on, and all with shapes.
 
@@ -281,21 +274,3 @@ def near_pairs(x, v, pairs, time, reach, moved, out):
         out[count] = k
         count += pairs.near[k]
     return count
-
-
-def hand_on(old: Pairs, kept: NDArray[np.int64], new: Pairs) -> None:
-    """Give the impulses of loaded pairs that are not kept to the same pairs of a new list."""
-    held = loaded_pairs(old.impulses)
-    if len(held):
-        left = np.ones(len(old.keys), dtype=np.bool_)
-        left[kept] = False
-        held = held[left[held]]
-    open_ = np.flatnonzero(new.near == UNKNOWN)
-    if not len(held) or not len(open_):
-        return
-    held = held[np.argsort(old.keys[held])]
-    place = np.minimum(np.searchsorted(old.keys[held], new.keys[open_]), len(held) - 1)
-    same = old.keys[held[place]] == new.keys[open_]
-    found, source = open_[same], held[place[same]]
-    new.impulses[found], new.normals[found] = old.impulses[source], old.normals[source]
-    new.reached[found] = old.reached[source]

@@ -14,20 +14,16 @@ from supple.solvers.xpbd.contact.bodies import Bodies, place_nodes, take_twists
 from supple.solvers.xpbd.contact.islands import Islands, find_islands
 from supple.solvers.xpbd.contact.levers import hold_bodies
 from supple.solvers.xpbd.contact.nodes import Nodes
-from supple.solvers.xpbd.contact.rows import Rows
 from supple.solvers.xpbd.contact.solve import solve
 from supple.solvers.xpbd.rigid.bodies import RigidBodies, Welds, follow_welds
 from supple.solvers.xpbd.rigid.joint_rows import begin_rows, linearize, note_rows, sweep_joints
 from supple.solvers.xpbd.rigid.joints import JointProjection
 from supple.solvers.xpbd.rigid.motion import advance
 
-# Of the gap: what the last sweep over the rows may change; the most sweeps.
-RESIDUAL, MOST_SWEEPS = 0.02, 4
-# The same of rigid bodies, which nothing else corrects: of the fall in a substep, and the most sweeps. In a heap of 200
-# boxes neither 10 nor 60 sweeps are enough; impulses that are kept go on with them.
-RIGID_RESIDUAL, MOST_RIGID_SWEEPS = 0.0001, 10
-# Rows are solved again with bodies where they are while these turn by more than this [rad], at most so often.
-MOST_TURNS, SMALL_TURN = 4, 2e-3
+# Of the gap: what the last sweep over the rows may change.
+ROW_RESIDUAL = 0.02
+# The same of rigid bodies, which nothing else corrects: of the fall in a substep.
+RIGID_RESIDUAL = 0.0001
 # The rows of joints are linearized at most so often, until none is off by more than this share of its joint's size.
 MOST_LINEARIZATIONS, JOINT_EXACT = 20, 1e-5
 # With joints, and for each rigid body where that is more: what pulls at a chain has to go along it.
@@ -56,36 +52,12 @@ class RowSolver:
         self.left = 0.0
         self.islands = Islands.of(nodes.of_pieces(pieces), pieces[rigid.control[:, 0]])
 
-    def solve(self, rows: Rows, count: int, h: float) -> float:
-        """Solve the first `count` rows in a substep of h [s]; returns `left`."""
-        find_islands(self._nodes.x, rows, count, self.islands)
-        return self._swept(rows, count, h, (MOST_SWEEPS, MOST_RIGID_SWEEPS))
-
-    def sweep(self, rows: Rows, count: int, h: float) -> None:
-        """Sweep once over the rows of active islands, as they were in the solution."""
-        self._swept(rows, count, h, (1, 1))
-
-    def _swept(self, rows: Rows, count: int, h: float, most: tuple[int, int]) -> float:
-        if not count:
-            self.islands.residual[:] = 0.0
-            return 0.0
-        nodes = self._nodes
-        for _ in range(MOST_TURNS):
-            x = self._prepared(rows, count)
-            contacts = nodes.x, nodes.bodies, nodes.begin, rows, count, self.islands
-            _, self.left = solve(*contacts, self._tolerances(h), most)
-            turns = (nodes.bodies.twists[:, 3:] ** 2).sum(axis=1).max(initial=0.0)
-            self._take_over(x, h)
-            if not turns > SMALL_TURN**2:
-                break
-        return self.left
-
-    def solve_joined(self, rows: Rows, count: int, joints: JointProjection, h: float) -> None:
+    def solve_joined(self, rows: NDArray[np.void], count: int, joints: JointProjection, h: float) -> None:
         """Solve the rows of contacts and of joints."""
         nodes, rigid = self._nodes, self._rigid
         moving = Moving(nodes.x, nodes.begin, nodes.v, nodes.impulses, nodes.bodies, rigid.control, rigid.welds)
         find_islands(nodes.x, rows, count, self.islands)
-        contacts = (rows, count, self.islands, self._tolerances(h)) if count else None
+        contacts = (rows, count, self.islands, self.tolerances(h)) if count else None
         at_once = MOST_LINEARIZATIONS if joints.at_once else 1
         for first in range(0, MOST_LINEARIZATIONS, at_once):
             joints.evaluate_others(nodes.x)
@@ -94,29 +66,10 @@ class RowSolver:
             if done:
                 break
 
-    def _prepared(self, rows: Rows, count: int) -> NDArray[np.float64]:
-        """Prepare the rows for a solution from the places as they are; a copy (n, 3) of these."""
-        nodes = self._nodes
-        if len(self._rigid):
-            hold_bodies(nodes.x, nodes.bodies, rows, count)
-        return nodes.x[: len(nodes.impulses), :3].copy()
-
-    def _tolerances(self, h: float) -> tuple[float, float]:
+    def tolerances(self, h: float) -> tuple[float, float]:
         """What the last sweep over the rows may change, in gaps, and in islands with rigid bodies [m]."""
         fall = self._gravity * h**2
-        return RESIDUAL, RIGID_RESIDUAL * fall if fall > 0.0 else math.inf
-
-    def _take_over(self, x: NDArray[np.float64], h: float) -> None:
-        """Give velocities the changes of places since x (n, 3), and of bodies."""
-        nodes, n = self._nodes, len(x)
-        changes = (nodes.x[:n, :3] - x) / h
-        nodes.v[:n] += changes
-        nodes.impulses += changes
-        if len(self._rigid):
-            control = self._rigid.control
-            v = nodes.v[control]
-            nodes.move_bodies(h)
-            nodes.impulses[control] += nodes.v[control] - v
+        return ROW_RESIDUAL, RIGID_RESIDUAL * fall if fall > 0.0 else math.inf
 
 
 class Moving(NamedTuple):

@@ -6,16 +6,12 @@ n . r >= min(gap, d) at the end of the substep, and for as little slip across n 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.levers import set_levers, softness
-from supple.solvers.xpbd.contact.pairs import EDGES, NIL, POINT, SHAPE, Pairs, along, facing, is_loaded, room_between
-from supple.solvers.xpbd.contact.shapes import Walls
+from supple.solvers.xpbd.contact.pairs import EDGES, NIL, POINT, SHAPE, along, facing, is_loaded, room_between
 
 # Of the gap: the distance from simple shapes.
 SKIN = 0.01
@@ -23,50 +19,31 @@ SKIN = 0.01
 PARALLEL = 0.05
 
 
-class Rows(NamedTuple):
-    """Room for rows, of which the first are used.
-
-    Attributes
-    ----------
-    pairs : (r,) the number of each row's pair; nodes : (r, 4) its nodes, kinds : (r,) its kind
-    weights : (r, 4) c_i; places : (r, 3) q (see `pairs`); normals : (r, 3) n
-    targets, distances : (r,) the least n . r, and d [m]; gaps : (r,) of the pairs [m]
-    masses : (r,) the impulse [kg m] along n that changes n . r by one, see `softness`; 0 where nothing moves or pushes
-    across : (r,) the same along the surface, of rows with a rigid body; 0 until something slips
-    friction : (r,); impulses : (r, 3), accumulated [kg m]
-    rigid : (r,) whether a node is on a rigid body
-    movers : (r, 4), levers : (r, 4, 4) share and arm [m], fixed : (r, 3) [m] of rows with rigid bodies; see `levers`
-    """
-
-    pairs: NDArray[np.int64]
-    nodes: NDArray[np.int32]
-    kinds: NDArray[np.int8]
-    weights: NDArray[np.float64]
-    places: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    targets: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    gaps: NDArray[np.float64]
-    masses: NDArray[np.float64]
-    across: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    impulses: NDArray[np.float64]
-    rigid: NDArray[np.bool_]
-    movers: NDArray[np.int32]
-    levers: NDArray[np.float64]
-    fixed: NDArray[np.float64]
-
-    @classmethod
-    def room(cls, r: int) -> Rows:
-        """For r rows."""
-        wide = (np.empty((r, 4)), np.empty((r, 3)), np.empty((r, 3)))
-        flat = (np.empty(r), np.empty(r), np.empty(r), np.empty(r), np.empty(r), np.empty(r))
-        numbers = np.empty(r, np.int64), np.empty((r, 4), np.int32), np.empty(r, np.int8)
-        of_bodies = np.empty(r, np.bool_), np.empty((r, 4), np.int32), np.empty((r, 4, 4)), np.empty((r, 3))
-        return cls(*numbers, *wide, *flat, np.empty((r, 3)), *of_bodies)
+# A row: the number of its pair, its nodes and its kind; c_i, q (see `pairs`), n, the least n . r, and d [m]; the gap
+# of the pair [m]; the impulse [kg m] along n that changes n . r by one, see `softness`, 0 where nothing moves or
+# pushes; the same along the surface, of rows with a rigid body, 0 until something slips; the coefficient of friction;
+# the accumulated impulse [kg m]; whether a node is on a rigid body; of rows with rigid bodies these, shares and arms
+# [m], and what is fixed [m]; see `levers`.
+ROW = np.dtype(
+    [
+        ("pairs", np.int64),
+        ("nodes", np.int32, 4),
+        ("kinds", np.int8),
+        ("rigid", np.bool_),
+        ("weights", np.float64, 4),
+        ("places", np.float64, 3),
+        ("normals", np.float64, 3),
+        *((name, np.float64) for name in ("targets", "distances", "gaps", "masses", "across", "friction")),
+        ("impulses", np.float64, 3),
+        ("movers", np.int32, 4),
+        ("levers", np.float64, (4, 4)),
+        ("fixed", np.float64, 3),
+    ],
+    align=True,
+)
 
 
-@njit(cache=True)
+@njit
 def detect(begin, end, bodies, faces, first_of, near, pairs, walls, slack, chosen, moved, first, rows):
     """Append the rows of all pairs that are not sure to keep their reach on the way; returns the number of rows.
 
@@ -77,7 +54,7 @@ def detect(begin, end, bodies, faces, first_of, near, pairs, walls, slack, chose
     near : (m,) the pairs that are asked; walls : of the last of these, those with shapes
     slack : the reach of a pair is its gap and this [m]; below zero: the reach is zero
     chosen : (k,) the pairs that are rows already; out
-    moved : (N,) of a pair, one node is among these; empty: all pairs are asked
+    moved : (N,) of a pair, one node is among these
     first : how many rows there are already
     """
     count = first
@@ -88,7 +65,7 @@ def detect(begin, end, bodies, faces, first_of, near, pairs, walls, slack, chose
         if chosen[k]:
             continue
         p, q, r, s = pairs.nodes[k, 0], pairs.nodes[k, 1], pairs.nodes[k, 2], pairs.nodes[k, 3]
-        if len(moved) and not (moved[p] or moved[q] or moved[r] or moved[s]):
+        if not (moved[p] or moved[q] or moved[r] or moved[s]):
             continue
         loaded = is_loaded(pairs.impulses, k)
         reach = pairs.gaps[k] + slack if slack >= 0.0 else 0.0
@@ -166,14 +143,3 @@ def _cross(x, nodes, k, c):
     a, b = subtract(row(x, nodes[k, 1]), row(x, nodes[k, 0])), subtract(row(x, nodes[k, 3]), row(x, nodes[k, 2]))
     n = cross(a, b)
     return inside > 1e-6 and dot(n, n) > PARALLEL**2 * dot(a, a) * dot(b, b)
-
-
-def no_walls() -> Walls:
-    """Of no pairs with shapes."""
-    return Walls(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-
-
-def is_last_shape(pairs: Pairs, near: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The near pairs with shapes, which are the last of the near pairs."""
-    first = int(np.searchsorted(pairs.kinds[near], SHAPE))
-    return near[first:]

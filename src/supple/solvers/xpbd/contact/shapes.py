@@ -132,8 +132,9 @@ class RowShapes:
 
     Attributes
     ----------
-    owners : (k,) number of each among bodies and obstacles; moving : (k,)
+    owners : (k,) number of each among bodies and obstacles; moving : (k,); parameters : (k, PARAMETERS)
     friction, collide : (owners, k)
+    kinds : the kernel that measures the walls of each kind of shape, and which shapes are of it (k,)
     """
 
     def __init__(self, system: System, poses: ObstaclePoses) -> None:
@@ -142,9 +143,9 @@ class RowShapes:
         table, bodies = pair_table(system.scene), len(system.bodies)
         self.owners = bodies + np.asarray(self._shapes.owners)
         self.friction, self.collide = table.friction[:, self.owners], table.collide[:, self.owners]
-        self.moving = self._shapes.moving
+        self.moving, self.parameters = self._shapes.moving, self._shapes.parameters
         contacts = self._shapes.contacts
-        self._kinds = [
+        self.kinds = [
             (kernel_of(function), np.array([each is function for each in contacts], dtype=np.bool_))
             for function in dict.fromkeys(contacts)
         ]
@@ -174,6 +175,6 @@ class RowShapes:
         k = len(points)
         walls = Walls(np.empty(k), np.empty((k, 3)), np.empty((k, 3)))
         if k:
-            for kernel, wanted in self._kinds:
-                kernel(x, points, shapes, wanted, self._shapes.parameters, begin, end, *walls)
+            for kernel, wanted in self.kinds:
+                kernel(x, points, shapes, wanted, self.parameters, begin, end, *walls)
         return walls

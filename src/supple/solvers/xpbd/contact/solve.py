@@ -60,7 +60,7 @@ def _turn(out, scale, points, bodies, begin, nodes, e, moment):
             out[v, j] += scale * points[v, 3] * d[j]
 
 
-@njit(cache=True)
+@njit
 def solve(points, bodies, begin, rows, count, islands, tolerances, most):
     """Sweep over the rows of each active island until no sweep changes an n . r by more than its tolerance.
 
@@ -70,8 +70,9 @@ def solve(points, bodies, begin, rows, count, islands, tolerances, most):
     Returns the number of sweeps, and the largest change in the last one of any island, in gaps.
     """
     sweeps, some, largest = 0, count > 0, 0.0
-    islands.swept[:] = islands.active
-    islands.residual[:] = islands.changes[:] = 0.0
+    for p in range(len(islands.swept)):
+        islands.swept[p] = islands.active[p]
+        islands.residual[p] = islands.changes[p] = 0.0
     while some:
         sweeps += 1
         for p in range(len(islands.swept)):
@@ -125,9 +126,12 @@ def solve(points, bodies, begin, rows, count, islands, tolerances, most):
     return sweeps, largest
 
 
-@njit(cache=True)
-def push_kept(points, bodies, velocities, near, pairs, walls, faces, h):
-    """Begin a substep with the kept impulses, along the normals at x_n; impulses of pairs that do not push are zero."""
+@njit
+def push_kept(points, begin, bodies, velocities, near, pairs, walls, faces, h):
+    """Begin a substep with the kept impulses, along the normals at x_n; impulses of pairs that do not push are zero.
+
+    points : (N, 4), of which the inverse masses are used; begin : (N, 3) x_n
+    """
     shape = len(near) - len(walls.gaps)
     for m in range(len(near)):
         k = near[m]
@@ -136,7 +140,7 @@ def push_kept(points, bodies, velocities, near, pairs, walls, faces, h):
         if pairs.kinds[k] == SHAPE:
             d, n = walls.gaps[m - shape], row(walls.normals, m - shape)
         else:
-            _, n, d = facing(points, pairs, k, faces)
+            _, n, d = facing(begin, pairs, k, faces)
         f, old = row(pairs.impulses, k), row(pairs.normals, k)
         if d > 2.0 * pairs.gaps[k] or dot(n, old) < 0.5:
             pairs.impulses[k, :] = 0.0
@@ -153,7 +157,7 @@ def push_kept(points, bodies, velocities, near, pairs, walls, faces, h):
             continue
         c = (1.0, 0.0, 0.0, 0.0)
         if pairs.kinds[k] != SHAPE:
-            c, _ = weights_of(points, pairs.nodes, k, pairs.kinds[k])
+            c, _ = weights_of(begin, pairs.nodes, k, pairs.kinds[k])
         for i in range(4):
             v, g = pairs.nodes[k, i], c[i]
             f = (g * pairs.impulses[k, 0], g * pairs.impulses[k, 1], g * pairs.impulses[k, 2])
@@ -163,13 +167,13 @@ def push_kept(points, bodies, velocities, near, pairs, walls, faces, h):
             for j in range(3):
                 velocities[v, j] += points[v, 3] * f[j] / h
         if pairs.kinds[k] != SHAPE:
-            _, _, d = facing(points, pairs, k, faces)
+            _, _, d = facing(begin, pairs, k, faces)
             m = cross(row(pairs.normals, k), row(pairs.impulses, k))
             if m[0] != 0.0 or m[1] != 0.0 or m[2] != 0.0:
-                _turn(velocities, 1.0 / h, points, bodies, points, pairs.nodes, k, (-d * m[0], -d * m[1], -d * m[2]))
+                _turn(velocities, 1.0 / h, points, bodies, begin, pairs.nodes, k, (-d * m[0], -d * m[1], -d * m[2]))
 
 
-@njit(cache=True)
+@njit
 def keep_impulses(rows, count, velocities, h, rates, near, pairs):
     """Keep what the next substep begins with: not what stopped the approach with which this one began.
 

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from supple.model.energy_balance import add_works
 from supple.model.state import State
-from supple.model.system import System
 from supple.solvers.xpbd.assessment.surfaces import Overlap
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping, cycle_lengths
-from supple.solvers.xpbd.frame.substep import substep
-from supple.solvers.xpbd.integration import first_lost, to_world
+from supple.solvers.xpbd.frame.substep import Substeps
+from supple.solvers.xpbd.integration import to_world
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.sleep import SleepMemory
 from supple.solvers.xpbd.workspace import XPBDWorkspace
@@ -48,13 +47,6 @@ def grow(ws: XPBDWorkspace, end: float) -> None:
         add_works(ws.works.by_name, {"growth": work})
 
 
-def pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:
-    """(substeps, k, 3) positions of the pinned vertices at the end of each substep [m]."""
-    if all(pin.pin.motion is None for pin in system.pins):
-        return np.repeat(system.pin_targets(time)[None], substeps, axis=0)
-    return np.stack([system.pin_targets(time + (k + 1) * h) for k in range(substeps)])
-
-
 def advance(
     ws: XPBDWorkspace,
     state: State,
@@ -68,12 +60,11 @@ def advance(
     h = dt / substeps
     load(ws, state)
     ws.set_asleep(sleep.asleep)
-    targets = pin_targets(ws.system, state.time, h, substeps)
     crossing = [each.numbers for each in overlaps if each.pairs]
     known = memory.contact
     if known is not None and not known.belongs_to(state.positions, KNOWN * ws.contact.edge_length):
         known = None
-    ws.contact.begin_frame((state.time, dt, h), ws.origins[0].copy(), known, crossing, sleep.asleep)
+    ws.contact.begin_frame(state.time, h, ws.origins[0].copy(), known, crossing, sleep.asleep)
     ws.contact.forces.keep_standing(sleep.contacts, sleep.asleep)
     ws.sound[:] = ws.assessment.begin(ws.moment(state.time), ws.contact.tets.now, h, memory.ledger)
     ws.begin_frame(state.time, h)
@@ -82,15 +73,18 @@ def advance(
     damping, lengths = damping_in(ws, h), cycles(substeps)
     if damping is not None:
         damping.begin_step(memory.viscous, state.velocities)
+    frame = Substeps(ws, state.time, dt, substeps, damping)
     for k in ws.pace.tasks(0 if sleep.asleep.all() else substeps, ws.most_threads):
-        end = state.time + (k + 1) * h
+        begun = state.time + k * h
         if damping is not None and k in lengths:
-            moving = ws.anchors.velocities(end - h, h)
+            moving = ws.anchors.velocities(begun, h)
             damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h)
-        grow(ws, end)
-        substep(ws, damping, targets[k], end, h, k == substeps - 1)
-        if first_lost(ws.points, ws.velocities) >= 0:
+        if ws.grows:
+            grow(ws, begun + h)
+        if not frame.run(k):
             break
+    frame.note_forces(substeps)
+    ws.works.add_contact(ws.values)
 
 
 def damping_in(ws: XPBDWorkspace, h: float) -> Damping | None:

@@ -18,6 +18,7 @@ from supple.solvers.xpbd.details import XPBDDetails
 from supple.solvers.xpbd.frame.advance import damping_in, overlaps_after
 from supple.solvers.xpbd.integration import to_world
 from supple.solvers.xpbd.memory import XPBDMemory
+from supple.solvers.xpbd.record import CUTS, RESIDUAL, SMALLEST
 from supple.solvers.xpbd.sleep import SleepMemory
 from supple.solvers.xpbd.substeps import FALL, Substeps
 from supple.solvers.xpbd.workspace import XPBDWorkspace
@@ -52,7 +53,7 @@ def end_frame(
     h = dt / used.count
     to_world(ws.points, ws.origins, ws.world)
     ws.world[ws.system.pinned_vertices] = ws.system.pin_targets(time)
-    held_back = ws.contact.counts.cut
+    held_back = int(ws.counts[CUTS])
     ws.works.end_frame(ws.velocities, ws.actuators.works(), dt)
     held, works = held_back / used.count, ws.works.by_name
     softening = ws.assessment.softening
@@ -83,13 +84,14 @@ def end_frame(
         problem = Status.CRUSHED
     elif problem is None and (findings.softened or findings.apart):
         problem = Status.SOFTENED
+    ws.contact.forces.end_frame()
     forces, old_points = ws.contact.forces, ws.layout.old_points
     x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
     sound = status in (Status.CONVERGED, Status.SOFTENED) and held <= HELD_TOLERANCE
     rest = ws.sleep.end(x, v, time, sleep, forces, sound)
     damping = damping_in(ws, h)
     memory = XPBDMemory(
-        contact=ws.contact.memory(x),
+        contact=ws.contact.memory(x, h),
         viscous=None if damping is None else damping.memory(v),
         ledger=ledger,
         measured=measured,
@@ -100,14 +102,14 @@ def end_frame(
     pushes, friction = forces.by_name()
     details = XPBDDetails(
         contacts=len(forces.latest.keys) + len(forces.standing.keys),
-        smallest_gap=ws.contact.smallest_gap,
+        smallest_gap=float(ws.values[SMALLEST]) if np.isfinite(ws.values[SMALLEST]) else None,
         substeps=used.count,
         repeats=repeats,
         substeps_reason=used.reason,
         softening=shares,
         energy_gained=findings.gained,
         truncated=held_back,
-        contact_residual=ws.contact.counts.residual,
+        contact_residual=float(ws.values[RESIDUAL]),
         asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
         contact_forces=pushes,
         friction_forces=friction,

@@ -135,19 +135,22 @@ def half_turn(S, L):
     return math.sqrt(1.0 - dot(q, q)), q
 
 
+@njit
+def spin_of(x, v, control, b):
+    """How fast body b turns at places x (N, >= 3) with velocities v (N, 3) of its control points [rad/s]."""
+    center, S = inertia_of(x, control, b)
+    L = (0.0, 0.0, 0.0)
+    for i in control[b]:
+        moment = cross(subtract(row(x, i), center), row(v, i))
+        L = (L[0] + moment[0], L[1] + moment[1], L[2] + moment[2])
+    turn = solve_symmetric(S, L)
+    return math.sqrt(dot(turn, turn))
+
+
 @njit(cache=True)
 def spins(x, v, control):
-    """(b,) how fast bodies turn at places x (N, >= 3) with velocities v (N, 3) of their control points [rad/s]."""
-    out = np.empty(len(control))
-    for b in range(len(control)):
-        center, S = inertia_of(x, control, b)
-        L = (0.0, 0.0, 0.0)
-        for i in control[b]:
-            moment = cross(subtract(row(x, i), center), row(v, i))
-            L = (L[0] + moment[0], L[1] + moment[1], L[2] + moment[2])
-        turn = solve_symmetric(S, L)
-        out[b] = math.sqrt(dot(turn, turn))
-    return out
+    """(b,) how fast all bodies turn; see `spin_of`."""
+    return np.array([spin_of(x, v, control, b) for b in range(len(control))])
 
 
 @njit(cache=True)

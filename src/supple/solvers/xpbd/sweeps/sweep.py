@@ -42,7 +42,7 @@ class Sweep:
         self._data = groups.lanes(constants)
         self._counts, self._pointers = groups.counts, groups.pointers
         self._active = np.ones(len(self._counts), dtype=np.bool_)
-        self._kernel = _sweep_of(project, constraints.shape[1])
+        self.kernel = _sweep_of(project, constraints.shape[1])
 
     @property
     def groups(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
@@ -59,7 +59,7 @@ class Sweep:
 
     def run(self, points: NDArray[np.float64], h: float) -> None:
         """Project every constraint once: see `ConstraintSet.project`."""
-        self._kernel(points, self._corners, self._counts, self._active, self._data, self._pointers, h)
+        self.kernel(points, self.groups, h)
 
     def run_measured(self, points: NDArray[np.float64], h: float) -> NDArray[np.float64]:
         """`run`, and the forces (m, k, 3) that it delivered to the vertices of each constraint [N].
@@ -115,8 +115,9 @@ def _sweep_chunk(points, corners, counts, active, data, first, last, h):
                 points[p, 2] = X[3 * c + 2, lane]
 
 
-def _sweep(points, corners, counts, active, data, pointers, h):
-    """Project the even chunks, then the odd ones."""
+def _sweep(points, groups, h):
+    """Project the even chunks, then the odd ones; groups : see `Sweep.groups`."""
+    corners, counts, active, data, pointers = groups
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for k in prange((n_chunks + 1 - parity) // 2):

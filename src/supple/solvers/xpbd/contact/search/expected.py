@@ -11,16 +11,38 @@ from supple.runtime.kernel_cache import njit
 
 
 class Expected:
-    """Where nodes were and how fast, when a list was made; until when the list holds."""
+    """Where nodes were and how fast, when a list was made.
+
+    Attributes
+    ----------
+    x, v : (N, 3) [m], [m/s]; clock : (2,) the time since then, and how long the list holds [s]
+    """
 
     def __init__(self, count: int) -> None:
-        self.x, self.v = np.full((count, 3), np.inf), np.zeros((count, 3))
-        self.age = self.until = 0.0
+        self.x, self.v, self.clock = np.full((count, 3), np.inf), np.zeros((count, 3)), np.zeros(2)
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.float64], ...]:
+        """x, v and clock."""
+        return self.x, self.v, self.clock
+
+    @property
+    def age(self) -> float:
+        """The time since the list was made [s]."""
+        return float(self.clock[0])
+
+    @property
+    def left(self) -> float:
+        """How long the list still holds [s]."""
+        return float(self.clock[1] - self.clock[0])
+
+    def ends_within(self, h: float) -> bool:
+        """Whether the list does not hold for a substep of h [s]."""
+        return bool(self.clock[0] + h * (1.0 - 1e-9) > self.clock[1])
 
     def begin(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         """Expect of all nodes that they go on from x (N, >= 3) with v (N, 3) for a time [s]."""
-        self.x, self.v = x[:, :3].copy(), v.copy()
-        self.age, self.until = 0.0, time
+        self.x[:], self.v[:], self.clock[:] = x[:, :3], v, (0.0, time)
 
     def correct(self, nodes: NDArray[np.bool_], x: NDArray[np.float64], v: NDArray[np.float64]) -> None:
         """Expect of some nodes (N,) that they go on from x with v."""
@@ -34,17 +56,18 @@ class Expected:
 
     def deviation(self, x: NDArray[np.float64], nodes: NDArray[np.int32]) -> float:
         """How far one of the nodes (s,) at x (N, >= 3) is from where it is expected, at most [m]; inf if not finite."""
-        return math.sqrt(_largest_deviation(x, self.x, self.v, self.age, nodes))
+        return largest_deviation(x, self.x, self.v, self.age, nodes)
 
     def off(self, x: NDArray[np.float64], nodes: NDArray[np.int32], most: float) -> NDArray[np.bool_]:
         """(N,) which of the nodes (s,) at x (N, >= 3) are farther than `most` [m] from where they are expected."""
         out = np.zeros(len(self.x), dtype=np.bool_)
-        _deviating(x, self.x, self.v, self.age, nodes, most, out)
+        deviating(x, self.x, self.v, self.age, nodes, most, out)
         return out
 
 
 @njit(cache=True)
-def _largest_deviation(x, begin, v, age, nodes):
+def largest_deviation(x, begin, v, age, nodes):
+    """See `Expected.deviation`."""
     most = 0.0
     for i in nodes:
         a, b, c = (
@@ -55,11 +78,12 @@ def _largest_deviation(x, begin, v, age, nodes):
         square = a * a + b * b + c * c
         if not square <= most:
             most = square if square < np.inf else np.inf
-    return most
+    return math.sqrt(most)
 
 
 @njit(cache=True)
-def _deviating(x, begin, v, age, nodes, margin, left):
+def deviating(x, begin, v, age, nodes, margin, left):
+    """See `Expected.off`."""
     for i in nodes:
         a, b, c = (
             x[i, 0] - begin[i, 0] - age * v[i, 0],

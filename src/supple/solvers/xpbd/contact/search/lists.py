@@ -16,16 +16,18 @@ from supple.contact.search.patch_search import PatchSearch
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.contact.memory import ContactMemory, ListMemory
 from supple.solvers.xpbd.contact.pairs import (
+    EDGES,
+    PART,
+    POINT,
     SHAPE,
-    Pairs,
-    copy_pairs,
     describe_pairs,
-    hand_on,
-    loaded_pairs,
+    keys_of,
     mean_square_speed,
     near_pairs,
+    pairs_with_keys,
+    parts_of,
 )
-from supple.solvers.xpbd.contact.search.expected import Expected, fastest_square
+from supple.solvers.xpbd.contact.search.expected import Expected, deviating, fastest_square
 from supple.solvers.xpbd.contact.search.overlaps import Overlaps
 from supple.solvers.xpbd.contact.search.surface import RowSurface
 from supple.solvers.xpbd.contact.shapes import RowShapes
@@ -34,17 +36,19 @@ from supple.solvers.xpbd.contact.shapes import RowShapes
 # before a substep rather than after it, and from which a node is searched together with those that must be.
 WIDE, NEAR = 0.13, 0.05
 SOON, TOGETHER = 0.7, 0.5
-# Of the mean edge: how far the fastest node goes while the wide list is valid, and at most where that has fewer pairs
-# than the surfaces have points, so that a search costs more than the list. The number of substeps of the near list. A
-# part of the list is made again for at most so many times as long as a list by the present velocities would be valid:
-# where falling boxes meet boxes that lie, a tenth of the list remains.
-WAY, LONGEST, STEPS, LATER = 0.35, 1.0, 6, 2.0
+# Of the mean edge: how far the fastest node goes while the wide list is valid. By how much this and the margin of that
+# list are larger at most where it has fewer pairs than the surfaces have points, so that a search costs more than the
+# list. The number of substeps of the near list. A part of the list is made again for at most so many times as long as a
+# list by the present velocities would be valid: where falling boxes meet boxes that lie, a tenth of the list remains.
+WAY, LARGEST, STEPS, LATER = 0.35, 3.0, 6, 2.0
 
 
 class Lists:
-    """The lists of a scene. `pairs` have the impulses that are kept, `near` (m,) the numbers of the near ones.
+    """The lists of a scene. `pairs` have the impulses that are kept.
 
-    `loaded`: whether any pair may have an impulse.
+    `loaded`: whether any pair may have an impulse where the frame begins. `wide` and `tight` are the lists of all pairs
+    and of the near ones, `deviations` (2,) how far nodes are from where these expect them and `margins` (2,) how far
+    they may be [m].
 
     Parameters
     ----------
@@ -57,12 +61,11 @@ class Lists:
         self._search = PatchSearch(surface.parts, surface.patches)
         excluded = surface.parts.excluded_triangles, surface.parts.excluded_edges
         self._excluded = sum(len(lists.items) for lists in excluded)
-        self._every = np.ones(surface.count, dtype=np.bool_)
         self._collide, self._on_shapes = surface.simplices.collide.copy(), shapes.collide
         self._fixed = shapes.described()
         self._any = bool(self._collide.any()) or bool(self._on_shapes.any())
-        self._number = np.zeros(surface.count, dtype=np.int64)
-        self._number[surface.simplices.nodes] = np.arange(len(surface.simplices.nodes))
+        self.wide, self.tight, self.deviations = Expected(surface.count), Expected(surface.count), np.zeros(2)
+        self.margins = np.array([WIDE, NEAR]) * self._edge
         nobody = np.zeros(len(self._collide), dtype=np.bool_), Overlaps.none(len(self._collide))
         self.begin_frame(None, np.zeros((surface.count, 3)), np.zeros(3), 1.0, *nobody)
 
@@ -86,111 +89,116 @@ class Lists:
         x : (N, >= 3) the nodes about an origin (3,) [m]
         still : (p,) things that do not move; overlaps : of things that begin in each other
         """
-        count, s = self._surface.count, self._surface.simplices
-        self._deep = overlaps
+        s = self._surface.simplices
         np.logical_and(self._collide & ~overlaps.crossing, ~(still[:, None] & still), out=s.collide)
         self._on_shapes = self._shapes.collide & ~still[:, None]
-        self.wide, self.tight = Expected(count), Expected(count)
-        self._points = self._edges = self._on_walls = np.zeros((0, 2), dtype=np.int32)
-        self.pairs = Pairs.room(0 if memory is None else len(memory.keys))
-        if memory is not None:
-            self.pairs.keys[:], self.pairs.normals[:] = memory.keys, memory.normals
-            self.pairs.impulses[:] = h * h * memory.forces
-        self.near = np.zeros(0, dtype=np.int64)
+        for expected in (self.wide, self.tight):
+            expected.begin(np.full(expected.x.shape, np.inf), np.zeros(expected.v.shape), 0.0)
+        self.deviations[:] = np.inf
         self.loaded = memory is not None and len(memory.keys) > 0
-        self._deviations = np.inf, np.inf
+        loaded = pairs_with_keys(np.zeros(0, np.int64) if memory is None else memory.keys)
+        if memory is not None:
+            loaded["normals"], loaded["impulses"] = memory.normals, h * h * memory.forces
         known = None if memory is None else memory.lists
+        nothing = np.zeros(len(loaded), dtype=np.bool_)
         if known is not None and not len(overlaps.normals) and self._is_of(known):
-            self.wide.x, self.wide.v = known.x - origin, known.v.copy()
-            self.wide.age, self.wide.until = known.age, known.until
-            self._on_walls = known.walls
-            self._describe(None, known.points, known.edges)
-            self.pairs.reached[: len(known.reached)] = known.reached
-            self._deviations = self._deviation(self.wide, x), np.inf
+            self.wide.x[:], self.wide.v[:] = known.x - origin, known.v
+            self.wide.clock[:], self.margins[0] = (known.age, known.until), known.margin
+            self.deviations[0] = self._deviation(self.wide, x)
+            self._describe(known.keys, loaded, nothing)
+            self.pairs["reached"] = known.reached
+            return
+        deep = np.concatenate([keys_of(POINT, *overlaps.points.T), keys_of(EDGES, *overlaps.edges.T)])
+        self._describe(np.union1d(deep, loaded["keys"][self._are_parts(loaded["keys"])]), loaded, nothing)
+        rows = np.searchsorted(self.pairs["keys"], deep)
+        self.pairs["deep"][rows], self.pairs["normals"][rows] = True, overlaps.normals
 
     def _is_of(self, known: ListMemory) -> bool:
         """Whether a list is of this scene, with the same things at rest."""
-        s = self._surface.simplices
+        s, keys = self._surface.simplices, known.keys
         same = [
             known.excluded == self._excluded,
             known.x.shape == self.wide.x.shape == known.v.shape,
             np.array_equal(known.collide, s.collide),
             np.array_equal(known.on_shapes, self._on_shapes),
             np.array_equal(known.shapes, self._fixed),
-            known.reached.shape == (len(known.points) + len(known.edges),),
+            keys.ndim == 1 and known.reached.shape == keys.shape,
+            keys.dtype == np.int64 and bool((np.diff(keys) > 0).all() and self._are_parts(keys).all()),
         ]
-        ends = (
-            (known.points, (len(s.nodes), len(s.triangles))),
-            (known.edges, (len(s.edges), len(s.edges))),
-            (known.walls, (len(self._number), len(self._shapes))),
-        )
-        return all(same) and all(
-            pairs.dtype == np.int32 and pairs.shape[1:] == (2,) and bool(((pairs >= 0) & (pairs < np.array(end))).all())
-            for pairs, end in ends
-        )
+        return all(same)
+
+    def _are_parts(self, keys: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which keys (k,) are of parts of this scene: a memory may be one of a scene with other obstacles."""
+        s, (kinds, first, second) = self._surface.simplices, parts_of(keys)
+        ends = {
+            POINT: (len(s.nodes), len(s.triangles)),
+            EDGES: (len(s.edges), len(s.edges)),
+            SHAPE: (len(self._shapes), len(s.nodes)),
+        }
+        fits = [(kinds == kind) & (first < most[0]) & (second < most[1]) for kind, most in ends.items()]
+        return np.logical_or.reduce(fits)
 
     def memory(self, x: NDArray[np.float64], origin: NDArray[np.float64], h: float) -> ContactMemory:
         """What the next frame begins with, after substeps of h [s]; x (n, 3) are the vertices in the world [m]."""
-        k, wide = loaded_pairs(self.pairs.impulses), self.wide
-        k = k[np.argsort(self.pairs.keys[k])]
+        pairs, wide = self.pairs, self.wide
+        k = np.flatnonzero(pairs["impulses"].any(axis=1))
         masks = self._surface.simplices.collide.copy(), self._on_shapes, self._fixed
-        first = len(self._deep.normals)
-        reached = self.pairs.reached[first : first + len(self._points) + len(self._edges)].copy()
-        pairs = self._points, self._edges, self._on_walls, reached
-        lists = ListMemory(*pairs, wide.x + origin, wide.v.copy(), wide.age, wide.until, *masks, self._excluded)
-        return ContactMemory(self.pairs.keys[k], self.pairs.impulses[k] / (h * h), self.pairs.normals[k], x, lists)
+        listed = ~pairs["deep"]
+        held = pairs["keys"][listed], pairs["reached"][listed], wide.x + origin, wide.v.copy()
+        until = float(wide.clock[1])
+        lists = ListMemory(*held, wide.age, until, float(self.margins[0]), *masks, self._excluded)
+        return ContactMemory(pairs["keys"][k], pairs["impulses"][k] / (h * h), pairs["normals"][k], x, lists)
 
-    def renew(self, x: NDArray[np.float64], v: NDArray[np.float64], h: float, frames: NDArray[np.float64]) -> None:
-        """Make the lists valid for the substep of h [s] that begins at x (N, >= 3) with velocities v (N, 3).
+    def renew(self, x: NDArray[np.float64], v: NDArray[np.float64], h: float, frames: NDArray[np.float64]) -> bool:
+        """Make the wide list valid for the substep of h [s] that begins at x (N, >= 3) with velocities v (N, 3).
 
         frames : of the shapes then
+
+        Returns whether there are other pairs.
         """
-        wide, tight, least = self.wide, self.tight, h * (1.0 - 1e-9)
-        limits = SOON * WIDE * self._edge, SOON * NEAR * self._edge
-        if wide.age + least > wide.until:
+        wide = self.wide
+        if wide.ends_within(h):
             self._find(x, v, self._time(v, h), frames, None)
-        elif not self._deviations[0] <= limits[0]:
-            wide.until = min(wide.until, wide.age + LATER * self._time(v, h))
-            self._find(x, v, 0.0, frames, self._nodes_off(wide, x, TOGETHER * WIDE))
-        elif tight.age + least <= tight.until and self._deviations[1] <= limits[1]:
-            return
-        if tight.age + least > tight.until:
-            self._choose(x, v, min(wide.until - wide.age, STEPS * h))
+        elif not self.deviations[0] <= SOON * self.margins[0]:
+            wide.clock[1] = min(wide.clock[1], wide.age + LATER * self._time(v, h))
+            self._find(x, v, 0.0, frames, self._nodes_off(wide, x, TOGETHER * self.margins[0]))
         else:
-            self._choose_again(x, v)
+            return False
+        return True
 
-    def end_substep(self, h: float) -> None:
-        """Note that a substep of h [s] ends."""
-        self.wide.age += h
-        self.tight.age += h
-
-    def cover(
+    def search_again(
         self, begin: NDArray[np.float64], end: NDArray[np.float64], h: float, frames: NDArray[np.float64]
-    ) -> bool:
-        """Whether the lists hold for the motion of the substep that ends; otherwise they are made again for it."""
+    ) -> NDArray[np.bool_]:
+        """Make the lists again for the motion of the substep that ends.
+
+        Returns the nodes (N,) whose near pairs are to be chosen again.
+        """
         wide, tight = self.wide, self.tight
-        self._deviations = self._deviation(wide, end), self._deviation(tight, end)
-        inside = [d <= margin * self._edge for d, margin in zip(self._deviations, (WIDE, NEAR), strict=True)]
-        if all(inside):
-            return True
         v = (end[:, :3] - begin[:, :3]) / h
-        nodes = self._nodes_off(tight, end, TOGETHER * NEAR)
-        off = self._nodes_off(wide, end, TOGETHER * WIDE)
-        wide.age -= h
-        tight.age -= h
-        if not inside[0]:
+        nodes = self._nodes_off(tight, end, TOGETHER * self.margins[1])
+        off = self._nodes_off(wide, end, TOGETHER * self.margins[0])
+        wide.clock[0] -= h
+        tight.clock[0] -= h
+        if not self.deviations[0] <= self.margins[0]:
             self._find(begin, v, 0.0, frames, off)
-        self._choose_again(begin, v, nodes)
-        wide.age += h
-        tight.age += h
-        self._deviations = self._deviation(wide, end), self._deviation(tight, end)
-        return False
+        tight.correct(nodes, begin, v)
+        wide.clock[0] += h
+        return nodes
+
+    def measure(self, x: NDArray[np.float64]) -> None:
+        """Set how far nodes at x (N, >= 3) are from where they are expected."""
+        self.deviations[:] = self._deviation(self.wide, x), self._deviation(self.tight, x)
+
+    @property
+    def hold(self) -> bool:
+        """Whether nodes are where the lists expect them."""
+        return bool((self.deviations <= self.margins).all())
 
     def _deviation(self, expected: Expected, x: NDArray[np.float64]) -> float:
         return expected.deviation(x, self._surface.simplices.nodes)
 
-    def _nodes_off(self, expected: Expected, x: NDArray[np.float64], share: float) -> NDArray[np.bool_]:
-        return expected.off(x, self._surface.simplices.nodes, share * self._edge)
+    def _nodes_off(self, expected: Expected, x: NDArray[np.float64], most: float) -> NDArray[np.bool_]:
+        return expected.off(x, self._surface.simplices.nodes, most)
 
     def _find(
         self,
@@ -201,104 +209,109 @@ class Lists:
         nodes: NDArray[np.bool_] | None,
     ) -> None:
         """Search the pairs of some nodes (N,), or a new list of all that holds for a time [s]."""
-        p, wide = self._surface.patches, self.wide
-        asked = None
+        wide, old = self.wide, self.pairs
+        asked, kept = None, old["deep"]
         if nodes is None:
             wide.begin(x, v, time)
+            self.margins[0] = WIDE * self._scale() * self._edge
         else:
             wide.correct(nodes, x, v)
-            asked = _asked(nodes[self._surface.simplices.nodes], p.corners)
-        at, way = wide.places, (wide.until - wide.age) * wide.v
-        found = self._search.find(at, way, self._widest + 2.0 * WIDE * self._edge, asked)
-        self._on_walls = np.column_stack(self._walls(at, way, frames))
-        self._describe(asked, *found)
+            patches, surface = self._surface.patches, self._surface.simplices.nodes
+            asked, kept = np.zeros(len(patches.owner), dtype=np.bool_), np.zeros(len(old), dtype=np.bool_)
+            _ask(nodes[surface], patches.corners, asked)
+            _keep(old, asked, patches.of_point, patches.of_triangle, patches.of_edge, kept)
+        at, way = wide.places, wide.left * wide.v
+        points, edges = self._search.find(at, way, self._widest + 2.0 * self.margins[0], asked)
+        found = keys_of(POINT, *points.T), keys_of(EDGES, *edges.T), self._walls(at, way, frames)
+        self._describe(np.sort(np.concatenate([old["keys"][kept], *found])), old, kept)
 
-    def _describe(self, asked: NDArray[np.bool_] | None, points: NDArray[np.int32], edges: NDArray[np.int32]) -> None:
-        """Make the pairs of the lists: the old ones without patches that are asked, and those that are found.
-
-        Pairs that push keep their impulses.
-        """
-        s, deep, p, old = self._surface.simplices, self._deep, self._surface.patches, self.pairs
-        stays = [np.zeros(0, dtype=np.int64)] * 2
-        if asked is not None:
-            points_asked, triangles_asked, edges_asked = asked[p.of_point], asked[p.of_triangle], asked[p.of_edge]
-            parts = (self._points, points_asked, triangles_asked), (self._edges, edges_asked, edges_asked)
-            stays = [np.flatnonzero(~(one[of[:, 0]] | other[of[:, 1]])) for of, one, other in parts]
-        d, listed = len(deep.normals), len(self._points)
-        self._points = np.concatenate([self._points[stays[0]], points])
-        self._edges = np.concatenate([self._edges[stays[1]], edges])
-        first = d + len(self._points)
-        new = Pairs.room(first + len(self._edges) + len(self._on_walls))
-        nothing = deep.points[:0]
-        describe_pairs(0, deep.points, deep.edges, s, new)
-        new.deep[:d], new.normals[:d] = True, deep.normals
-        kept = np.concatenate([d + stays[0], d + listed + stays[1]])
-        copy_pairs(old, kept[: len(stays[0])], new, d)
-        copy_pairs(old, kept[len(stays[0]) :], new, first)
-        describe_pairs(d + len(stays[0]), points, nothing, s, new)
-        describe_pairs(first + len(stays[1]), nothing, edges, s, new)
-        self._describe_walls(new, first + len(self._edges), *self._on_walls.T)
-        hand_on(old, kept, new)
-        self.pairs = new
+    def _describe(self, keys: NDArray[np.int64], old: NDArray[np.void], kept: NDArray[np.bool_]) -> None:
+        """Take the pairs with these keys (k,), and of the `old` ones (o,) what is known of them, where it is `kept`."""
+        self.pairs = pairs_with_keys(keys)
+        describe_pairs(self.pairs, self._surface.simplices, self._shapes.friction, old, kept)
 
     def _walls(
         self, x: NDArray[np.float64], way: NDArray[np.float64], frames: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """The nodes and shapes (k,) that may touch."""
+    ) -> NDArray[np.int64]:
+        """The keys (k,) of points and shapes that may touch."""
         s = self._surface.simplices
-        nodes = s.nodes[s.owner[s.nodes] < len(self._shapes.collide)]
-        reach = s.gaps[nodes] + WIDE * self._edge + np.sqrt(np.einsum("ij,ij->i", way[nodes], way[nodes]))
-        points, shapes = [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=np.int32)]
+        mine = np.flatnonzero(s.owner[s.nodes] < len(self._shapes.collide))
+        nodes = s.nodes[mine]
+        reach = s.gaps[nodes] + self.margins[0] + np.sqrt(np.einsum("ij,ij->i", way[nodes], way[nodes]))
+        keys = [np.zeros(0, dtype=np.int64)]
         for o in range(len(self._shapes)):
             every = np.full(len(nodes), o, dtype=np.int32)
             gaps = self._shapes.walls(x, nodes, every, frames, frames).gaps
             near = self._on_shapes[s.owner[nodes], o] & ((gaps < reach) | self._shapes.moving[o])
-            points.append(nodes[near])
-            shapes.append(every[near])
-        return np.concatenate(points), np.concatenate(shapes)
-
-    def _describe_walls(self, pairs: Pairs, first: int, nodes: NDArray[np.int32], shapes: NDArray[np.int32]) -> None:
-        s, mine = self._surface.simplices, slice(first, None)
-        pairs.nodes[mine] = nodes[:, None]
-        pairs.kinds[mine], pairs.shapes[mine], pairs.pushes[mine] = SHAPE, shapes, True
-        pairs.keys[mine] = 1 << 62 | shapes.astype(np.int64) << 31 | self._number[nodes]
-        pairs.gaps[mine] = s.gaps[nodes]
-        pairs.friction[mine] = self._shapes.friction[s.owner[nodes], shapes]
-
-    def _choose(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
-        """Choose the near pairs for a time [s]."""
-        self.tight.begin(x, v, time)
-        self._choose_of(self._every)
-
-    def _choose_again(
-        self, x: NDArray[np.float64], v: NDArray[np.float64], nodes: NDArray[np.bool_] | None = None
-    ) -> None:
-        """Choose again the near ones among the pairs of nodes (N,), or of those that have left their place."""
-        off = self._nodes_off(self.tight, x, TOGETHER * NEAR) if nodes is None else nodes
-        self.tight.correct(off, x, v)
-        self._choose_of(off)
-
-    def _choose_of(self, nodes: NDArray[np.bool_]) -> None:
-        tight, room = self.tight, np.empty(len(self.pairs.keys) + 1, dtype=np.int64)
-        reach, time = 2.0 * NEAR * self._edge, tight.until - tight.age
-        near = room[: near_pairs(tight.places, tight.v, self.pairs, time, reach, nodes, room)]
-        # One order for any history of the lists, and whatever else is in the scene; those with shapes last.
-        self.near = near[np.lexsort((self.pairs.keys[near], self.pairs.kinds[near]))]
-        self._deviations = self._deviations[0], 0.0
+            keys.append(keys_of(SHAPE, every[near], mine[near]))
+        return np.concatenate(keys)
 
     def _time(self, v: NDArray[np.float64], h: float) -> float:
         """For how long to search ahead: while the fastest node, seen from its body, goes `WAY` edges or more."""
-        s, pairs = self._surface.simplices, len(self._points) + len(self._edges)
-        way = min(LONGEST, WAY * max(1.0, len(s.nodes) / max(1, pairs))) * self._edge
+        s, way = self._surface.simplices, WAY * self._scale() * self._edge
         fastest = math.sqrt(max(fastest_square(v, s.nodes, s.owner, len(s.collide)), mean_square_speed(v, self.pairs)))
         return max(h, way / max(fastest, way / (200.0 * h)))
 
+    def _scale(self) -> float:
+        """By how much longer and wider a list is than in a scene with many pairs, where a search costs less."""
+        return min(LARGEST, max(1.0, len(self._surface.simplices.nodes) / max(1, len(self.pairs))))
+
+
+@njit
+def choose_near(tight, left, begin, v, pairs, found, deviations, margins, surface, h, off, places, near):
+    """Make the list of the near pairs valid for a substep of h [s]; returns their number, -1 where they are known.
+
+    Parameters
+    ----------
+    tight : the list; left : how long the wide one still holds [s]; found : whether that is another one
+    begin, v : (N, 3) x_n and velocities; surface : (s,) nodes; off, places : (N,) and (N, 3) scratch memory
+    """
+    x, u, clock = tight.x, tight.v, tight.clock
+    if clock[0] + h * (1.0 - 1e-9) > clock[1]:
+        for i in range(len(off)):
+            off[i] = True
+            for j in range(3):
+                x[i, j], u[i, j] = begin[i, j], v[i, j]
+        clock[0], clock[1] = 0.0, min(left, STEPS * h)
+    elif found or not deviations[1] <= SOON * margins[1]:
+        for i in range(len(off)):
+            off[i] = False
+        deviating(begin, x, u, clock[0], surface, TOGETHER * margins[1], off)
+        for i in range(len(off)):
+            if off[i]:
+                for j in range(3):
+                    u[i, j] = v[i, j]
+                    x[i, j] = begin[i, j] - clock[0] * v[i, j]
+    else:
+        return -1
+    return choose_of(tight, pairs, deviations, margins, off, places, near)
+
+
+@njit
+def choose_of(tight, pairs, deviations, margins, off, places, near):
+    """Choose again the near ones among the pairs of the nodes that are `off`; returns the number of near pairs."""
+    for i in range(len(places)):
+        for j in range(3):
+            places[i, j] = tight.x[i, j] + tight.clock[0] * tight.v[i, j]
+    deviations[1] = 0.0
+    return near_pairs(places, tight.v, pairs, tight.clock[1] - tight.clock[0], 2.0 * margins[1], off, near)
+
 
 @njit(cache=True)
-def _asked(left, corners):
-    """(q,) the patches with a corner that has left its place (s,)."""
-    out = np.zeros(len(corners.start) - 1, dtype=np.bool_)
-    for q in range(len(out)):
+def _ask(left, corners, asked):
+    """Ask the patches (q,) with a corner that has left its place (s,)."""
+    for q in range(len(asked)):
         for k in range(corners.start[q], corners.start[q + 1]):
-            out[q] = out[q] or left[corners.items[k]]
-    return out
+            asked[q] = asked[q] or left[corners.items[k]]
+
+
+@njit(cache=True)
+def _keep(pairs, asked, of_point, of_triangle, of_edge, kept):
+    """Keep the pairs (k,) of which no side is in a patch that is asked (q,), and those that are deep."""
+    for k in range(len(kept)):
+        first, second = pairs.keys[k] >> 30 & PART, pairs.keys[k] & PART
+        if pairs.kinds[k] == POINT:
+            kept[k] = not (asked[of_point[first]] or asked[of_triangle[second]])
+        elif pairs.kinds[k] == EDGES:
+            kept[k] = not (asked[of_edge[first]] or asked[of_edge[second]])
+        kept[k] = kept[k] or pairs.deep[k]
