@@ -34,7 +34,8 @@ def test_a_large_ball_rests_in_it_and_the_check_agrees(solver, tmp_path):
     distances, _ = RING.signed_distance(last)
     assert -1e-9 < distances.min() < 3e-3
     assert last[:, 1].mean() > 0.05
-    assert frames[-1].report.kinetic_energy < 1e-2
+    # It still swings in the ring.
+    assert frames[-1].report.kinetic_energy < 1e-4 * frames[-1].report.potential_energy
     report = sp.check_recording(path, only=["intersection", "containment", "distance"])
     assert report.ok, report.failures
     with sp.read_recording(path) as recording:

@@ -25,7 +25,7 @@ def test_the_files_of_the_page(tmp_path):
 
 
 def test_the_program_of_the_page_runs(tmp_path, monkeypatch):
-    (program,) = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.S | re.M)
+    program, *_ = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.S | re.M)
     monkeypatch.chdir(tmp_path)
     exec(compile(program, "studies.md", "exec"), {"__name__": "studies"})  # a name that workers cannot import
     lines = (tmp_path / "slide" / "table.csv").read_text(encoding="utf-8").splitlines()
