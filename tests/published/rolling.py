@@ -1,5 +1,5 @@
 """A ball that slides over a plane with friction begins to turn, and rolls after 2 v / (7 mu g). Coriolis (1835): from
-then on its speed is 5/7 of the first, whatever the friction is.
+then on its speed is 5/7 of the first, whatever the friction is. Here it starts on a level plane.
 """
 
 from typing import Any

@@ -16,7 +16,7 @@ from supple.results.checkpoint.file import read_checkpoint
 from supple.runtime.lock import is_locked
 from supple.solvers.implicit.energies.elasticity import Elasticity
 from supple.solvers.implicit.newton import linear_solver
-from supple.solvers.xpbd.frame.substep import Substeps
+from supple.solvers.xpbd.frame.substep import SubstepRunner
 
 from .conftest import DT, Drift, circling, drifting_scene, kept, same_bits, stitched_scene
 
@@ -137,13 +137,13 @@ def test_nan_within_a_solver_is_a_status_and_the_last_good_state_is_kept(out, mo
         good = next(frames)
     with monkeypatch.context() as patch:
         if name == "xpbd":
-            push = Substeps._push  # comes before the constraints
+            push = SubstepRunner._push  # comes before the constraints
 
             def spoiled(self, now, last):
                 push(self, now, last)
                 now.points[0, 1] = np.nan
 
-            patch.setattr(Substeps, "_push", spoiled)
+            patch.setattr(SubstepRunner, "_push", spoiled)
         else:
             model = Elasticity.add_model
 

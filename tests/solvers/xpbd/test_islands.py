@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.solvers.xpbd.frame.substep import Substeps
+from supple.solvers.xpbd.frame.substep import SubstepRunner
 from supple.solvers.xpbd.record import SWEEPS
 from supple.solvers.xpbd.stages import MOST_RIGID_SWEEPS
 
@@ -59,14 +59,14 @@ def test_soft_rows_of_bodies_with_bones_are_solved_as_other_soft_rows(monkeypatc
     """A stack of three. Rows on rigid bodies, which nothing else corrects, are more exact: 63 % reach the limit."""
     sweeps, bodies, welds = [], [], []
 
-    run = Substeps.run
+    run = SubstepRunner.run
 
     def counting(substeps, k):
         known = run(substeps, k)
         sweeps.append(int(substeps.ws.counts[SWEEPS]))
         return known
 
-    monkeypatch.setattr(Substeps, "run", counting)
+    monkeypatch.setattr(SubstepRunner, "run", counting)
     for k in range(3):
         y = 0.051 + 0.1021 * k
         core = sp.shapes.box_surface((0.04, 0.04, 0.04), (1, 1, 1))

@@ -8,7 +8,7 @@ import pytest
 import supple as sp
 from supple.mesh import shapes
 from supple.solvers.xpbd.frame import volumes
-from supple.solvers.xpbd.frame.substep import Substeps
+from supple.solvers.xpbd.frame.substep import SubstepRunner
 from supple.solvers.xpbd.record import CUTS
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
@@ -109,9 +109,9 @@ class Watch:
         self.crossing: list[int] = []
         self.least: list[float] = []
         self.cut = self.crushed = 0
-        run = Substeps.run
+        run = SubstepRunner.run
 
-        def checked(substeps: Substeps, k: int) -> bool:
+        def checked(substeps: SubstepRunner, k: int) -> bool:
             known, ws = run(substeps, k), substeps.ws
             asleep = np.zeros(len(ws.system.bodies), dtype=np.bool_)
             found = ws.assessment.surfaces.find(np.ascontiguousarray(ws.points[:, :3] + ws.origins), ws.time, asleep)
@@ -121,7 +121,7 @@ class Watch:
             self.cut, self.crushed = max(self.cut, int(ws.counts[CUTS])), max(self.crushed, ws.contact.crushed)
             return known
 
-        monkeypatch.setattr(Substeps, "run", checked)
+        monkeypatch.setattr(SubstepRunner, "run", checked)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from supple.model.energy_balance import add_works
 from supple.model.state import State
 from supple.solvers.xpbd.assessment.surfaces import Overlap
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping, cycle_lengths
-from supple.solvers.xpbd.frame.substep import Substeps
+from supple.solvers.xpbd.frame.substep import SubstepRunner
 from supple.solvers.xpbd.integration import to_world
 from supple.solvers.xpbd.memory import XPBDMemory
 from supple.solvers.xpbd.sleep import SleepMemory
@@ -73,7 +73,7 @@ def advance(
     damping, lengths = damping_in(ws, h), cycles(substeps)
     if damping is not None:
         damping.begin_step(memory.viscous, state.velocities)
-    frame = Substeps(ws, state.time, dt, substeps, damping)
+    frame = SubstepRunner(ws, state.time, dt, substeps, damping)
     for k in ws.pace.tasks(0 if sleep.asleep.all() else substeps, ws.most_threads):
         begun = state.time + k * h
         if damping is not None and k in lengths:

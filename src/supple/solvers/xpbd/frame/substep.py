@@ -22,7 +22,7 @@ from supple.solvers.xpbd.stages import MOST_RIGID_SWEEPS, MOST_SWEEPS
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
 
-class Substeps:
+class SubstepRunner:
     """The substeps of a frame.
 
     Parameters
