@@ -14,7 +14,7 @@ endif
 # Bytecode is compiled now, also that of src, so that no later start has to (it is 1.3 s of one, and 0.4 s for src).
 install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
 
-.PHONY: demo test test-all coverage fuzz soak bench blender lint format docs kernels dist lock clean
+.PHONY: demo test test-all coverage fuzz soak bench peers blender lint format docs kernels dist lock clean
 .DELETE_ON_ERROR:
 
 # Both demos compile for half a minute, once: first, on all cores. They run at the same time, and the first says at the end
@@ -48,6 +48,9 @@ fuzz: .venv/.dev
 # A hundred thousand steps of small scenes with every solver.
 soak: .venv/.dev
 	SUPPLE_SOAK_STEPS=$(STEPS) $(BIN)/python -m pytest -n 2 tests/soak
+
+# The environments of other programs, for `bench` and for `python -m benchmarks.published_against`.
+peers: .venv-peers/.made .venv-superdex/.made
 
 bench: .venv/.dev .venv-peers/.made
 	$(BIN)/python -m benchmarks
@@ -92,6 +95,8 @@ lock: .venv/.dev
 	  --extra video -c requirements/dev.lock pyproject.toml -o requirements/base.lock
 	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
 	  requirements/peers.in -o requirements/peers.lock
+	$(BIN)/python -m uv pip compile -q --universal -p 3.12 --generate-hashes --no-emit-index-url --no-header \
+	  requirements/superdex.in -o requirements/superdex.lock
 
 .venv/.made:
 	$(PYTHON) -c "import sys; sys.version_info >= (3, 11) or sys.exit('Supple needs Python 3.11 or newer; set PYTHON=python3.x')"
@@ -116,5 +121,11 @@ lock: .venv/.dev
 	  || $(PEERS_BIN)/python -m pip install -q -r requirements/peers.lock
 	$(BIN)/python -c "open('.venv-peers/.made', 'w')"
 
+# SuperDex needs Python 3.12 or newer, which uv finds or fetches.
+.venv-superdex/.made: .venv/.base requirements/superdex.lock
+	$(BIN)/python -m uv venv -q --clear --python 3.12 .venv-superdex
+	$(BIN)/python -m uv pip install -q --python $(subst peers,superdex,$(PEERS_BIN))/python -r requirements/superdex.lock
+	$(BIN)/python -c "open('.venv-superdex/.made', 'w')"
+
 clean:
-	rm -rf .venv .venv-peers out build dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers .venv-superdex out build dist .pytest_cache .ruff_cache .hypothesis

@@ -11,6 +11,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 _SCRIPTS = "Scripts" if os.name == "nt" else "bin"
 PEERS_PYTHON = ROOT / ".venv-peers" / _SCRIPTS / "python"
+# SuperDex needs Python 3.12 or newer.
+SUPERDEX_PYTHON = ROOT / ".venv-superdex" / _SCRIPTS / "python"
 
 
 def alternate(programs: dict[str, Callable[[], dict]], rounds: int) -> dict[str, dict]:

@@ -31,6 +31,7 @@ from supple.simulate import first_frame
 
 PAGE = DOCS / "validation" / "published.md"
 FIGURES = DOCS / "figures" / "published"
+PEERS = FIGURES / "peers"
 PICTURES = DOCS / "images" / "published"
 COLUMNS = {
     "case": "",
@@ -43,7 +44,7 @@ COLUMNS = {
     "elements": "",
     "seconds": "",
 }
-BEGIN, END = "<!-- cases -->\n", "<!-- end of cases -->"
+CASES_MARK, OTHERS_MARK = "cases", "other programs"
 
 
 def number(value: Any) -> str:
@@ -104,22 +105,57 @@ def measured_names() -> list[str]:
 
 
 def with_cases(page: str) -> str:
-    """The text of the page, with table and descriptions of all measured cases between the two marks."""
+    """The text of the page, with table and descriptions of all measured cases, and with what other programs give."""
     figures = {name: json.loads((FIGURES / f"{name}.json").read_text(encoding="utf-8")) for name in measured_names()}
-    lines = [f"| {' | '.join(COLUMNS)} |", "|" + "---|" * len(COLUMNS)]
-    for name, of_case in figures.items():
-        for row in of_case["rows"]:
-            texts = [
-                text if isinstance(text, str) else f"{text:{form}}"
-                for text, form in zip(row, COLUMNS.values(), strict=True)
-            ]
-            lines.append(f"| [{texts[0]}](#{name}) | {' | '.join(texts[1:])} |")
+    lines = table_lines(
+        [[f"[{row[0]}](#{name})", *row[1:]] for name, of_case in figures.items() for row in of_case["rows"]], COLUMNS
+    )
     for name, module in modules().items():
         if name in figures:
             lines += ["", *described(name, module, figures[name])]
-    pattern = f"{re.escape(BEGIN)}.*?{re.escape(END)}"
-    changed, count = re.subn(pattern, lambda _: BEGIN + "\n" + "\n".join(lines) + f"\n\n{END}", page, flags=re.S)
-    assert count == 1, f"the page needs the marks {BEGIN.strip()} and {END}"
+    return between_marks(between_marks(page, CASES_MARK, lines), OTHERS_MARK, others())
+
+
+def others() -> list[str]:
+    """The lines of the tables of other programs: what they give, and with which settings."""
+    programs = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(PEERS.glob("*.json"))]
+    programs.sort(key=lambda one: not one["program"].startswith("Supple"))
+    columns: dict[str, str] = programs[0]["columns"]
+    rows = []
+    settings: list[list[Any]] = []
+    for case in dict.fromkeys(case for one in programs for case in one["rows"]):
+        of_case = [row for one in programs for row in one["rows"].get(case, [])]
+        # Quantity by quantity, and what cannot run at the end.
+        order = [*dict.fromkeys(row[1] for row in of_case if row[1]), ""]
+        rows += [[f"[{row[0]}](#{case})", *row[1:-1]] for key in order for row in of_case if row[1] == key]
+        settings += [[row[0], row[3], row[-1]] for row in of_case if row[1] == order[0]]
+    return [
+        *table_lines(rows, dict(list(columns.items())[:-1])),
+        "",
+        *table_lines(settings, {"case": "", "program": "", "settings": ""}),
+        "",
+        *(f"{one['program']}: {measured_on(one)[:1].lower()}{measured_on(one)[1:]}  " for one in programs),
+    ]
+
+
+def table_lines(rows: list[list[Any]], columns: dict[str, str]) -> list[str]:
+    """Rows as Markdown; numbers in the form of their columns, and nothing for None."""
+    lines = [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
+    for row in rows:
+        texts = [
+            "" if cell is None else cell if isinstance(cell, str) else f"{cell:{form}}"
+            for cell, form in zip(row, columns.values(), strict=True)
+        ]
+        lines.append(f"| {' | '.join(texts)} |")
+    return lines
+
+
+def between_marks(page: str, mark: str, lines: list[str]) -> str:
+    """The text of the page with these lines between the two marks of this name."""
+    begin, end = f"<!-- {mark} -->\n", f"<!-- end of {mark} -->"
+    pattern = f"{re.escape(begin)}.*?{re.escape(end)}"
+    changed, count = re.subn(pattern, lambda _: begin + "\n" + "\n".join(lines) + f"\n\n{end}", page, flags=re.S)
+    assert count == 1, f"the page needs the marks {begin.strip()} and {end}"
     return changed
 
 

@@ -12,7 +12,8 @@ import supple as sp
 RADIUS, MU, SPEED, G = 0.05, 0.3, 1.0, 9.81
 
 
-def solve(setting):
+def frames_of(setting, solver):
+    """The frames of .13 s of the ball in Supple; setting : step [s], and edges as a share of the radius."""
     dt, edge = setting
     surface = sp.shapes.sphere_surface(RADIUS, edge * RADIUS)
     J = 0.4 * RADIUS**2
@@ -23,10 +24,14 @@ def solve(setting):
     low = float(ball.place(ball.points)[:, 1].min())
     plane = sp.HalfSpace(name="plane", point=(0, low - 1e-4, 0), normal=(0, 1, 0), friction=MU)
     scene = sp.Scene([ball], obstacles=[plane], gravity=(0, -G, 0))
+    return list(sp.simulate(scene, solver, dt, round(0.13 / dt)))
+
+
+def solve(setting):
     values: dict[str, Any] = {}
     frame: Any = None
     for name, solver in SOLVERS.items():
-        frames = list(sp.simulate(scene, solver, dt, round(0.13 / dt)))
+        frames = frames_of(setting, solver)
         values[f"speed, {name}"] = np.mean([f.poses["ball"].velocity[0] for f in frames[-len(frames) // 6 :]]) / SPEED
         frame = frames[-1]
     return Solution(values, frame)
