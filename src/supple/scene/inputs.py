@@ -127,6 +127,11 @@ class ForceInput(Input):
         return self.ramp.last if time > self.ramp.begin else self.ramp.first
 
 
+def is_steady(value: object) -> bool:
+    """Whether a force, or another value over time, has one value within a frame."""
+    return isinstance(value, ForceInput) or not callable(value)
+
+
 def inputs_among(functions: Iterable[object]) -> dict[str, Input]:
     """The inputs among motions and forces, by name.
 

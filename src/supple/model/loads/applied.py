@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import ActiveTets
 from supple.scene.body import PlacedBody
+from supple.scene.inputs import is_steady
 from supple.scene.loads.body_force import BodyForce
 
 
@@ -45,10 +46,12 @@ class AppliedLoad(ABC):
     Attributes
     ----------
     is_internal : whether its forces act between vertices of one body, so that they change no momentum
+    is_steady : whether its forces stay the same within a frame, wherever the vertices are
     work : the name under which its work is counted, see `Report.work`
     """
 
     is_internal: ClassVar[bool] = False
+    is_steady: bool = False
     work: str
 
     @abstractmethod
@@ -71,6 +74,7 @@ class DeadLoad(AppliedLoad):
     vertices: NDArray[np.int32]
     per_vertex: Callable[[float], NDArray[np.float64]]
     work: str
+    is_steady: bool = False
 
     @classmethod
     def shared(
@@ -79,9 +83,10 @@ class DeadLoad(AppliedLoad):
         weights: NDArray[np.float64],
         vector: Callable[[float], NDArray[np.float64]],
         work: str,
+        is_steady: bool = False,
     ) -> DeadLoad:
         """One vector times the weight of each vertex; `vector` : time -> (3,)."""
-        return cls(vertices, lambda time: weights[:, None] * vector(time), work)
+        return cls(vertices, lambda time: weights[:, None] * vector(time), work, is_steady)
 
     def renumbered(self, new: NDArray[np.int32]) -> DeadLoad:
         return replace(self, vertices=new[self.vertices])
@@ -102,6 +107,10 @@ class MassLoad(AppliedLoad):
     masses: NDArray[np.float64]
 
     work = "body_forces"
+
+    @property
+    def is_steady(self) -> bool:
+        return is_steady(self.load.force)
 
     def renumbered(self, new: NDArray[np.int32]) -> MassLoad:
         return replace(self, vertices=new[self.vertices])

@@ -17,6 +17,7 @@ from supple.model.loads.pressure import FollowerPressure, area_vectors, wind_dra
 from supple.model.loads.springs import PointSpring
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force
+from supple.scene.inputs import is_steady
 from supple.scene.loads.body_force import BodyForce
 from supple.scene.loads.growth import Growth
 from supple.scene.loads.load import Load
@@ -51,7 +52,7 @@ def _(load: Traction, setting: Setting) -> list[AppliedLoad]:
     vertices, weights = _vertices_of(body, setting.begins[load.body], touched)
     on_points = shares[touched]
     own = on_points if weights is None else weights.T @ on_points
-    return [DeadLoad.shared(vertices, own, script_of(load, "traction"), "tractions")]
+    return [DeadLoad.shared(vertices, own, script_of(load, "traction"), "tractions", is_steady(load.traction))]
 
 
 @applied.register
@@ -95,13 +96,13 @@ def applied_force(force: Force, body: PlacedBody, begin: int, rows: NDArray[np.i
     if force.is_total:
         shares = np.full(count, 1.0 / count)
         own = shares if weights is None else weights.T @ shares
-        return DeadLoad.shared(vertices, own, force.total, "forces")
+        return DeadLoad.shared(vertices, own, force.total, "forces", is_steady(force.force))
 
     def forces(time: float) -> NDArray[np.float64]:
         given = force.per_vertex(time, count)
         return given if weights is None else weights.T @ given
 
-    return DeadLoad(vertices, forces, "forces")
+    return DeadLoad(vertices, forces, "forces", is_steady(force.force))
 
 
 def _vertices_of(

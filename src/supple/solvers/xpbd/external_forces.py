@@ -10,6 +10,7 @@ from supple.model.loads.growth import GrownTets
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.assessment.acting import Acting
 from supple.solvers.xpbd.moment import Substep
 
 
@@ -19,41 +20,58 @@ class ExternalForces:
     Attributes
     ----------
     push, pull : whether any change a prediction, and whether any act after constraints
-    acting : the forces of the present substep: the name of their work, their vertices, and (k, 3) [N]
+    acting : the forces of the present substep
     """
 
     def __init__(self, system: System) -> None:
         loads = system.loads
-        self._springs = [load for load in loads if isinstance(load, PointSpring)]
-        self._drags = [load for load in loads if isinstance(load, DragLoad)]
-        self._pushes = [load for load in loads if not isinstance(load, (PointSpring, GrownTets, DragLoad))]
-        self._need_places = not all(isinstance(load, DeadLoad) for load in self._pushes)
-        self._targets = system.soft_targets
-        self.push, self.pull = bool(self._pushes or self._drags), bool(self._springs or self._targets)
-        self.acting: list[tuple[str, NDArray[np.integer] | slice, NDArray[np.float64]]] = []
+        pushes = [load for load in loads if not isinstance(load, (PointSpring, GrownTets, DragLoad))]
+        drags = [load for load in loads if isinstance(load, DragLoad)]
+        springs = [load for load in loads if isinstance(load, PointSpring)]
+        applied = [(load.work, load.acts_on()) for load in (*pushes, *drags)]
+        pulling = [("soft_targets", target.vertices) for target in system.soft_targets]
+        pulling += [(spring.work, spring.vertices) for spring in springs]
+        self.acting = Acting(*zip(*applied, *pulling, strict=True)) if applied or pulling else Acting([], [])
+        parts = iter(self.acting.parts)
+        self._pushes, self._drags, self._targets, self._springs = (
+            [(each, *next(parts)) for each in some] for some in (pushes, drags, system.soft_targets, springs)
+        )
+        self._internal = np.array([load.is_internal for load in pushes], dtype=np.bool_)
+        self._need_places = not all(load.is_steady or isinstance(load, DeadLoad) for load in pushes)
+        self.push, self.pull = bool(applied), bool(springs or system.soft_targets)
+        self._total = np.zeros((len(system.masses), 3))
+
+    def begin_frame(self, at: Substep) -> None:
+        """Begin a frame, of which this is the first substep."""
+        self.acting.works[:], self.acting.forces[:] = 0.0, 0.0
+        self._find(at.points[:, :3], at.time, True)
 
     def add_forces(self, at: Substep) -> None:
         """Add the loads to a prediction: v += h w f, x += h^2 w f.
 
         Internal ones change positions alone: like constraints, they change velocities where momenta are restored.
         """
-        self.acting = []
-        x = at.world() if self._need_places else at.points[:, :3]
-        for load in self._pushes:
-            forces = np.zeros_like(at.velocities)
-            load.add_forces(x, at.time, forces)
-            self.acting.append((load.work, slice(None), forces))
-        for load, (_, _, forces) in zip(self._pushes, self.acting, strict=True):
-            _push(at.points, np.zeros_like(forces) if load.is_internal else at.velocities, forces, at.h)
-        for load in self._drags:
-            self._drag(load, at)
+        self._find(at.world() if self._need_places else at.points[:, :3], at.time, False)
+        acting = self.acting
+        _push(at.points, at.velocities, acting.rows, acting.start, acting.forces, self._internal, at.h)
+        for drag in self._drags:
+            self._drag(*drag, at)
 
-    def _drag(self, load: DragLoad, at: Substep) -> None:
+    def _find(self, x: NDArray[np.float64], time: float, steady: bool) -> None:
+        """Set the forces of the loads that are steady, or those of the others."""
+        for load, rows, part in self._pushes:
+            if load.is_steady == steady:
+                self._total[rows] = 0.0
+                load.add_forces(x, time, self._total)
+                part[:] = self._total[rows]
+
+    def _drag(self, load: DragLoad, rows: NDArray[np.int64], part: NDArray[np.float64], at: Substep) -> None:
         """The forces c (w - v') with the velocity v' after them: v' = (v + h c w / m) / (1 + h c / m)."""
-        c = load.coefficients(at.begun + at.origins, at.velocities, at.time)[:, None]
-        forces = c * (load.value(at.time) - at.velocities) / (1.0 + at.h * c * at.points[:, 3:])
-        self.acting.append((load.work, slice(None), forces))
-        _push(at.points, at.velocities, forces, at.h)
+        v = at.velocities
+        c, w = load.coefficients(at.begun + at.origins, v, at.time)[rows, None], at.points[rows, 3:]
+        part[:] = c * (load.value(at.time) - v[rows]) / (1.0 + at.h * c * w)
+        v[rows] += at.h * w * part
+        at.points[rows, :3] += at.h**2 * w * part
 
     def pull_springs(self, at: Substep) -> None:
         """Project the springs between points: C = l - l0 with compliance 1 / k, one after the other.
@@ -61,8 +79,8 @@ class ExternalForces:
         Dlam = -C / (sum w c^2 + 1 / (k h^2)), with the coefficients c of the vertices. The direction is that of the
         beginning of the substep, see `ActuatorProjection`.
         """
-        for spring in self._springs:
-            rows, c = spring.vertices, spring.coefficients
+        for spring, rows, part in self._springs:
+            part[:], c = 0.0, spring.coefficients
             r = c @ at.world(rows) + spring.offset
             length = float(np.sqrt(r @ r))
             begun = c @ (at.begun[rows] + at.origins[rows]) + spring.offset
@@ -72,11 +90,10 @@ class ExternalForces:
             if length > 0.0:
                 stretch = length - spring.rest_length(at.time)
                 pull = -stretch / (at.h**2 * float(w @ (c * c)) + 1.0 / spring.stiffness) / length * r
-                forces = c[:, None] * pull
-                moved = at.h**2 * w[:, None] * forces
+                part[:] = c[:, None] * pull
+                moved = at.h**2 * w[:, None] * part
                 at.points[rows, :3] += moved
                 at.velocities[rows] += moved / at.h
-                self.acting.append((spring.work, rows, forces))
 
     def pull_to_targets(self, at: Substep) -> None:
         """Project the springs to soft targets: C = x - target with compliance 1 / k, all three components at once.
@@ -84,21 +101,22 @@ class ExternalForces:
         Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. These forces are external, so they act after the
         momentum restore.
         """
-        for target in self._targets:
+        for target, rows, part in self._targets:
             places = np.ascontiguousarray(target.targets(at.time))
-            forces = np.zeros_like(places)
             stiffness = np.broadcast_to(target.target.stiffness, 3).copy()
-            _pull(at.points, at.velocities, at.origins, target.vertices, places, stiffness, at.h, forces)
-            self.acting.append(("soft_targets", target.vertices, forces))
+            _pull(at.points, at.velocities, at.origins, rows, places, stiffness, at.h, part)
 
 
 @njit(cache=True)
-def _push(points, velocities, forces, h):
-    for i in range(len(points)):
-        for j in range(3):
-            change = h * points[i, 3] * forces[i, j]
-            velocities[i, j] += change
-            points[i, j] += h * change
+def _push(points, velocities, rows, start, forces, internal, h):
+    for f in range(len(internal)):
+        for k in range(start[f], start[f + 1]):
+            i = rows[k]
+            for j in range(3):
+                change = h * points[i, 3] * forces[k, j]
+                points[i, j] += h * change
+                if not internal[f]:
+                    velocities[i, j] += change
 
 
 @njit(cache=True)

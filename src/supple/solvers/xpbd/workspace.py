@@ -166,6 +166,7 @@ class XPBDWorkspace:
     def begin_frame(self, time: float, h: float) -> None:
         """Begin a frame at `time` [s], in substeps of h [s]."""
         self.actuators.begin_frame(self.substep(time, h))
+        self.loads.begin_frame(self.substep(time + h, h))
         self.works.begin_frame(self.velocities)
         self.stitch_forces.begin_frame()
         self.rigid.begin_frame(self.velocities)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from supple.model.energy_balance import add_works, no_works
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
+from supple.solvers.xpbd.assessment.acting import Acting
 from supple.solvers.xpbd.assessment.held_forces import HeldForces
 from supple.solvers.xpbd.contact.contact import Contact
 from supple.solvers.xpbd.moment import Substep
 from supple.solvers.xpbd.record import CONTACT_WORK, FRICTION_WORK, UNNAMED_WORK
 
 Floats = NDArray[np.float64]
-Forces = tuple[str, NDArray[np.integer] | slice, Floats]
 
 
 class Works:
@@ -32,7 +32,7 @@ class Works:
         self.system = system
         self.by_name, self.residual = no_works(system), 0.0
         self.held = HeldForces(system)
-        self._all, self._nothing = np.arange(len(system.masses)), np.zeros((len(system.masses), 3))
+        self._of_contact = np.zeros((len(system.masses), 3))
 
     def begin_frame(self, velocities: Floats) -> None:
         """Begin a frame with velocities (n, 3) [m/s]."""
@@ -42,8 +42,9 @@ class Works:
     def end_substep(
         self,
         at: Substep,
-        forces: Iterable[Forces],
+        acting: Sequence[tuple[Acting, bool]],
         contact: Contact,
+        logged: tuple[int, int],
         extended: Floats,
         more: Iterable[Callable[[Substep, Floats], None]],
     ) -> None:
@@ -51,23 +52,22 @@ class Works:
 
         Parameters
         ----------
-        forces : of loads and damping: the name of their work, their rows of `extended`, and (k, 3) [N]
-        contact : of the substep; extended : (n + a, 4) with the anchors
+        acting : of loads and damping, and whether they are what elements exert on each other
+        contact : with a log of rows, of which those from `logged[0]` to `logged[1]` are of the substep
+        extended : (n + a, 4) with the anchors
         more : add the forces (n + a, 3) of actuators and joints, whose works are known [N]
         """
-        held, n, nodes = self.held, len(at.points), contact.nodes
+        held, nodes = self.held, contact.nodes
         begun = nodes.begin[: len(extended)]
+        held.outside[:], held.inside[:] = 0.0, 0.0
+        for forces, are_inside in acting:
+            forces.end_substep(extended, begun, held.inside if are_inside else held.outside)
         if held.is_needed:
-            held.outside[:], held.inside[:] = 0.0, 0.0
-        for name, rows, acting in forces:
-            numbers = self._all if isinstance(rows, slice) else rows.astype(np.int64, copy=False)
-            add_works(self.by_name, {name: _work(acting, numbers, extended, begun)})
-            if held.is_needed:
-                (held.inside if name == "damping" else held.outside)[numbers] += acting
-        if held.is_needed:
-            of_contact = contact.forces.on_vertices(self.system.points, n)
+            self._of_contact[:] = 0.0
+            if logged[1] > logged[0]:
+                contact.forces.add_to(self._of_contact, self.system.points, *logged)
             arrays = nodes.impulses, at.points, at.begun, self.system.masses, at.h
-            self.residual += _add_contact(of_contact, *arrays, held.outside)
+            self.residual += _add_contact(self._of_contact, *arrays, held.outside)
             for add_forces in more:
                 add_forces(at, held.outside)
             add_works(self.by_name, held.end_substep(extended, begun, at.velocities, at.h))
@@ -100,14 +100,3 @@ def _add_contact(of_contact, impulses, points, begun, masses, h, out):
             if held:
                 work += force * (points[i, j] - begun[i, j])
     return work
-
-
-@njit(cache=True)
-def _work(forces, rows, points, begun):
-    """Of forces (k, 3) on the vertices `rows` (k,), over their displacements since `begun` (n, 3)."""
-    total = 0.0
-    for k in range(len(rows)):
-        i = rows[k]
-        for j in range(3):
-            total += forces[k, j] * (points[i, j] - begun[i, j])
-    return total

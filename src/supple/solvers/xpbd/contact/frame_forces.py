@@ -124,12 +124,14 @@ class FrameForces:
         """Keep the rows, as the log is filled again in the next frame."""
         self.rows = LoadedRows._make(values.copy() for values in self.rows)
 
-    def on_vertices(self, points: EmbeddedPoints, count: int) -> NDArray[np.float64]:
-        """The forces of the latest substep on the vertices, (count, 3) [N]; `points` are those of the system."""
-        at_points, out = np.zeros((len(points), 3)), np.zeros((count, 3))
-        add_rows(self.points, self.latest.nodes, self.latest.weights, self.latest.forces, at_points)
+    def add_to(self, out: NDArray[np.float64], points: EmbeddedPoints, latest: int, logged: int) -> None:
+        """Add the forces of the rows latest to logged of the log to those on the vertices (n, 3) [N].
+
+        points : of the system
+        """
+        at_points, rows = np.zeros((len(points), 3)), self.log.chosen(slice(latest, logged))
+        add_rows(self.points, rows.nodes, rows.weights, rows.forces, at_points)
         points.add_forces(at_points, out)
-        return out
 
     def pairs(self) -> NDArray[np.int64]:
         """(k, 2) the pairs of bodies and obstacles (counted after the bodies) that push each other."""

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.model.system import System, initial_state
+from supple.solvers.xpbd.assessment.acting import Acting
 from supple.solvers.xpbd.damping import cycle
 from supple.solvers.xpbd.damping.coarse_space import CoarseMatrix, frames_of_groups, vertex_groups
 from supple.solvers.xpbd.damping.elements import matrices_of_springs, matrices_of_tets, viscous_springs, viscous_tets
@@ -86,7 +87,11 @@ class Damping:
     Attributes
     ----------
     tau : the largest Kelvin-Voigt time [s]
+    acting : the viscous forces of the present cycle. Vertices and anchors that are held come last; the forces on them
+        are those of the velocities that the cycle began with.
     """
+
+    acting: Acting
 
     def __init__(self, system: System, layout: Layout, inverse_masses: NDArray[np.float64]) -> None:
         tets, springs = viscous_tets(system, inverse_masses), viscous_springs(system, inverse_masses)
@@ -125,7 +130,9 @@ class Damping:
         self._motion = np.zeros((len(inverse_masses), 6))
         self._viscous = np.zeros((len(inverse_masses), 4))
         r, g = len(rows), len(self._groups.start) - 1
-        self._forces, self._local_forces, self._local_velocities = (np.zeros((r, 3)) for _ in range(3))
+        self.acting = Acting(["damping"], [self._rows])
+        self._forces, self._forces_on_held = self.acting.forces[:r], self.acting.forces[r:]
+        self._local_forces, self._local_velocities = np.zeros((2, r, 3))
         self._frames, self._products = np.zeros((g, 3, 3)), np.zeros((g, 2))
         self._coarse = np.zeros(12 * g)
         body_of_group = np.repeat(np.arange(len(self._groups.blocks) - 1), np.diff(self._groups.blocks))
@@ -150,7 +157,7 @@ class Damping:
         else:
             self._local_forces[:] = 0.0
             self._interval = 0.0
-        self._forces[:] = 0.0
+        self._forces[:], self.acting.works[:] = 0.0, 0.0
         self._cycle = 0
 
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:
@@ -195,6 +202,7 @@ class Damping:
             groups.start, groups.rows, groups.blocks, H, LONGEST_STEP, self._masses, motion, *found, self._forces
         )
         cycle.keep(*shape, velocities, self._forces, self._local_forces, self._local_velocities)
+        np.negative(self._viscous[self._held, :3], out=self._forces_on_held)
         self._interval = 0.0
         self._cycle += 1
 
@@ -202,14 +210,6 @@ class Damping:
         """Move points (n, 4) by the viscous forces, in a substep of h [s]: x += h^2 w f."""
         cycle.push(self._groups.rows, points, self._forces, h)
         self._interval += h
-
-    @property
-    def acting(self) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
-        """The damped vertices and anchors (k,), and the viscous forces on them (k, 3) [N].
-
-        Those that are held come last; their forces are those of the velocities that the cycle began with.
-        """
-        return self._rows, np.concatenate([self._forces, -self._viscous[self._held, :3]])
 
     def memory(self, state_velocities: NDArray[np.float64]) -> ViscousMemory:
         """Of a state with these velocities (n, 3), in the scene's numbering."""

@@ -83,8 +83,7 @@ def advance(
             grow(ws, begun + h)
         if not frame.run(k):
             break
-    frame.note_forces(substeps)
-    ws.works.add_contact(ws.values)
+    frame.end()
 
 
 def damping_in(ws: XPBDWorkspace, h: float) -> Damping | None:

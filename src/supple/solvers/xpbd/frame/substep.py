@@ -38,6 +38,8 @@ class SubstepRunner:
         self._is_welded = len(ws.rigid.welding) > 0
         self._has_forces = damping is not None or ws.loads.push or self._is_welded
         self._has_pulls = ws.loads.pull or ws.actuators.between or self._is_welded
+        self._acting = [(ws.loads.acting, False)] if ws.loads.push or ws.loads.pull else []
+        self._acting += [] if damping is None else [(damping.acting, True)]
         others = ws.loads.pull, len(ws.joints) > 0, ws.actuators.within, ws.actuators.between, ws.works.held.is_needed
         self._has_works = self._has_forces or any(others)
         self.record = ws.record(self._targets, self._recovered, self.h)
@@ -73,10 +75,13 @@ class SubstepRunner:
             self._end(now)
         return True
 
-    def note_forces(self, substeps: int) -> None:
-        """Note the contact forces after a number of substeps of the frame."""
-        counts = self.record.counts
-        self.ws.contact.forces.end_substeps(counts[LATEST], counts[LOGGED], substeps)
+    def end(self) -> None:
+        """Note the contact forces of the frame, and the works of loads, damping and contact."""
+        ws, counts = self.ws, self.record.counts
+        ws.contact.forces.end_substeps(counts[LATEST], counts[LOGGED], self.count)
+        for forces, _ in self._acting:
+            forces.add_works(ws.works.by_name)
+        ws.works.add_contact(ws.values)
 
     def _predict(self, now: Substep, k: int) -> None:
         """1: lists and kept impulses; 2: prediction."""
@@ -111,8 +116,6 @@ class SubstepRunner:
         else:
             update_velocities(nodes.x, nodes.begin, nodes.v, h, len(ws.points))
         if self._has_pulls:
-            if not self._has_forces:
-                ws.loads.acting = []
             ws.loads.pull_to_targets(now)
             ws.loads.pull_springs(now)
             ws.actuators.project_between(now)
@@ -175,13 +178,12 @@ class SubstepRunner:
     def _end(self, now: Substep) -> None:
         """Add up what forces did in a substep."""
         ws = self.ws
-        self.note_forces(0)
         if len(ws.joints):
             add_works(ws.works.by_name, {"joints": ws.joints.end_substep(ws.points, ws.previous, self.h)})
         ws.actuators.end_substep(now)
-        forces = [*ws.loads.acting] if self.damping is None else [*ws.loads.acting, ("damping", *self.damping.acting)]
-        more = ws.actuators.add_forces, ws.joints.add_forces
-        ws.works.end_substep(now, forces, ws.contact, ws.extended, more)
+        more, counts = (ws.actuators.add_forces, ws.joints.add_forces), self.record.counts
+        logged = int(counts[LATEST]), int(counts[LOGGED])
+        ws.works.end_substep(now, self._acting, ws.contact, logged, ws.extended, more)
 
 
 def pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:
