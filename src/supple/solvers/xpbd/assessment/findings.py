@@ -13,6 +13,8 @@ from supple.solvers.xpbd.assessment.surfaces import Overlap
 
 # The share of the scene's energy that may lack a source, and that of the substeps in which motion may be shortened.
 ENERGY_TOLERANCE, HELD_TOLERANCE = 0.02, 0.1
+# Of things with the same problem in one message.
+MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -55,12 +57,9 @@ class Findings:
         return f"{', '.join(texts)} at t = {time:.4g} s; {remedy}" if texts else ""
 
     def _problems(self) -> list[tuple[Status, str]]:
-        found = []
-        for name, count in self.inverted.items():
-            found.append((Status.INVERTED, f"{count} {'tet' if count == 1 else 'tets'} of body {name!r} inverted"))
-        found += [(Status.INTERSECTING, str(overlap)) for overlap in self.overlaps[:3]]
-        if len(self.overlaps) > 3:
-            found.append((Status.INTERSECTING, f"{len(self.overlaps) - 3} more such pairs"))
+        tets = [f"{n} {'tet' if n == 1 else 'tets'} of body {name!r} inverted" for name, n in self.inverted.items()]
+        found = _first(Status.INVERTED, tets, "bodies")
+        found += _first(Status.INTERSECTING, [str(overlap) for overlap in self.overlaps], "pairs")
         if self.gained > ENERGY_TOLERANCE:
             text = f"{_percent(self.gained)} of the energy has no source, most of it in body {self.gainer!r}"
             found.append((Status.ENERGY_GAINED, text))
@@ -69,11 +68,18 @@ class Findings:
         if self.open > ENERGY_TOLERANCE:
             text = f"works leave {_percent(self.open)} of the energy open, as motion was shortened"
             found.append((Status.TRUNCATED, text))
-        for share, name in self.softened:
-            found.append((Status.SOFTENED, f"body {name!r} about {_percent(share)} too soft"))
+        soft = [f"body {name!r} about {_percent(share)} too soft" for share, name in sorted(self.softened, reverse=True)]
+        found += _first(Status.SOFTENED, soft, "bodies")
         for what, lacks in (("its size", self.apart), ("the way of its motor", self.stalled)):
-            found += [(Status.SOFTENED, f"{label} is off by {_percent(share)} of {what}") for share, label in lacks]
+            off = [f"{label} is off by {_percent(share)} of {what}" for share, label in lacks]
+            found += _first(Status.SOFTENED, off, "joints")
         return found
+
+
+def _first(status: Status, texts: list[str], things: str) -> list[tuple[Status, str]]:
+    """The first `MOST_NAMED` of what is wrong with `things`, and how many others there are."""
+    more = len(texts) - MOST_NAMED
+    return [(status, text) for text in [*texts[:MOST_NAMED], *([f"{more} more such {things}"] if more > 0 else [])]]
 
 
 def _percent(share: float) -> str:
