@@ -31,11 +31,13 @@ class ExternalForces:
         applied = [(load.work, load.acts_on()) for load in (*pushes, *drags)]
         pulling = [("soft_targets", target.vertices) for target in system.soft_targets]
         pulling += [(spring.work, spring.vertices) for spring in springs]
-        self.acting = Acting(*zip(*applied, *pulling, strict=True)) if applied or pulling else Acting([], [])
-        parts = iter(self.acting.parts)
-        self._pushes, self._drags, self._targets, self._springs = (
-            [(each, *next(parts)) for each in some] for some in (pushes, drags, system.soft_targets, springs)
-        )
+        acting = [*applied, *pulling]
+        self.acting = Acting([name for name, _ in acting], [vertices for _, vertices in acting])
+        parts = iter(self.acting.parts)  # in the order of the names
+        self._pushes = [(load, *next(parts)) for load in pushes]
+        self._drags = [(load, *next(parts)) for load in drags]
+        self._targets = [(target, *next(parts)) for target in system.soft_targets]
+        self._springs = [(spring, *next(parts)) for spring in springs]
         self._internal = np.array([load.is_internal for load in pushes], dtype=np.bool_)
         self._need_places = not all(load.is_steady or isinstance(load, DeadLoad) for load in pushes)
         self.push, self.pull = bool(applied), bool(springs or system.soft_targets)

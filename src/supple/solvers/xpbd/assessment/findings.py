@@ -68,7 +68,8 @@ class Findings:
         if self.open > ENERGY_TOLERANCE:
             text = f"works leave {_percent(self.open)} of the energy open, as motion was shortened"
             found.append((Status.TRUNCATED, text))
-        soft = [f"body {name!r} about {_percent(share)} too soft" for share, name in sorted(self.softened, reverse=True)]
+        softest = sorted(self.softened, reverse=True)
+        soft = [f"body {name!r} about {_percent(share)} too soft" for share, name in softest]
         found += _first(Status.SOFTENED, soft, "bodies")
         for what, lacks in (("its size", self.apart), ("the way of its motor", self.stalled)):
             off = [f"{label} is off by {_percent(share)} of {what}" for share, label in lacks]
