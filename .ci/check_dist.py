@@ -21,6 +21,7 @@ def check_contents(wheel: Path, sdist: Path) -> None:
         (metadata,) = (file.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
     sources = {str(p.relative_to(ROOT / "src").as_posix()) for p in (ROOT / "src" / "supple").rglob("*.py*")}
     sources = {name for name in sources if name.endswith((".py", ".pyi", ".typed"))}
+    sources.add("supple/results/page/page.html")
     assert sources <= names, f"the wheel lacks {sorted(sources - names)[:5]}"
     strange = {name.partition("/")[0] for name in names} - {"supple"}
     assert all(name.endswith(".dist-info") for name in strange), f"the wheel contains {strange}"
@@ -33,7 +34,8 @@ def check_contents(wheel: Path, sdist: Path) -> None:
     assert not relative, f"links that do not work on an index: {relative[:5]}"
     with tarfile.open(sdist) as file:
         packed = {name.partition("/")[2] for name in file.getnames()}
-    missing = {"pyproject.toml", "hatch_build.py", "README.md", "LICENSE", "CHANGELOG.md"} - packed
+    missing = {"pyproject.toml", "hatch_build.py", "README.md", "LICENSE", "CHANGELOG.md", "client/build.py"}
+    missing = (missing | {"src/supple/results/page/page.html"}) - packed
     assert not missing, f"the sdist lacks {missing}"
     print(f"{wheel.name}: {len(names)} files; {sdist.name}: {len(packed)} files")
 

@@ -4,7 +4,9 @@ import io
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +28,12 @@ _FLAGS = (
     "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader "
     "--disable-background-networking"
 )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Build the page of a checkout whose client has changed, once for all processes."""
+    if not hasattr(config, "workerinput"):
+        subprocess.run([sys.executable, Path(__file__).parents[1] / "client" / "build.py"], check=True)
 
 
 @pytest.fixture(scope="session", autouse=True)

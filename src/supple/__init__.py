@@ -17,7 +17,7 @@ supply(
     compilation="supple.results.progress:show_compilation",
     check="supple.results.check.checker:check_recording",
     export="supple.results.export.exporter:export",
-    player="supple.results.player:player_of",
+    player="supple.results.page.player:player_of",
     plot="supple.results.plots:plot",
     progress="supple.results.progress:ProgressBar",
 )

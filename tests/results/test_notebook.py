@@ -74,7 +74,7 @@ def test_players_are_complete_pages(shown, kind, tmp_path):
     assert tag == "iframe"
     assert attributes["srcdoc"] == player.page
     assert "height:300px" in attributes["style"]
-    assert "__VISER_EMBED_DATA__" in player.page
+    assert '<script id="data"' in player.page
     assert not re.search(r'(src|href)="https?:', player.page)
     assert len(repr(player)) < 200
     assert player.save(tmp_path / "page.html").read_text(encoding="utf-8") == player.page
@@ -160,4 +160,4 @@ def test_the_notebook_runs(tmp_path):
 def test_meshes_are_shown(mesh, tmp_path):
     player = mesh.show(height=200)
     assert type(mesh).__name__ in player.title
-    assert "__VISER_EMBED_DATA__" in player.page
+    assert '<script id="data"' in player.page

@@ -9,8 +9,6 @@ import supple as sp
 from supple.model.system import initial_state
 from supple.results.plots import plot_recording
 from supple.results.view.from_recording import model_of_recording, render_frame_of
-from supple.results.view.layers.connections import StitchView
-from supple.results.view.page import write_page
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 
 SOFT = sp.StableNeoHookean(youngs=1e4, poisson=0.3)
@@ -94,21 +92,6 @@ def test_broken_stitches_are_not_drawn(tmp_path):
     assert first.shape == end.shape == (8, 2, 3)
     assert (lengths[0] > 0.0).all()
     assert np.array_equal(lengths[1] == 0.0, broken)
-
-
-def test_the_page_draws_stitches_as_moving_segments(recorded, tmp_path, monkeypatch):
-    drawn, update = [], StitchView.update
-
-    def spy(view, render_frame):
-        update(view, render_frame)
-        drawn.extend(np.array(handle.points) for handle in view.nodes)
-
-    monkeypatch.setattr(StitchView, "update", spy)
-    page = write_page(recorded[0], tmp_path / "index.html")
-    assert page.stat().st_size > 100_000
-    assert len(drawn) >= 8
-    assert all(points.shape == (8, 2, 3) for points in drawn)
-    assert drawn[-1][0, 1, 1] > drawn[0][0, 1, 1] + 0.1
 
 
 def test_the_plot_has_energy_and_stretch_of_stitches(recorded, tmp_path, monkeypatch):

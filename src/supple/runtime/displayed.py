@@ -1,6 +1,6 @@
 """What is shown of an object: one line of text, a table in notebooks, and a picture that `show` draws.
 
-The lowest layer describes; `supple.results.player` draws, and `supple/__init__.py` names it here.
+The lowest layer describes; `supple.results.page.player` draws, and `supple/__init__.py` names it here.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Showable(Displayed):
     def show(self, *, height: int = 480) -> Any:
         """A player for notebooks: bodies and obstacles in 3D, which the mouse turns; a recording plays.
 
-        It needs no server and no widgets: the page, about 0.8 MB and the frames, is part of the notebook's output. In a
+        It needs no server and no widgets: the page, about 0.7 MB and the frames, is part of the notebook's output. In a
         script, `show().save("page.html")` writes the page.
 
         Parameters

@@ -232,8 +232,8 @@ def _warn_of_older_files(products: Products) -> None:
 
 
 def _write_products(recording: Path, products: Products) -> None:
+    from supple.results.page.page import write_page
     from supple.results.plots import plot_recording
-    from supple.results.view.page import write_page
 
     writers = {"page": write_page, "plot": plot_recording}
     for name, path in products.files().items():

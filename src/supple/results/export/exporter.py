@@ -50,7 +50,7 @@ FORMATS = {
     "mp4": Format("export.video:write_video", (".mp4",), {}),  # (extra: video)
     "png": Format("export.video:write_video", (".png",), {}),  # one instant (extra: video)
     "csv": Format("export.table:write_csv", (".csv",)),  # the reports of all frames
-    "html": Format("view.page:write_page", (".html", ".htm")),  # plays the recording in a browser
+    "html": Format("page.page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }
 
 

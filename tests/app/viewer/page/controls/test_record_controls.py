@@ -39,7 +39,7 @@ def test_recording_as_html_page(live, fake, guest, until):
     until(lambda: len(record._frames) >= 4)
     record._toggle(event)
     assert record.record.label == "Record a page"
-    assert b"__VISER_EMBED_DATA__" in guest.files["supple.html"]
+    assert b'<script id="data"' in guest.files["supple.html"]
 
 
 def test_a_missing_picture_is_reported(live, guest):

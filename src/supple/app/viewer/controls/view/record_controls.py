@@ -7,8 +7,8 @@ import threading
 import time
 from typing import Any
 
+from supple.results.page.page import page_of_frames
 from supple.results.view.model import RenderFrame
-from supple.results.view.page import page_of_frames
 from supple.results.view.stage import Stage
 
 _MOST_SECONDS = 120.0  # of a page
@@ -60,7 +60,7 @@ class RecordControls:
                 self._began, self._bytes, self._frames = time.monotonic(), 0, [(0.0, self._stage.frame)]
             self.record.label = "Stop, and receive the page" if frames is None else "Record a page"
         if frames is not None:
-            event.client.send_file_download("supple.html", page_of_frames(frames, self._stage.options).encode())
+            event.client.send_file_download("supple.html", page_of_frames(frames).encode())
 
 
 def png_of(client: Any) -> bytes:

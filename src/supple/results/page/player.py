@@ -17,10 +17,10 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.model.system import build_system, initial_state
 from supple.results.frame import Frame, start_frame
+from supple.results.page.page import write_page
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
 from supple.results.recording.recorder import Recorder
-from supple.results.view.page import write_page
 from supple.runtime.replacing import whole_file
 from supple.scene.body import Body
 from supple.scene.scene import Scene

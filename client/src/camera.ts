@@ -1,0 +1,75 @@
+// The camera: turned, moved and brought near with the mouse or fingers; at first it shows the whole scene.
+
+import { PerspectiveCamera, Vector3 } from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import type { Block } from "./decode.ts";
+
+const MARGIN = 1.06;
+const BAR = 70; // height of the bar below and its margins [pixels]
+
+export class View {
+  readonly camera = new PerspectiveCamera(35, 1, 0.01, 100);
+  private readonly controls: OrbitControls;
+  private readonly block: Block;
+  private fitted = true;
+  private free = 1; // share of the height that the bar leaves
+
+  constructor(block: Block, canvas: HTMLCanvasElement, moved: () => void) {
+    this.block = block;
+    const { up, center, radius } = block.description;
+    this.camera.up.set(...up);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.minDistance = 0.05 * radius;
+    this.controls.maxDistance = 30 * radius;
+    this.controls.target.set(...center);
+    this.controls.addEventListener("change", moved);
+    this.controls.addEventListener("start", () => (this.fitted = false));
+  }
+
+  /** The picture has another size; a camera that nobody has moved shows the whole scene again, above the bar. */
+  resize(width: number, height: number): void {
+    this.camera.aspect = width / height;
+    this.free = Math.max(1 - BAR / height, 0.5);
+    this.camera.setViewOffset(width, height, 0, 0.4 * BAR, width, height);
+    if (this.fitted) this.fit();
+    else this.camera.updateProjectionMatrix();
+  }
+
+  /** Shows the whole scene, as large as possible. */
+  fit(): void {
+    const { away, radius, outline } = this.block.description;
+    const points = this.block.array(outline);
+    const back = new Vector3(...away);
+    const right = new Vector3().crossVectors(this.camera.up, back).normalize();
+    const upward = new Vector3().crossVectors(back, right);
+    const slope = Math.tan((this.camera.fov * Math.PI) / 360);
+    const slopes = [slope * this.camera.aspect, slope * this.free];
+    const target = new Vector3(...this.block.description.center);
+    let distance = radius;
+    const p = new Vector3();
+    for (let turn = 0; turn < 6; turn++) {
+      // The distance from which all points are within the picture; then the middle between its extremes.
+      const ends = [[Infinity, -Infinity], [Infinity, -Infinity]];
+      let needed = 1e-6;
+      for (let i = 0; i < points.length; i += 3) {
+        p.set(points[i], points[i + 1], points[i + 2]).sub(target);
+        const along = p.dot(back), across = [p.dot(right), p.dot(upward)];
+        across.forEach((x, k) => (needed = Math.max(needed, Math.abs(x) / slopes[k] + along)));
+        const depth = Math.max(distance - along, 0.1 * distance);
+        across.forEach((x, k) => {
+          ends[k][0] = Math.min(ends[k][0], x / depth);
+          ends[k][1] = Math.max(ends[k][1], x / depth);
+        });
+      }
+      distance = MARGIN * needed;
+      [right, upward].forEach((axis, k) => target.addScaledVector(axis, 0.5 * distance * (ends[k][0] + ends[k][1])));
+    }
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(back, distance);
+    this.camera.near = 0.02 * radius;
+    this.camera.far = distance + 40 * radius;
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.fitted = true;
+  }
+}

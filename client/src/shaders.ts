@@ -1,0 +1,258 @@
+// How surfaces reflect light: a key light with shadows, an environment of sky, ground and soft boxes, and the light that
+// the height of all bodies lets through from the sky. One short program, which software can draw too.
+
+/** What all programs share: the environment, and how colors become those of a screen. */
+const LIGHT = /* glsl */ `
+uniform vec3 up, sun, back, skyColor, groundColor, sunColor;
+uniform float reach;
+
+// The light of all directions about a normal.
+vec3 around(vec3 n) { return mix(groundColor, skyColor, .5 + .5 * dot(n, up)); }
+
+// The light from one direction; rough from 0 to 1 blurs it.
+vec3 environment(vec3 d, float rough) {
+  float u = dot(d, up), w = .06 + .84 * rough, wide = .015 + .235 * rough, strong = 2.4 - 2.05 * rough;
+  vec3 c = mix(groundColor, skyColor * (.82 + .25 * max(u, 0.)), clamp(.5 + .5 * u / w, 0., 1.));
+  c += sunColor * (strong * clamp(.5 + .5 * (dot(d, sun) - .93) / wide, 0., 1.));
+  return c + skyColor * (.7 * strong * clamp(.5 + .5 * (dot(d, back) - .8) / wide, 0., 1.));
+}
+
+vec3 shown(vec3 c) {
+  c = c * (1. + c * .12) / (1. + c * .45);
+  return sqrt(clamp(c, 0., 1.));
+}
+`;
+
+/** The share of the key light at a point, and how much of a body it passes on its way there [m]. */
+const SHADOW = /* glsl */ `
+#ifdef SHADOWS
+uniform highp sampler2D shadowMap;
+uniform mat4 shadowMatrix;
+uniform float shadowDepth;
+const float shadowTexel = 1. / CELLS;
+vec2 shadow(vec3 p, float bias) {
+  vec4 s = shadowMatrix * vec4(p, 1.);
+  if (any(greaterThan(abs(s.xyz - .5), vec3(.499)))) return vec2(1., 0.);
+  vec2 cell = s.xy / shadowTexel - .5, f = fract(cell);
+  vec2 base = (floor(cell) + .5) * shadowTexel;
+  float lit = 0., sum = 0., thick = 0.;
+  for (int i = -TAPS; i <= TAPS + 1; i++)
+    for (int j = -TAPS; j <= TAPS + 1; j++) {
+      float wx = i == -TAPS ? 1. - f.x : i == TAPS + 1 ? f.x : 1.;
+      float wy = j == -TAPS ? 1. - f.y : j == TAPS + 1 ? f.y : 1.;
+      float through = s.z - texture(shadowMap, base + vec2(i, j) * shadowTexel).r;
+      lit += wx * wy * step(through, bias);
+      thick += wx * wy * max(through, 0.);
+      sum += wx * wy;
+    }
+  return vec2(lit, thick * shadowDepth) / sum;
+}
+#else
+vec2 shadow(vec3 p, float bias) { return vec2(1., .3 * reach); }
+#endif
+`;
+
+/** The share of the sky that bodies around a point leave free: the map has the greatest height at each place. */
+const SKY = /* glsl */ `
+#ifdef SHADOWS
+uniform sampler2D heightMap;
+uniform mat4 heightMatrix;
+uniform float heightDepth;
+const vec2 AROUND[8] = vec2[](vec2(.96, .3), vec2(.47, .88), vec2(-.3, .96), vec2(-.88, .47), vec2(-.96, -.3),
+  vec2(-.47, -.88), vec2(.3, -.96), vec2(.88, -.47));
+float openSky(vec3 p, float reach) {
+  vec4 s = heightMatrix * vec4(p, 1.);
+  float free = 0.;
+  for (int i = 0; i < 8; i++) {
+    float far = (i & 1) == 0 ? .03 : .09, d = far * 2. * reach;
+    float h = max(textureLod(heightMap, s.xy + far * AROUND[i], LOD + float(i & 1)).r - s.z, 0.) * heightDepth;
+    free += d * d / (h * h + d * d);
+  }
+  return free / 8.;
+}
+#else
+float openSky(vec3 p, float reach) { return .8; }
+#endif
+`;
+
+export const VERTEX = /* glsl */ `
+${SKY}
+uniform float reach;
+in float value;
+in vec3 rest;
+out vec3 at, facing, own;
+out float amount, sky;
+#ifdef FACETS
+out vec3 corner;
+#endif
+void main() {
+  vec4 p = modelMatrix * vec4(position, 1.);
+  at = p.xyz;
+  own = rest;
+  amount = value;
+  facing = mat3(modelMatrix) * normal;
+  sky = mix(.3, 1., openSky(at, reach));
+#ifdef FACETS
+  int k = gl_VertexID % 3;
+  corner = vec3(k == 0, k == 1, k == 2);
+#endif
+  gl_Position = projectionMatrix * viewMatrix * p;
+}
+`;
+
+/** `LOOK` is a number: 0 rubber, 1 gummy, 2 foam, 3 steel, 4 what stands still, 5 glass. */
+export const SURFACE = /* glsl */ `
+${LIGHT}
+${SHADOW}
+in vec3 at, facing, own;
+in float amount, sky;
+uniform vec3 color;
+uniform float size, opacity;
+uniform sampler2D scale;
+#ifdef FACETS
+in vec3 corner;
+#endif
+out vec4 result;
+
+float grain(vec3 p) { // pores of foam: random points of a skew lattice
+  p += .37 * p.yzx + .41;
+  vec3 i = floor(p), f = fract(p) - .5;
+  float h = fract(sin(dot(i, vec3(12.9898, 78.233, 37.719))) * 43758.5453);
+  return smoothstep(.1, .5, length(f) + .25 * h);
+}
+
+void main() {
+  vec3 v = normalize(cameraPosition - at), base = color;
+#ifdef FACETS
+  vec3 n = normalize(cross(dFdx(at), dFdy(at)));
+#else
+  vec3 n = normalize(facing);
+  if (!gl_FrontFacing) n = -n;
+#endif
+#ifdef FIELD
+  base = texture(scale, vec2(amount / 255., .5)).rgb;
+  base *= base;
+#endif
+  float nv = max(dot(n, v), 0.), nl = dot(n, sun), edge = (1. - nv) * (1. - nv);
+  edge *= edge;
+#if LOOK == 5
+  vec2 s = vec2(1., 0.);
+#else
+  vec2 s = shadow(at + .004 * reach * n, .0015);
+#endif
+  vec3 r = reflect(-v, n), c;
+  float lit = max(nl, 0.) * s.x, alpha = opacity;
+  vec3 ambient = around(n) * sky;
+#if defined(FIELD)
+  c = base * (.75 * ambient + .75 * sunColor * lit) + .02 * environment(r, .5);
+#elif LOOK == 1
+  // Light passes: what comes through from the light, and what is seen through, where the body is thin.
+  vec3 absorb = (1.06 - base) * (3.6 / size);
+  vec3 through = exp(-absorb * s.y * 1.3) * (.35 + .65 * smoothstep(-1., .6, nl));
+  vec3 t = refract(-v, n, .72);
+  float path = max(-dot(t, n), .15) * .55 * size;
+  vec3 seen = environment(t, .7) * exp(-absorb * path) * (base + .12);
+  c = base * (.3 * ambient + .3 * sunColor * lit) + .6 * sunColor * base * through + .5 * seen * mix(.6, 1., sky);
+  c += environment(r, .08) * (.035 + .5 * edge) * mix(.25, 1., sky) * mix(.45, 1., s.x);
+#elif LOOK == 2
+  float pore = grain(own * (15. / size)) * mix(.6, 1., grain(own * (7. / size) + 3.1));
+  c = base * mix(.5, 1., pore) * (.85 * ambient + .65 * sunColor * (.85 * lit + .1 * max(nl + .5, 0.)));
+#elif LOOK == 3
+  c = base * (environment(r, .12) * mix(.3, 1., sky) * mix(.6, 1., s.x) * 1.05 + .1 * ambient + .18 * sunColor * lit);
+  c += edge * .35 * environment(r, .2);
+#elif LOOK == 4
+  c = base * (.8 * ambient + .6 * sunColor * lit);
+#elif LOOK == 5
+  vec3 mirrored = environment(r, .2) * (.015 + .7 * edge);
+  alpha = clamp(.5 * opacity + .25 * edge + .5 * mirrored.g, .01, 1.);
+  c = mix(.7 * base * ambient, mirrored, clamp(mirrored.g / alpha, 0., 1.)) + mirrored;
+#else
+  c = base * (.75 * ambient + .8 * sunColor * lit) + environment(r, .45) * (.03 + .22 * edge) * sky;
+#endif
+#ifdef FACETS
+  vec3 w = corner / max(fwidth(corner), vec3(1e-6));
+  c *= mix(.55, 1., smoothstep(.3, 1.3, min(min(w.x, w.y), w.z)));
+#endif
+  result = vec4(shown(c), alpha);
+}
+`;
+
+/** The light that reaches the ground: of the key in red, of the sky in green. Bodies that move change this map alone. */
+export const GROUND_MAP = /* glsl */ `
+${SHADOW}
+${SKY}
+in vec3 at;
+uniform vec3 up;
+uniform float reach;
+out vec4 result;
+void main() { result = vec4(shadow(at + .004 * reach * up, .0015).x, openSky(at, reach), 0., 1.); }
+`;
+
+/** A disc with lines, which fades into the background. */
+export const GROUND_VERTEX = /* glsl */ `
+uniform float reach;
+in vec3 rest;
+out vec3 own, at;
+out vec2 spot;
+void main() {
+  own = rest;
+  at = (modelMatrix * vec4(position, 1.)).xyz;
+  spot = rest.xy / (LIT * 2. * reach) + .5;
+#ifdef MAP
+  gl_Position = vec4(2. * spot - 1., 0., 1.);
+#else
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
+#endif
+}
+`;
+export const GROUND = /* glsl */ `
+${LIGHT}
+in vec3 own;
+in vec2 spot;
+uniform vec3 color;
+uniform float cell;
+uniform sampler2D groundMap;
+out vec4 result;
+void main() {
+  vec2 place = own.xy / cell, width = max(fwidth(place), vec2(1e-5));
+  vec2 off = abs(fract(place - .5) - .5) / width;
+  float line = (1. - smoothstep(.4, 1.4, min(off.x, off.y))) * .09 * min(1., .25 / max(width.x, width.y));
+#ifdef SHADOWS
+  vec2 light = texture(groundMap, spot).rg;
+#else
+  vec2 light = vec2(1.);
+#endif
+  vec3 c = color * (1. - line) * (.72 * mix(.1, 1., light.g) * skyColor + .42 * sunColor * light.r);
+  float away = length(own.xy) / reach;
+  result = vec4(shown(c), 1. - smoothstep(1.6, 4.6, away));
+}
+`;
+
+/** The background: from the horizon to the sky. */
+export const BACKGROUND_VERTEX = /* glsl */ `
+out float height;
+void main() {
+  height = position.y * .5 + .5;
+  gl_Position = vec4(position.xy, 1., 1.);
+}
+`;
+export const BACKGROUND = /* glsl */ `
+in float height;
+uniform vec3 top, bottom;
+out vec4 result;
+void main() { result = vec4(mix(bottom, top, height), 1.); }
+`;
+
+/** Depth alone, for the map of shadows; and the height, for that of the sky. */
+export const MAP_VERTEX = /* glsl */ `
+out float height;
+void main() {
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
+  height = .5 - .5 * gl_Position.z;
+}
+`;
+export const MAP = /* glsl */ `
+in float height;
+out vec4 result;
+void main() { result = vec4(height, 0., 0., 1.); }
+`;

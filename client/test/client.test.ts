@@ -1,0 +1,130 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { colorAt } from "../src/colors.ts";
+import { Block, inflated, summed16, summed8 } from "../src/decode.ts";
+import { Pace } from "../src/pace.ts";
+import { follow, lighter, normals, type Skin } from "../src/skin.ts";
+import { placeTets } from "../src/tets.ts";
+
+/** A sphere of triangles, each vertex of which follows a point of its own and, with weight 1/4, the first one. */
+function sphere(rings: number): Skin {
+  const rest: number[] = [], triangles: number[] = [];
+  for (let i = 0; i <= rings; i++)
+    for (let j = 0; j < 2 * rings; j++) {
+      const [a, b] = [(Math.PI * i) / rings, (Math.PI * j) / rings];
+      rest.push(Math.sin(a) * Math.cos(b), Math.cos(a), -Math.sin(a) * Math.sin(b));
+      const [right, down] = [i * 2 * rings + ((j + 1) % (2 * rings)), 2 * rings];
+      const at = i * 2 * rings + j;
+      if (i < rings) triangles.push(at, at + down, right, right, at + down, right + down);
+    }
+  const count = rest.length / 3;
+  return {
+    corners: Uint32Array.from({ length: 2 * count }, (_, k) => (k % 2 ? k >> 1 : 0)),
+    weights: new Int16Array(count).fill(8192), step: 0.25 / 8192, order: 2, first: 0,
+    triangles: Uint32Array.from(triangles), rest: Float32Array.from(rest),
+  };
+}
+
+test("differences are summed over frames", () => {
+  // 5, 70000 mod 2^16, then -3 and +2 against the frame before: folded as 5 -> 10, -3 -> 5, +2 -> 4
+  const folded = [10, 2 * 300, 5, 4];
+  const bytes = Uint8Array.from([...folded.map((x) => x >> 8), ...folded.map((x) => x & 255)]);
+  assert.deepEqual([...summed16(bytes, 2, 2)], [5, 300, 2, 302]);
+  assert.deepEqual([...summed8(Uint8Array.from([10, 5, 4]), 3, 1)], [5, 2, 4]);
+  assert.throws(() => summed16(bytes, 3, 2), /incomplete/);
+  assert.throws(() => summed8(bytes, 3, 2), /incomplete/);
+});
+
+test("a block gives its arrays, and damaged ones are refused", async () => {
+  const json = JSON.stringify({ ref: { type: "i2", at: 8, count: 2 } });
+  const text = new TextEncoder().encode(json.padEnd(8 * Math.ceil((4 + json.length) / 8) - 4));
+  const bytes = new Uint8Array(4 + text.length + 16);
+  new DataView(bytes.buffer).setUint32(0, text.length, true);
+  bytes.set(text, 4);
+  new DataView(bytes.buffer).setInt16(4 + text.length + 8, -7, true);
+  const packed = new Blob([bytes]).stream().pipeThrough(new CompressionStream("deflate"));
+  const base64 = Buffer.from(await new Response(packed).arrayBuffer()).toString("base64");
+  const block = new Block(await inflated(`\n${base64}\n`));
+  const ref = (block.description as unknown as { ref: Parameters<Block["array"]>[0] }).ref;
+  assert.deepEqual([...block.array(ref)], [-7, 0]);
+  assert.throws(() => block.array({ ...ref, count: 99 }));
+  await assert.rejects(inflated(base64.slice(0, 40)));
+  await assert.rejects(inflated("no base64 ?"));
+});
+
+test("a skin follows its points, and moves with them", () => {
+  const skin = sphere(6);
+  const out = new Float32Array(skin.rest.length);
+  follow(skin, skin.rest as Float32Array, 3, out);
+  for (let k = 0; k < out.length; k++) {
+    const expected = 0.25 * skin.rest[k % 3] + 0.75 * skin.rest[k];
+    assert.ok(Math.abs(out[k] - expected) < 1e-6);
+  }
+  const moved = new Float32Array(out.length);
+  follow(skin, (skin.rest as Float32Array).map((x) => x + 100), 3, moved);
+  for (let k = 0; k < out.length; k++) assert.ok(Math.abs(moved[k] - out[k] - 100) < 1e-4);
+});
+
+test("normals of a sphere point outwards", () => {
+  const { rest, triangles } = sphere(12);
+  const out = new Float32Array(rest.length);
+  normals(rest as Float32Array, triangles, out);
+  for (let k = 3 * 24; k < rest.length - 3 * 24; k += 3)
+    assert.ok(out[k] * rest[k] + out[k + 1] * rest[k + 1] + out[k + 2] * rest[k + 2] > 0.98);
+});
+
+test("a lighter skin is closed, has about as many vertices as asked, and follows the same points", () => {
+  const skin = sphere(40);
+  const light = lighter(skin, 400);
+  const count = light.rest.length / 3;
+  assert.ok(count <= 400 && count > 150, `${count}`);
+  assert.equal(light.corners.length, 2 * count);
+  assert.equal(light.weights.length, count);
+  const edges = new Map<string, number>();
+  for (let t = 0; t < light.triangles.length; t++) {
+    const [a, b] = [light.triangles[t], light.triangles[t % 3 === 2 ? t - 2 : t + 1]];
+    assert.ok(a < count && a !== b);
+    edges.set(`${a} ${b}`, (edges.get(`${a} ${b}`) ?? 0) + 1);
+    edges.set(`${b} ${a}`, (edges.get(`${b} ${a}`) ?? 0) - 1);
+  }
+  assert.ok([...edges.values()].every((sum) => sum === 0), "an edge has one side only");
+  for (let k = 0; k < count; k++)
+    assert.deepEqual([0, 1, 2].map((i) => light.rest[3 * k + i]),
+      [0, 1, 2].map((i) => skin.rest[3 * light.corners[2 * k + 1] + i]));
+  assert.equal(lighter(light, 400), light);
+});
+
+test("tets are apart from the middle, and end at a cut", () => {
+  const x = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 9, 9, 9]);
+  const tets = { corners: Uint32Array.from([0, 1, 2, 3, 1, 2, 3, 4]), count: 2 };
+  const position = { array: new Float32Array(72) }, value = { array: new Float32Array(24), needsUpdate: false };
+  const place = (explode: number, cut: number, axis = 0) =>
+    placeTets(tets, x, x, Uint8Array.from([1, 2, 3, 4, 5]), { explode, axis }, cut, position as never, value as never);
+  assert.equal(place(0, 10), 24);
+  assert.deepEqual([...position.array.slice(0, 9)], [0, 0, 0, 0, 1, 0, 1, 0, 0]);
+  assert.deepEqual([...value.array.slice(0, 3)], [1, 3, 2]);
+  assert.equal(place(0, 1), 12);
+  place(1, 10);
+  assert.ok(position.array[0] < -0.5 && position.array[36] > 1);
+});
+
+test("slow pictures lower the quality, once they are known to be slow", () => {
+  const run = (gap: number, count: number) => {
+    const pace = new Pace(1);
+    for (let k = 0; k < count; k++) pace.picture(1000 + gap * k);
+    return pace;
+  };
+  assert.equal(run(16, 200).note, "");
+  assert.ok(Math.abs(run(16, 200).rate - 62.5) < 1);
+  assert.equal(run(300, 5).quality.sharp, 2);
+  assert.equal(run(300, 40).quality.shadows, false);
+  assert.match(run(300, 40).note, /lighter skins, no shadows/);
+  assert.equal(run(300, 40).best.shadows, true);
+  assert.ok(run(600, 5).quality.coarse);
+});
+
+test("scales begin and end with their colors", () => {
+  assert.deepEqual(colorAt("viridis", 0), [0x44, 0x01, 0x54]);
+  assert.deepEqual(colorAt("RdBu", 0.5), [0xf7, 0xf7, 0xf7]);
+  assert.deepEqual(colorAt("RdBu", 2), [0x05, 0x30, 0x61]);
+});

@@ -1,0 +1,135 @@
+"""What the client of the page draws: parts that follow points, and how these points move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.results.page.packed import Packer, differences, quantized
+from supple.results.view.camera import direction_of
+from supple.results.view.fields import FIELDS, Field, Limits, Range, color_map, nodal_values
+from supple.results.view.layers.joints import joint_segments, lines_of_joints
+from supple.results.view.look import drawn_as
+from supple.results.view.model import Model, RenderFrame
+from supple.results.view.surfaces import RigidSurface, SoftSurface, Surface, boundary_surface, obstacle_surfaces
+from supple.scene.rows import BodyRows
+
+
+def described_scene(model: Model, packer: Packer) -> dict[str, Any]:
+    """What no frame changes: the parts of the picture, tets, camera and floor."""
+    view, planes = model.view, [obstacle.plane for obstacle in model.obstacles]
+    floors = [float(point @ view.up) for point, normal in filter(None, planes) if float(normal @ view.up) > 0.99]
+    if not floors and any(obstacle.is_container for obstacle in model.obstacles):
+        floors = [float((view.outline @ view.up).min())]  # a table under the bowl
+    return {
+        "up": view.up.tolist(),
+        "center": view.center.tolist(),
+        "radius": view.radius,
+        "outline": packer.add(view.outline, "f4"),
+        "away": direction_of("corner", view).tolist(),
+        "floor": max(floors, default=None),
+        "bodies": [_body(model, body, packer) for body in model.bodies],
+        "tets": packer.add(model.tets, "u4"),
+    }
+
+
+def _body(model: Model, body: BodyRows, packer: Packer) -> dict[str, Any]:
+    """Its vertices among the points, and its surface; also of a rigid body, the surface follows its four points."""
+    if body.skin is None:
+        surface = boundary_surface(body).creased(model)
+        corners, weights = surface.rows[:, None], np.ones((len(surface.rows), 1))
+    else:
+        rows = np.arange(len(body.skin.corners))
+        surface = SoftSurface(body.name, body.skin.triangles, *drawn_as(body), body, True, rows).creased(model)
+        corners, weights = body.skin.corners[surface.rows], body.skin.weights[surface.rows]
+    # The last weight is what the others lack to one, so that rounded ones still move with the body.
+    kept = np.ascontiguousarray(weights[:, :-1])
+    step = max(float(np.abs(kept).max(initial=0.0)), 1e-30) / 32767.0
+    return {
+        **_triangles(surface, packer),
+        "look": body.body.drawn_look,
+        "first": body.vertices.start,
+        "count": body.vertices.stop - body.vertices.start,
+        "tets": [body.tets.start, 0 if body.rigid else body.tets.stop - body.tets.start],
+        "order": weights.shape[1],
+        "corners": packer.add(corners, "u2" if corners.max(initial=0) < 65536 else "u4"),
+        "weights": packer.add(np.round(kept / step), "i2"),
+        "step": step,
+        "rest": packer.add(surface.at_rest(model), "f4"),
+        "closed": surface.hides_its_backs(model),
+    }
+
+
+def _triangles(surface: Surface, packer: Packer) -> dict[str, Any]:
+    triangles = surface.triangles
+    kind = "u2" if triangles.max(initial=0) < 65535 else "u4"
+    return {"name": surface.name, "color": list(surface.color), "triangles": packer.add(triangles, kind)}
+
+
+def described_motion(frames: Sequence[tuple[float, RenderFrame]], packer: Packer) -> dict[str, Any]:
+    """What changes: points, poses of obstacles, and fields; of at least one frame, each with its time [s]."""
+    model, first = frames[0][1].model, frames[0][1]
+    lines = lines_of_joints(model)
+    x = np.array([_points(frame, lines) for _, frame in frames])
+    n, ends = len(first.positions), 2 * len(model.stitches)
+    groups = [(body.vertices.start, body.vertices.stop) for body in model.bodies]
+    groups += [(low, high) for low, high in ((n, n + ends), (n + ends, x.shape[1])) if high > low]
+    steps, described = np.empty((len(frames), 3, x.shape[1]), dtype=np.uint16), []
+    for low, high in groups:
+        whole, corner, step = quantized(x[:, low:high])
+        steps[:, :, low:high] = whole.transpose(0, 2, 1)
+        described.append({"first": low, "count": high - low, "low": corner, "step": step})
+    return {
+        "times": packer.add([time for time, _ in frames], "f8"),
+        "points": x.shape[1],
+        "groups": described,
+        "motion": packer.add(differences(steps), "u1"),
+        "stitches": [n, ends],
+        "joints": [n + ends, x.shape[1] - n - ends],
+        "pins": packer.add(first.pinned, "u4"),
+        "obstacles": [_obstacle(frames, surface, packer) for surface in obstacle_surfaces(model)],
+        "fields": [one for field in FIELDS.values() if (one := _field(frames, field, packer))],
+    }
+
+
+def _points(frame: RenderFrame, lines: list[Any]) -> NDArray[np.float64]:
+    """(n + ..., 3) vertices, then ends of stitches and of the lines of joints [m]."""
+    joints = joint_segments(frame, lines) if lines else np.zeros((0, 2, 3))
+    more = np.concatenate([frame.stitch_segments, joints]).reshape(-1, 3)
+    return np.concatenate([frame.finite_positions, np.nan_to_num(more)])
+
+
+def _obstacle(frames: Sequence[tuple[float, RenderFrame]], surface: RigidSurface, packer: Packer) -> dict[str, Any]:
+    model = frames[0][1].model
+    poses = np.nan_to_num([surface.pose(frame) for _, frame in frames])
+    moves = bool((poses != poses[0]).any())
+    creased = surface.creased(model)
+    return {
+        **_triangles(creased, packer),
+        "vertices": packer.add(creased.vertices, "f4"),
+        "poses": packer.add(poses if moves else poses[:1], "f4"),
+        "opacity": surface.opacity,
+        "container": surface.container,
+        "casts": surface.casts_shadow,
+        "isFloor": surface.is_floor and not moves,
+    }
+
+
+def _field(frames: Sequence[tuple[float, RenderFrame]], field: Field, packer: Packer) -> dict[str, Any] | None:
+    """A field at the vertices, in 256 steps of a scale that suits all frames; None where no value is known."""
+    of_tets = [field.values(frame) for _, frame in frames]
+    ends = Limits(field, Range()).follow(np.concatenate(of_tets))
+    if ends is None:
+        return None
+    values = np.array([nodal_values(frame, own) for (_, frame), own in zip(frames, of_tets, strict=True)])
+    share = np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+    return {
+        "name": field.name,
+        "unit": field.unit,
+        "ends": list(ends),
+        "colors": color_map(field),
+        "values": packer.add(differences(np.round(255.0 * share).astype(np.uint8)), "u1"),
+    }
