@@ -116,8 +116,8 @@ def _problem(system: System, state: State) -> _Problem:
         conditions.append(_joint_conditions(joints, x))
     hessian = space.tools.hessian
     objective.model(x, hessian, ProjectedTerms.NONE)
-    T = _unknowns(whole)
-    K = T.T @ _matrix(hessian, whole.elements, len(x)) @ T
+    T = unknowns(whole)
+    K = T.T @ hessian_matrix(hessian, whole.elements, len(x)) @ T
     M = T.T @ diags_array(np.repeat(whole.masses, 3)) @ T
     C = (_stacked(conditions, x.size) @ T).tocsr()
     C = C[_independent(C)]
@@ -127,7 +127,7 @@ def _problem(system: System, state: State) -> _Problem:
     return _Problem(csr_array(K), csr_array(M), csr_array(diags_array(scale) @ C), csr_array(G), T)
 
 
-def _unknowns(system: System) -> Sparse:
+def unknowns(system: System) -> Sparse:
     """T (3 n, 3 u): displacements of all vertices by those of the ones that are neither pinned nor welded."""
     welding, n = system.welding, len(system.rest_positions)
     free = np.ones(n, dtype=bool)
@@ -144,7 +144,7 @@ def _unknowns(system: System) -> Sparse:
     return csr_array(kron(by_vertex, np.eye(3)))
 
 
-def _matrix(hessian: HessianBlocks, elements: NDArray[np.int32], n: int) -> Sparse:
+def hessian_matrix(hessian: HessianBlocks, elements: NDArray[np.int32], n: int) -> Sparse:
     """(3 n, 3 n) the sparse part of a Hessian."""
     blocks = hessian.elements.reshape(-1, 4, 3, 4, 3).transpose(0, 1, 3, 2, 4).reshape(-1, 3, 3)
     i, j = np.repeat(elements, 4, axis=1).ravel(), np.tile(elements, (1, 4)).ravel()

@@ -269,6 +269,8 @@ class Implicit(Solver):
                 worst = taken.outcome.status
                 if not worst.can_go_on:
                     break
+            if workspace.tape is not None:
+                workspace.tape.append((now, taken, substepping.length))
             now, last = taken.state, taken
             before, parts = parts, [each.parts(now.positions) for each in system.actuators]
             forces = list(taken.actuators)

@@ -12,7 +12,7 @@ from supple.model.state import State, Status
 from supple.model.system import System
 from supple.solvers.implicit.energies.elasticity import Elasticity
 from supple.solvers.implicit.energies.inversion_barrier import inversion_barrier
-from supple.solvers.implicit.energies.loads.actuators import actuators_at, muscles_at
+from supple.solvers.implicit.energies.loads.actuators import ActuatorPotential, actuators_at, muscles_at
 from supple.solvers.implicit.energies.loads.external_forces import total_forces
 from supple.solvers.implicit.energies.loads.pressure import drags_at, pressures_at
 from supple.solvers.implicit.energies.loads.springs import soft_targets_at, springs_at
@@ -96,6 +96,7 @@ class Substep:
 
     actuators : generalized forces of each actuator, as they acted in the step; works, residual : see `works_of_step`
     time_error : see `ImplicitDetails`
+    settings : those with which it was taken, where it reached its end
     """
 
     state: State
@@ -106,6 +107,7 @@ class Substep:
     works: dict[str, float] = field(default_factory=dict)
     residual: float = 0.0
     time_error: float | None = None
+    settings: StepSettings | None = None
 
 
 def take_substep(
@@ -135,10 +137,31 @@ def take_substep(
     return replace(again, outcome=replace(again.outcome, rows=taken.outcome.rows + again.outcome.rows))
 
 
-def _take(
-    state: State, end: float, h: float, settings: StepSettings, workspace: Workspace, divisible: bool
-) -> Substep | None:
-    system, tools = workspace.system, workspace.tools
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A step as its state and its system pose it, before anything is solved.
+
+    Attributes
+    ----------
+    targets : (k, 3) of the pinned vertices at the end [m]; middle : where loads are taken [s]; forces : (n, 3) [N]
+    base : the objective without joints and contact
+    """
+
+    plan: Plan
+    targets: NDArray[np.float64]
+    middle: float
+    forces: NDArray[np.float64]
+    guard: InversionGuard
+    grown: Elasticity
+    actuators: list[ActuatorPotential]
+    base: Objective
+    joints: JointStep | None
+    contact: ContactStep
+
+
+def pose(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Posed:
+    """The step of h [s] that ends at `end` [s]."""
+    system = workspace.system
     targets = system.pin_targets(end)
     obstacles = len(state.positions) - workspace.bodies_end
     if obstacles:
@@ -147,11 +170,7 @@ def _take(
     plan = settings.integrator.plan(system, state, h)
     middle = end - (1.0 - plan.place) * h
     forces = total_forces(system, state.positions, middle)
-    onwards = _without_forces(system, plan, targets)
-    if divisible and workspace.contact is not None and workspace.contact.passing(state.positions, onwards):
-        return None
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
-    limits = StepLimits(guard, workspace.contact, tools.clock)
     grown = workspace.elasticity_at(middle)
     elasticity = grown.in_step(state.internal, h)
     mu = workspace.elasticity.material.mu
@@ -164,6 +183,20 @@ def _take(
     times = state.time, end
     joints = None if workspace.joints is None else JointStep.of(workspace.joints, state, times, plan.scale)
     contact = ContactStep(workspace.contact, state.positions, times, plan.contact_weight, settings.linearized)
+    return Posed(plan, targets, middle, forces, guard, grown, actuators, base, joints, contact)
+
+
+def _take(
+    state: State, end: float, h: float, settings: StepSettings, workspace: Workspace, divisible: bool
+) -> Substep | None:
+    system, tools = workspace.system, workspace.tools
+    posed = pose(state, end, h, settings, workspace)
+    targets, plan, forces, middle = posed.targets, posed.plan, posed.forces, posed.middle
+    base, joints, contact, grown, actuators = posed.base, posed.joints, posed.contact, posed.grown, posed.actuators
+    onwards = _without_forces(system, plan, targets)
+    if divisible and workspace.contact is not None and workspace.contact.passing(state.positions, onwards):
+        return None
+    limits = StepLimits(posed.guard, workspace.contact, tools.clock)
     still = np.array_equal(targets, state.positions[tools.pinned])
     objective = _with_joints(base, joints)
     if not (still and settings.linearized):  # a linearization has the contact of where it begins
@@ -221,7 +254,7 @@ def _take(
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
     works, residual = works_of_step(contact.objective, outcome, state, internal, plan, middle, end, workspace)
     error = _time_error(system, workspace.bodies_end, settings.integrator.position_error(state, after))
-    return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual, error)
+    return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual, error, settings)
 
 
 def _time_error(system: System, n: int, error: NDArray[np.float64] | None) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class Workspace:
     diagonal : of the smallest body's bounding box at rest [m]
     checked : the state that `Implicit.check` has accepted, or that the latest step ended with
     grown : the latest growth, and the elastic energy with it
+    tape : where a list is given, every substep that is taken is appended: where it begins, the substep, its length [s]
     """
 
     system: System
@@ -44,6 +46,7 @@ class Workspace:
     joints: JointGeometry | None
     checked: State | None = None
     grown: tuple[Growth, Elasticity] | None = None
+    tape: list[tuple[State, Any, float]] | None = None
     conservation: Conservation = field(init=False)
 
     def __post_init__(self) -> None:
