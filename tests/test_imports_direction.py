@@ -19,6 +19,7 @@ LAYERS = (
     ("app.studies",),
     ("app.runs",),
     ("app.scene_file",),
+    ("gradients",),
     ("simulate",),
     ("results",),
     ("solvers.registry",),

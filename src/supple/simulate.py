@@ -129,16 +129,16 @@ def simulate(
     if start is None:
         start = initial_state(scene, initial_positions, initial_velocities)
     if isinstance(solver, Solver):
-        first, workspace = _prepared(scene, start, solver)
+        first, workspace = prepared(scene, start, solver)
     else:
         choices = solver.choices(first_frame(scene, start).system, dt)
         before = getattr(start, "solver", None)  # a run that resumes keeps its solver
         first, workspace = _first_able(scene, start, sorted(choices, key=lambda choice: choice != before))
     shown = [supplied("progress")()] if progress else []
-    return _steps(first, dt, steps, workspace, control, [*sinks, *shown], strict)
+    return frames_from(first, dt, steps, workspace, control, [*sinks, *shown], strict)
 
 
-def _prepared(scene: Scene, start: StartFrame | State, solver: Solver) -> tuple[Frame, Any]:
+def prepared(scene: Scene, start: StartFrame | State, solver: Solver) -> tuple[Frame, Any]:
     """The frame at the start, and the solver's workspace; errors are those of `simulate`."""
     tets = sum(len(body.mesh.tets) for body in scene.bodies)
     what = f"simulate: the scene of {tets} tets"
@@ -153,13 +153,13 @@ def _prepared(scene: Scene, start: StartFrame | State, solver: Solver) -> tuple[
 
 
 def _first_able(scene: Scene, start: StartFrame | State, solvers: Sequence[Solver]) -> tuple[Frame, Any]:
-    """As `_prepared`, of the first solver that accepts the start; where none does, the error is that of the first."""
+    """As `prepared`, of the first solver that accepts the start; where none does, the error is that of the first."""
     try:
-        return _prepared(scene, start, solvers[0])
+        return prepared(scene, start, solvers[0])
     except SuppleError as error:
         for other in solvers[1:]:
             with suppress(SuppleError):
-                return _prepared(scene, start, other.chosen(f"{solvers[0].label} cannot start: {error}"))
+                return prepared(scene, start, other.chosen(f"{solvers[0].label} cannot start: {error}"))
         raise
 
 
@@ -245,7 +245,7 @@ def prepared_after_breaks(
     return left, state, step, workspace
 
 
-def _steps(
+def frames_from(
     first: Frame,
     dt: float,
     steps: int,
@@ -254,6 +254,7 @@ def _steps(
     sinks: Sequence[Sink],
     strict: bool,
 ) -> Frames:
+    """The frames of a run from its first one, which has a solver; see `simulate`."""
     system, state, frame, solver = first.system, first.state, first, first.solver
     assert solver is not None
     inputs = system.scene.inputs

@@ -113,16 +113,16 @@ def _problem(system: System, state: State) -> _Problem:
     if space.joints is not None:
         joints = JointStep.of(space.joints, extended, (time, time), None).potential
         objective = replace(objective, terms=[*objective.terms, joints])
-        conditions.append(_joint_conditions(joints, x))
+        conditions.append(joint_conditions(joints, x))
     hessian = space.tools.hessian
     objective.model(x, hessian, ProjectedTerms.NONE)
     T = unknowns(whole)
     K = T.T @ hessian_matrix(hessian, whole.elements, len(x)) @ T
     M = T.T @ diags_array(np.repeat(whole.masses, 3)) @ T
-    C = (_stacked(conditions, x.size) @ T).tocsr()
-    C = C[_independent(C)]
+    C = (stacked(conditions, x.size) @ T).tocsr()
+    C = C[independent(C)]
     scale = float(K.diagonal().max()) / np.maximum(np.sqrt(C.multiply(C).sum(axis=1)), np.finfo(float).tiny)
-    columns = [csr_array((x.size, 0)), *(_column(part.vertices, part.vector, x.size) for part in hessian.low_rank)]
+    columns = [csr_array((x.size, 0)), *(column(part.vertices, part.vector, x.size) for part in hessian.low_rank)]
     G = T.T @ block_array([columns])
     return _Problem(csr_array(K), csr_array(M), csr_array(diags_array(scale) @ C), csr_array(G), T)
 
@@ -170,10 +170,10 @@ def _rigidity(system: System, x: NDArray[np.float64]) -> Sparse:
     way = x[i] - x[j]
     k = np.arange(len(i))
     rows, signs = np.concatenate([k, k]), np.concatenate([way, -way])
-    return _conditions(rows, np.concatenate([i, j]), signs, len(k), x.size)
+    return conditions_of(rows, np.concatenate([i, j]), signs, len(k), x.size)
 
 
-def _joint_conditions(joints: JointPotential, x: NDArray[np.float64]) -> Sparse:
+def joint_conditions(joints: JointPotential, x: NDArray[np.float64]) -> Sparse:
     """What joints, and motors without a stiffness, hold."""
     geometry, differences = joints.geometry, joints.geometry.differences
     along = np.eye(3)[None, :, None, :] * differences.coefficients[:, None, :, None]  # [row, axis, corner, coordinate]
@@ -190,11 +190,11 @@ def _joint_conditions(joints: JointPotential, x: NDArray[np.float64]) -> Sparse:
         count = values.shape[0] * values.shape[1]
         corners = np.repeat(geometry.corners[joint], values.shape[1], axis=0)
         rows = np.repeat(np.arange(count), 8)
-        found.append(_conditions(rows, corners.ravel(), values.reshape(-1, 3), count, x.size))
-    return _stacked(found, x.size)
+        found.append(conditions_of(rows, corners.ravel(), values.reshape(-1, 3), count, x.size))
+    return stacked(found, x.size)
 
 
-def _conditions(
+def conditions_of(
     rows: NDArray[np.int64], vertices: NDArray[np.integer], vectors: NDArray[np.float64], count: int, size: int
 ) -> Sparse:
     """(count, size) with vectors (k, 3) in the columns of vertices (k,)."""
@@ -203,15 +203,15 @@ def _conditions(
     return csr_array(coo_array((vectors.ravel(), places), shape=(count, size)))
 
 
-def _stacked(parts: Sequence[Sparse], size: int) -> Sparse:
+def stacked(parts: Sequence[Sparse], size: int) -> Sparse:
     return csr_array(block_array([[part] for part in (csr_array((0, size)), *parts)]))
 
 
-def _column(vertices: NDArray[np.integer], vector: NDArray[np.float64], size: int) -> Sparse:
-    return _conditions(np.zeros(len(vertices), dtype=np.int64), vertices, vector, 1, size).T.tocsr()
+def column(vertices: NDArray[np.integer], vector: NDArray[np.float64], size: int) -> Sparse:
+    return conditions_of(np.zeros(len(vertices), dtype=np.int64), vertices, vector, 1, size).T.tocsr()
 
 
-def _independent(C: Sparse) -> NDArray[np.int64]:
+def independent(C: Sparse) -> NDArray[np.int64]:
     """Rows of C that are independent: closed chains of joints, and joints with what is pinned, repeat conditions."""
     used = np.flatnonzero(np.abs(C).sum(axis=0))
     dense = C[:, used].toarray()

@@ -82,6 +82,18 @@ class Friction(ContactPotential):
         positions = self.points.positions
         renew_duals(positions(x), positions(direction), self.slips, self.reach, self.duals)
 
+    def settle(self, x: NDArray[np.float64]) -> None:
+        """Set the duals to the forces at x (n, 3): the matrix is then the Hessian there."""
+        self.duals[:] = self.held(x, np.zeros_like(x))
+
+    def by_start(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) the derivative of the gradient's product with `way` (n, 3) by where the step begins."""
+        self.settle(x)
+        points, out = self.points.positions, np.zeros_like(x)
+        between = friction_hessian(points(x), self.slips, self.reach, self.duals)
+        vertex_couplings(self.points, between).add_product(-way, out)
+        return out
+
     def held(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k, 3) what the linearization at x (n, 3) predicts at the end of a way (n, 3), as shares of the largest
         forces; along the slip."""

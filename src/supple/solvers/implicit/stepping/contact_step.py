@@ -81,6 +81,11 @@ class ContactStep:
             self.model.collisions.forget_weights()
         self.stiffness = self.model.scales.stiffness * self.weight if self.model is not None else 0.0
 
+    @staticmethod
+    def stiffened(stiffness: float, increases: int) -> float:
+        """A barrier's stiffness after so many increases."""
+        return stiffness * _STIFFENING**increases
+
     def with_contact(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
         """The objective with the barrier, and with friction whose normal forces are those at x (n, 3)."""
         self.objective = objective
@@ -107,7 +112,7 @@ class ContactStep:
         allowed = increases == 0 or (increases < _MOST_INCREASES and nearest > _LEAST_GAIN * self.nearest)
         allowed = allowed and unbalanced <= _BALANCED
         if scales.adaptive and allowed and nearest < _TOO_NEAR * scales.dhat:
-            self.stiffness *= _STIFFENING
+            self.stiffness = self.stiffened(self.stiffness, 1)
             self.stiffness_increases += 1
             self.nearest = nearest
             return True

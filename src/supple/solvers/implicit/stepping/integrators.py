@@ -42,6 +42,8 @@ class Plan:
     memory : the data of this step that the next one needs
     place : p, where all forces but those of contact act, as a share of the step's way and time. The objective is
         multiplied by 1 / p, so that the Hessian of an energy enters it as it is (see `ActingWithin`)
+    past : with the shares a and b of the last two states, x^ = a x_n - b x_(n-1) and x~ = x^ + sqrt(s) v^; the like of
+        strains. The midpoint rule has other ones
     """
 
     scale: float | None
@@ -50,6 +52,7 @@ class Plan:
     strain_rate: Callable[[Damper], StrainRate]
     memory: History | None = None
     place: float = 1.0
+    past: tuple[float, float] = (1.0, 0.0)
 
     def motion(self, state: State) -> tuple[NDArray[np.float64], float]:
         """The velocities (n, 3) [m/s] where forces act, affine in the positions x there: at x_n, and their rate [1/s].
@@ -188,6 +191,7 @@ class BDF2(Integrator):
             velocity=lambda end: (end - old_x) / b,
             strain_rate=strain_rate,
             memory=History(x, v, h),
+            past=(one, two),
         )
 
 

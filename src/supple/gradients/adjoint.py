@@ -1,0 +1,224 @@
+"""One substep backwards: from the derivatives of a loss by the state at its end to those by the state at its beginning.
+
+The unknowns y of a substep are the vertices that are neither pinned nor welded, x = T y + (pins), and the multipliers m
+of conditions c(x) = 0. Its equations are T^T g(x; s, p) = 0, where g contains the forces C^T m of the conditions. With
+the true Hessian K of the objective, in which nothing is projected, and the derivative of friction by the state that its
+normal forces belong to, the adjoint forces l = T l_y + (seeds at pins) and u solve
+
+    [ T^T K T  T^T C^T ]^T [ l_y ]     [ T^T (dL/dx + K^T l_pins) ]
+    [ C T      0       ]   [ u   ] = - [ C l_pins                 ]
+
+Then dL/dp = l . dg/dp + u . dc/dp + dL/dx . dx/dp at fixed y and s, and likewise by s.
+
+Source: Johnson, "Notes on Adjoint Methods for 18.335" (2012); Geilinger et al., "ADD: Analytically Differentiable
+Dynamics for Multi-Body Systems with Frictional Contact" (2020).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_array, csr_array, eye_array
+from scipy.sparse.linalg import splu
+
+from supple.errors import SolverError
+from supple.gradients.kept import Replay
+from supple.model.loads.actuators.laws import Held
+from supple.solvers.implicit.energies.damping import StrainRate
+from supple.solvers.implicit.natural_modes import (
+    column,
+    conditions_of,
+    hessian_matrix,
+    independent,
+    joint_conditions,
+    stacked,
+    unknowns,
+)
+from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
+from supple.solvers.implicit.stepping.integrators import History
+
+Floats = NDArray[np.float64]
+
+# Of the extent of the bodies: the step of a difference of strains, which are quadratic but for those of springs.
+_STRAIN_STEP = 1e-4
+
+
+@dataclass(eq=False)
+class StateAdjoint:
+    """Derivatives of a loss by a state, (n, 3) each: by its positions and velocities, and by those that BDF2 remembers."""
+
+    x: Floats
+    v: Floats
+    past_x: Floats
+    past_v: Floats
+
+    @classmethod
+    def zeros(cls, n: int) -> StateAdjoint:
+        return cls(*(np.zeros((n, 3)) for _ in range(4)))
+
+    def with_vertices(self, n: int) -> StateAdjoint:
+        """With n vertices: further ones have zeros."""
+        parts = (self.x, self.v, self.past_x, self.past_v)
+        return StateAdjoint(*(np.concatenate([part[:n], np.zeros((max(0, n - len(part)), 3))]) for part in parts))
+
+
+@dataclass(frozen=True, eq=False)
+class StepAdjoint:
+    """What the parameters' derivatives need of one substep.
+
+    Attributes
+    ----------
+    forces : (n, 3) l
+    multipliers : (c,) u, of the conditions `rows` among all; held : (l,) which laws of joints are conditions
+    end : (n, 3) dL/dx; begin : (n, 3) derivative by the positions where it begins
+    """
+
+    forces: Floats
+    multipliers: Floats
+    rows: NDArray[np.int64]
+    held: NDArray[np.bool_]
+    end: Floats
+    begin: Floats
+
+    def value(self, replay: Replay) -> float:
+        """A function of the scene alone, whose derivative by the parameters is that of the loss in this substep."""
+        forces, system = self.forces.copy(), replay.workspace.system
+        system.welding.follow(forces)
+        total = np.einsum("ij,ij->", forces, replay.gradient) + np.einsum("ij,ij->", self.end, replay.x)
+        if len(self.rows):
+            total += self.multipliers @ replay.conditions(self.held)[self.rows]
+        if replay.kept.first:
+            # Obstacles' vertices, and points of rigid bodies that something is stitched to, are placed at each step.
+            begun = replay.kept.before
+            n = len(system.start_states[-1].positions)
+            own = replace(begun, positions=begun.positions[:n], velocities=begun.velocities[:n])
+            total += np.einsum("ij,ij->", self.begin[n:], replay.workspace.extended(own).positions[n:])
+        return float(total)
+
+
+def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[StepAdjoint, StateAdjoint]:
+    """The adjoint of a substep, and that of the state where it begins.
+
+    Parameters
+    ----------
+    after : of the state at its end
+    seeds : (n, 3) derivatives of the loss by the gradient g at pinned vertices, whose minus is their reaction [1/N]
+
+    Raises
+    ------
+    SolverError : where the equations are singular.
+    """
+    plan, x, n = replay.plan, replay.x, len(replay.x)
+    welding = replay.workspace.system.welding
+    seeds = seeds.copy()
+    welding.follow(seeds)
+    by_end = after.x.copy()
+    rate = 0.0 if plan.scale is None else 1.0 / float(np.sqrt(plan.scale))
+    by_end += rate * after.v
+    K = _hessian(replay)
+    C, rows, held = _conditions(replay)
+    T = unknowns(replay.workspace.system)
+    right = by_end + (K.T @ seeds.ravel()).reshape(n, 3)
+    G = _low_rank(replay, n)
+    if G.shape[1]:
+        right += (G @ (G.T @ seeds.ravel())).reshape(n, 3)
+    solved, multipliers = _solved(T.T @ K @ T, C @ T, T.T @ G, -(T.T @ right.ravel()), -(C @ seeds.ravel()))
+    forces = (T @ solved).reshape(n, 3)
+    forces += seeds
+    welding.follow(forces)
+    begin = _by_state(replay, after, forces, rate)
+    return StepAdjoint(forces, multipliers, rows, held, by_end, begin.x), begin
+
+
+def _solved(K: Any, C: Any, G: Any, right: Floats, of_conditions: Floats) -> tuple[Floats, Floats]:
+    c, g, size = C.shape[0], G.shape[1], K.shape[0]
+    if size == 0:
+        return np.zeros(0), np.zeros(c)
+    A = K
+    if c + g:
+        A = block_array([[K, C.T, G], [C, None, csr_array((c, g))], [G.T, None, -eye_array(g)]])
+    try:
+        solution = splu(A.tocsc()).solve(np.concatenate([right, of_conditions, np.zeros(g)]), trans="T")
+    except RuntimeError as error:
+        raise SolverError(f"gradient: the equations of a step are singular ({error})") from None
+    if not np.isfinite(solution).all():
+        raise SolverError("gradient: the equations of a step are singular; something is free to move at no cost")
+    return solution[:size], solution[size : size + c]
+
+
+def _hessian(replay: Replay) -> Any:
+    """(3 n, 3 n) the sparse part of dg/dx."""
+    hessian, x = replay.workspace.tools.hessian, replay.x
+    for friction in replay.frictions:
+        friction.settle(x)
+    replay.objective.model(x, hessian, ProjectedTerms.NONE)
+    K = hessian_matrix(hessian, replay.workspace.system.elements, len(x))
+    if replay.kept.at_end:
+        for lag in replay.lags:
+            K = K + lag.derivative(x)
+    return csr_array(K)
+
+
+def _low_rank(replay: Replay, n: int) -> Any:
+    parts = replay.workspace.tools.hessian.low_rank
+    return csr_array(block_array([[csr_array((3 * n, 0)), *(column(p.vertices, p.vector, 3 * n) for p in parts)]]))
+
+
+def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.bool_]]:
+    """C (c, 3 n) of independent conditions, which ones of `Replay.conditions` they are, and which laws are among them."""
+    x, found = replay.x, []
+    for each in replay.posed.actuators:
+        if isinstance(each.law, Held):
+            own = each.coordinate.vertices
+            gradient = each.coordinate.gradient(x[own])
+            found.append(conditions_of(np.zeros(len(own), dtype=np.int64), own, gradient, 1, x.size))
+    held = np.zeros(0, dtype=bool)
+    if replay.joints is not None:
+        laws = replay.joints.laws
+        held = np.zeros(len(laws.table), dtype=bool)
+        if len(held):
+            g = replay.joints.coordinates(x)[laws.table["function"]]
+            held = laws.table["adapts"] & (laws.stiffness(g, replay.joints.law_multipliers) > 0.0)
+        found.append(joint_conditions(replay.joints, x))
+    C = csr_array(stacked(found, x.size))
+    rows = independent(csr_array(C @ unknowns(replay.workspace.system))) if C.shape[0] else np.zeros(0, dtype=np.int64)
+    return C[rows], rows, held
+
+
+def _by_state(replay: Replay, after: StateAdjoint, forces: Floats, rate: float) -> StateAdjoint:
+    """What forces (n, 3) on the equations, and the velocities at the end, give to the state at the beginning."""
+    plan, x, before = replay.plan, replay.x, replay.kept.before
+    out = StateAdjoint.zeros(len(x))
+    for lag in replay.lags:
+        pushed = lag.friction.by_start(x, forces)
+        out.x += pushed
+        if not replay.kept.at_end:
+            out.x += (lag.derivative(x).T @ forces.ravel()).reshape(-1, 3)
+    if plan.scale is None:
+        return out
+    out.x += after.past_x
+    out.v += after.past_v
+    one, two = plan.past
+    predicted = -replay.workspace.system.masses[:, None] / plan.scale * forces
+    by_x, by_v = predicted - rate * after.v, predicted / rate
+    out.x += one * by_x
+    out.v += one * by_v
+    if two:
+        out.past_x -= two * by_x
+        out.past_v -= two * by_v
+    longest = float(np.abs(forces).max(initial=0.0))
+    if replay.workspace.dampers and longest > 0.0:
+        past = before.memory.positions if two and isinstance(before.memory, History) else None
+        step = _STRAIN_STEP * replay.workspace.diagonal / longest
+        for damper in replay.workspace.dampers:
+            strains = damper.strains
+            along = (strains(x + step * forces) - strains(x - step * forces)) / (2.0 * step)
+            for there, share, target in ((before.positions, one, out.x), (past, -two, out.past_x)):
+                if there is not None:
+                    pull = np.zeros_like(x)
+                    damper.damping(StrainRate(rate, strains(there) - along)).add_gradient(there, pull)
+                    target -= share * pull
+    return out

@@ -1,0 +1,245 @@
+"""The derivative of a loss over a whole simulation by parameters of its scene, by the adjoint of its converged steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError, SolverError
+from supple.gradients.adjoint import StateAdjoint, StepAdjoint, step_adjoint
+from supple.gradients.kept import Kept, Replay
+from supple.gradients.misfit import Loss, Misfit, OwnLoss, Seeds
+from supple.gradients.refusals import refuse
+from supple.model.state import State
+from supple.model.system import System, initial_state
+from supple.results.frame import Frame
+from supple.scene.scene import Scene
+from supple.simulate import check_timing, frames_from, prepared
+from supple.solvers.implicit.solver import Implicit
+from supple.solvers.implicit.stepping.workspace import Workspace
+
+Floats = NDArray[np.float64]
+
+# Of a parameter: the step of central differences at fixed states. Their error of truncation is about its square, and
+# that of round-off its inverse times 1e-16.
+_STEP = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """A loss and its derivatives.
+
+    Attributes
+    ----------
+    value : of the loss; by_parameters : (q,)
+    start_positions, start_velocities : by name of the body, (n, 3) by where and how fast its vertices start [1/m], [s/m]
+    """
+
+    value: float
+    by_parameters: Floats
+    start_positions: dict[str, Floats]
+    start_velocities: dict[str, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """Derivatives along directions: of the gradient, and of central differences of whole runs.
+
+    Attributes
+    ----------
+    directions : (d, q); gradient, differences : (d,); relative : their largest difference, over the largest of them
+    ok : whether that is at most 1e-4
+    """
+
+    directions: Floats
+    gradient: Floats
+    differences: Floats
+
+    @property
+    def relative(self) -> float:
+        largest = float(np.abs(self.differences).max(initial=0.0))
+        return float(np.abs(self.gradient - self.differences).max(initial=0.0)) / max(largest, np.finfo(float).tiny)
+
+    @property
+    def ok(self) -> bool:
+        return self.relative <= 1e-4
+
+    def __str__(self) -> str:
+        rows = zip(self.gradient, self.differences, strict=True)
+        lines = [f"direction {k + 1}: gradient {a:.9g}, differences {b:.9g}" for k, (a, b) in enumerate(rows)]
+        verdict = "agree" if self.ok else "do not agree"
+        return "\n".join([*lines, f"they {verdict}: relative difference {self.relative:.2g}"])
+
+
+class Sensitivity:
+    """A loss over a simulation with `Implicit`, as a function of parameters, with its gradient.
+
+    Parameters
+    ----------
+    scene_of : parameters (q,) -> Scene. All that depends on them is differentiated: moduli, densities, friction, loads,
+        laws over time, rest shapes, starts. The meshes have the same vertices and tets for all parameters.
+    loss : a `Misfit`, or a function: frame -> None, or the loss's share of that frame and its derivatives by
+        `frame.positions`, (n, 3) by name of the body; or several of both, which are added.
+    solver : an `Implicit`. Its `tolerance` limits what the gradient is worth: it is that of the exact minimum of each step.
+    dt, steps : as of `simulate`.
+    scales : (q,) sizes of the parameters, whose 1e-5 is the step of differences at fixed states; None: the parameters,
+        and 1 where one is zero.
+
+    Raises
+    ------
+    SceneError, SolverError : as `simulate`; and where the solver or the scene has what is not differentiated.
+    """
+
+    def __init__(
+        self,
+        scene_of: Callable[[Floats], Scene],
+        loss: Misfit | OwnLoss | Sequence[Misfit | OwnLoss],
+        solver: Implicit,
+        dt: float,
+        steps: int,
+        *,
+        scales: ArrayLike | None = None,
+    ) -> None:
+        if not isinstance(solver, Implicit):
+            raise SolverError(
+                f"Sensitivity: {type(solver).__name__} has no equations that hold at the end of a step; give Implicit(...)"
+            )
+        self.dt, self.steps = check_timing("Sensitivity", dt, steps)
+        self.scene_of, self.loss, self.solver = scene_of, Loss.of(loss), solver
+        self.scales = None if scales is None else np.asarray(scales, dtype=np.float64)
+        for misfit in self.loss.misfits:
+            misfit.frames(self.steps)
+
+    def value(self, p: ArrayLike) -> float:
+        """The loss at parameters (q,)."""
+        first, workspace = self._begun(_vector(p))
+        return sum(self.loss.at(frame, self.steps)[0] for frame in self._frames(first, workspace))
+
+    def residuals(self, p: ArrayLike) -> Floats:
+        """(r,) of all misfits, frame by frame; the loss is the sum of their squares."""
+        first, workspace = self._begun(_vector(p))
+        found = [np.zeros(0)]
+        for frame in self._frames(first, workspace):
+            found += [residuals.ravel() for _, residuals in self.loss.residuals(frame, self.steps)]
+        return np.concatenate(found)
+
+    def value_and_gradient(self, p: ArrayLike) -> tuple[float, Floats]:
+        """The loss at parameters (q,), and its derivatives (q,)."""
+        found = self.gradient(p)
+        return found.value, found.by_parameters
+
+    def gradient(self, p: ArrayLike) -> Gradient:
+        """The loss at parameters (q,) and all its derivatives."""
+        p = _vector(p)
+        first, workspace = self._begun(p)
+        workspace.tape = []
+        total, kept, seeds = 0.0, [], []
+        for frame in self._frames(first, workspace):
+            value, at_frame = self.loss.at(frame, self.steps)
+            total += value
+            kept.append([Kept.of(taken, k == 0) for k, taken in enumerate(workspace.tape)])
+            seeds.append(at_frame)
+            workspace.tape.clear()
+        workspace.tape = None
+        adjoints, begin = _backwards(kept, seeds, workspace, len(first.state.positions))
+        steps = [(one, adjoint) for some, own in zip(kept, adjoints, strict=True) for one, adjoint in zip(some, own, strict=True)]
+        system = first.system
+        starts = {part.name: begin.x[part.vertices] for part in system.bodies}
+        moving = {part.name: begin.v[part.vertices] for part in system.bodies}
+        by_parameters = np.array([self._derivative(p, k, steps, begin, system) for k in range(len(p))])
+        return Gradient(total, by_parameters, starts, moving)
+
+    def check(self, p: ArrayLike, directions: int = 2, *, step: float = 1e-4, seed: int = 0) -> Check:
+        """Compare with central differences of whole runs along random directions.
+
+        Parameters
+        ----------
+        step : of the differences, as a share of the parameters or their `scales`. The solver's `tolerance` has to be far
+            below what it changes.
+        """
+        p = _vector(p)
+        gradient = self.value_and_gradient(p)[1]
+        ways = np.random.default_rng(seed).standard_normal((directions, len(p))) * self._sizes(p)
+        if directions == 1 and len(p) == 1:
+            ways = self._sizes(p)[None]
+        differences = [(self.value(p + step * way) - self.value(p - step * way)) / (2.0 * step) for way in ways]
+        return Check(ways, ways @ gradient, np.array(differences))
+
+    def _sizes(self, p: Floats) -> Floats:
+        return np.where(p == 0.0, 1.0, np.abs(p)) if self.scales is None else np.broadcast_to(self.scales, p.shape)
+
+    def _begun(self, p: Floats) -> tuple[Frame, Workspace]:
+        scene = self.scene_of(p)
+        if not isinstance(scene, Scene):
+            raise SceneError(f"Sensitivity: scene_of gives a {type(scene).__name__}; give a Scene")
+        first, workspace = prepared(scene, initial_state(scene), self.solver)
+        refuse(first.system, workspace, self.solver)
+        return first, workspace
+
+    def _frames(self, first: Frame, workspace: Workspace) -> Any:
+        for frame in frames_from(first, self.dt, self.steps, workspace, None, [], True):
+            if frame.system is not first.system:
+                raise SolverError(f"gradient: stitches break in frame {frame.index}; what breaks has no derivative")
+            yield frame
+
+    def _derivative(
+        self, p: Floats, k: int, steps: list[tuple[Kept, StepAdjoint]], begin: StateAdjoint, system: System
+    ) -> float:
+        """By parameter k, at fixed states: no step is taken."""
+        e = _STEP * float(self._sizes(p)[k])
+        sides = []
+        for sign in (1.0, -1.0):
+            there = p.copy()
+            there[k] += sign * e
+            first, workspace = self._begun(there)
+            _same_shape(system, first.system, k)
+            values = [adjoint.value(Replay.of(one, workspace)) for one, adjoint in steps]
+            sides.append(np.array([*values, _start_value(begin, first.state)]))
+        return float((sides[0] - sides[1]).sum() / (2.0 * e))
+
+
+def _backwards(
+    kept: list[list[Kept]], seeds: list[Seeds], workspace: Workspace, n: int
+) -> tuple[list[list[StepAdjoint]], StateAdjoint]:
+    """The adjoints of all substeps, and of the state at the start."""
+    at, found = StateAdjoint.zeros(n), []
+    stitched = workspace.system.stitching.rigid
+    for some, given in zip(reversed(kept), reversed(seeds), strict=True):
+        at.x += given.x
+        at.v += given.v
+        whole = len(some[-1].x)
+        at, own, pins = at.with_vertices(whole), [], np.zeros((whole, 3))
+        pins[:n] = given.pins
+        for one in reversed(some):
+            adjoint, at = step_adjoint(Replay.of(one, workspace), at, pins)
+            own.append(adjoint)
+            pins = np.zeros_like(pins)
+        if len(stitched):
+            for values in (at.x, at.v):
+                stitched.add_forces(values[n : n + len(stitched)], values)
+        past = at.past_x, at.past_v
+        at = at.with_vertices(n)
+        at.past_x, at.past_v = past
+        found.append(own[::-1])
+    return found[::-1], at
+
+
+def _start_value(begin: StateAdjoint, start: State) -> float:
+    n = len(start.positions)
+    return float(np.einsum("ij,ij->", begin.x[:n], start.positions) + np.einsum("ij,ij->", begin.v[:n], start.velocities))
+
+
+def _same_shape(system: System, other: System, k: int) -> None:
+    if not np.array_equal(system.tets, other.tets):
+        raise SceneError(f"Sensitivity: parameter {k} changes the meshes of the scene; keep their vertices and tets")
+
+
+def _vector(p: ArrayLike) -> Floats:
+    values = np.atleast_1d(np.asarray(p, dtype=np.float64)).copy()
+    if values.ndim != 1 or not np.isfinite(values).all():
+        raise SceneError("Sensitivity: give the parameters as a vector of finite numbers")
+    return values
