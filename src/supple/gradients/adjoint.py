@@ -25,6 +25,8 @@ from scipy.sparse import block_array, csr_array, eye_array
 from scipy.sparse.linalg import splu
 
 from supple.errors import SolverError
+from supple.gradients.begun import add_by_joints, add_by_loads
+from supple.gradients.flow import add_by_end, by_begin
 from supple.gradients.kept import Replay
 from supple.model.loads.actuators.laws import Held
 from supple.solvers.implicit.energies.damping import StrainRate
@@ -48,21 +50,24 @@ _STRAIN_STEP = 1e-4
 
 @dataclass(eq=False)
 class StateAdjoint:
-    """Derivatives of a loss by a state, (n, 3) each: by its positions and velocities, and by those that BDF2 remembers."""
+    """Derivatives of a loss by a state, (n, 3) each: by its positions and velocities, and by those that BDF2 remembers;
+    and by internal variables (k, 11)."""
 
     x: Floats
     v: Floats
     past_x: Floats
     past_v: Floats
+    internal: Floats
 
     @classmethod
-    def zeros(cls, n: int) -> StateAdjoint:
-        return cls(*(np.zeros((n, 3)) for _ in range(4)))
+    def zeros(cls, n: int, internal: int) -> StateAdjoint:
+        return cls(*(np.zeros((n, 3)) for _ in range(4)), np.zeros((internal, 11)))
 
     def with_vertices(self, n: int) -> StateAdjoint:
         """With n vertices: further ones have zeros."""
         parts = (self.x, self.v, self.past_x, self.past_v)
-        return StateAdjoint(*(np.concatenate([part[:n], np.zeros((max(0, n - len(part)), 3))]) for part in parts))
+        longer = (np.concatenate([part[:n], np.zeros((max(0, n - len(part)), 3))]) for part in parts)
+        return StateAdjoint(*longer, self.internal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +79,16 @@ class StepAdjoint:
     forces : (n, 3) l
     multipliers : (c,) u, of the conditions `rows` among all; held : (l,) which laws of joints are conditions
     end : (n, 3) dL/dx; begin : (n, 3) derivative by the positions where it begins
+    internal : (k, 11) by the internal variables at the end
     """
 
     forces: Floats
     multipliers: Floats
     rows: NDArray[np.int64]
-    held: NDArray[np.bool_]
+    held: NDArray[np.int64]
     end: Floats
     begin: Floats
+    internal: Floats
 
     def value(self, replay: Replay) -> float:
         """A function of the scene alone, whose derivative by the parameters is that of the loss in this substep."""
@@ -90,6 +97,9 @@ class StepAdjoint:
         total = np.einsum("ij,ij->", forces, replay.gradient) + np.einsum("ij,ij->", self.end, replay.x)
         if len(self.rows):
             total += self.multipliers @ replay.conditions(self.held)[self.rows]
+        if len(self.internal):
+            begun = replay.kept.before.internal
+            total += np.einsum("ij,ij->", self.internal, replay.posed.grown.flowed(replay.x, begun, replay.kept.h))
         if replay.kept.first:
             # Obstacles' vertices, and points of rigid bodies that something is stitched to, are placed at each step.
             begun = replay.kept.before
@@ -118,8 +128,10 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     by_end = after.x.copy()
     rate = 0.0 if plan.scale is None else 1.0 / float(np.sqrt(plan.scale))
     by_end += rate * after.v
+    if len(after.internal):
+        add_by_end(replay, after.internal, by_end)
     K = _hessian(replay)
-    C, rows, held = _conditions(replay)
+    C, rows, held, count = _conditions(replay)
     T = unknowns(replay.workspace.system)
     right = by_end + (K.T @ seeds.ravel()).reshape(n, 3)
     G = _low_rank(replay, n)
@@ -130,7 +142,14 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     forces += seeds
     welding.follow(forces)
     begin = _by_state(replay, after, forces, rate)
-    return StepAdjoint(forces, multipliers, rows, held, by_end, begin.x), begin
+    if len(after.internal):
+        begin.internal = by_begin(replay, forces, after.internal)
+    add_by_loads(replay, forces, begin.x)
+    of_conditions = np.zeros(count)
+    of_conditions[rows] = multipliers
+    add_by_joints(replay, forces, of_conditions, held, begin.x)
+    end = after.x + rate * after.v
+    return StepAdjoint(forces, multipliers, rows, held, end, begin.x, after.internal), begin
 
 
 def _solved(K: Any, C: Any, G: Any, right: Floats, of_conditions: Floats) -> tuple[Floats, Floats]:
@@ -167,31 +186,33 @@ def _low_rank(replay: Replay, n: int) -> Any:
     return csr_array(block_array([[csr_array((3 * n, 0)), *(column(p.vertices, p.vector, 3 * n) for p in parts)]]))
 
 
-def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.bool_]]:
-    """C (c, 3 n) of independent conditions, which ones of `Replay.conditions` they are, and which laws are among them."""
+def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.int64], int]:
+    """C (c, 3 n) of independent conditions, which ones of `Replay.conditions` they are, which laws are among them, and the
+    number of all."""
     x, found = replay.x, []
     for each in replay.posed.actuators:
         if isinstance(each.law, Held):
             own = each.coordinate.vertices
             gradient = each.coordinate.gradient(x[own])
             found.append(conditions_of(np.zeros(len(own), dtype=np.int64), own, gradient, 1, x.size))
-    held = np.zeros(0, dtype=bool)
+    held = np.zeros(0, dtype=np.int64)
     if replay.joints is not None:
         laws = replay.joints.laws
-        held = np.zeros(len(laws.table), dtype=bool)
-        if len(held):
+        if len(laws.table):
             g = replay.joints.coordinates(x)[laws.table["function"]]
-            held = laws.table["adapts"] & (laws.stiffness(g, replay.joints.law_multipliers) > 0.0)
+            active = laws.table["adapts"] & (laws.stiffness(g, replay.joints.law_multipliers) > 0.0)
+            held = np.flatnonzero(active)
+            held = held[np.unique(laws.table["function"][held], return_index=True)[1]]
         found.append(joint_conditions(replay.joints, x))
     C = csr_array(stacked(found, x.size))
     rows = independent(csr_array(C @ unknowns(replay.workspace.system))) if C.shape[0] else np.zeros(0, dtype=np.int64)
-    return C[rows], rows, held
+    return C[rows], rows, held, C.shape[0]
 
 
 def _by_state(replay: Replay, after: StateAdjoint, forces: Floats, rate: float) -> StateAdjoint:
     """What forces (n, 3) on the equations, and the velocities at the end, give to the state at the beginning."""
     plan, x, before = replay.plan, replay.x, replay.kept.before
-    out = StateAdjoint.zeros(len(x))
+    out = StateAdjoint.zeros(len(x), 0)
     for lag in replay.lags:
         pushed = lag.friction.by_start(x, forces)
         out.x += pushed

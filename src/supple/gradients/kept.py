@@ -117,7 +117,9 @@ class Replay:
         joints = None
         if posed.joints is not None and kept.multipliers is not None:
             own, laws = kept.multipliers
-            joints = replace(posed.joints.potential, multipliers=own, law_multipliers=laws)
+            begun = posed.joints.potential
+            laws = np.where(begun.laws.table["adapts"], laws, begun.law_multipliers)
+            joints = replace(begun, multipliers=own, law_multipliers=laws)
             terms.append(joints)
         frictions, lags = (), ()
         model = workspace.contact
@@ -140,10 +142,10 @@ class Replay:
         """(n, 3) g of all vertices, those of pins and welds included [N]."""
         return self.objective.gradient(self.x)
 
-    def conditions(self, held: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def conditions(self, held: NDArray[np.int64]) -> NDArray[np.float64]:
         """The values that are zero at the end, of actuators with a given coordinate and of joints.
 
-        held : (l,) the laws of joints that are conditions
+        held : (l,) numbers of the laws of joints that are conditions
         """
         values = [
             np.array([each.coordinate.value(self.x[each.coordinate.vertices]) - each.law.target])

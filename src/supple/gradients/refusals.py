@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from supple.errors import SolverError
 from supple.model.loads.applied import DragLoad
-from supple.model.loads.pressure import FollowerPressure
 from supple.model.system import System
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.implicit.stepping.integrators import BDF2, BackwardEuler, Static, integrator_of
-from supple.solvers.implicit.stepping.workspace import Workspace
 
 
-def refuse(system: System, workspace: Workspace, solver: Implicit) -> None:
+def refuse(system: System, solver: Implicit) -> None:
     """Raise `SolverError` for a scene or solver whose gradient would not be that of its run."""
     method = integrator_of(solver.integrator)
     if not isinstance(method, BackwardEuler | BDF2 | Static):
@@ -22,15 +20,11 @@ def refuse(system: System, workspace: Workspace, solver: Implicit) -> None:
         raise SolverError(
             "gradient: linearizations do not end where forces are balanced; give Implicit more max_iterations"
         )
-    if system.laws.material.flowing_laws:
-        raise SolverError("gradient: materials that flow are not differentiated")
+    if any(tets.points > 1 for tets, _ in system.laws.material.flowing_laws):
+        raise SolverError("gradient: materials that flow are not differentiated in quadratic tets; use linear ones")
     for actuator in system.actuators:
         if actuator.friction > 0.0:
             raise SolverError("gradient: cables with friction in their eyelets are not differentiated")
-    if workspace.joints is not None:
-        raise SolverError("gradient: joints are not differentiated")
     for load in system.loads:
         if isinstance(load, DragLoad):
             raise SolverError("gradient: wind and drag are not differentiated")
-        if isinstance(load, FollowerPressure):
-            raise SolverError("gradient: a Pressure is not differentiated; model the space behind it as a Cavity")

@@ -145,7 +145,7 @@ class Sensitivity:
             seeds.append(at_frame)
             workspace.tape.clear()
         workspace.tape = None
-        adjoints, begin = _backwards(kept, seeds, workspace, len(first.state.positions))
+        adjoints, begin = _backwards(kept, seeds, workspace, first.state)
         steps = [(one, adjoint) for some, own in zip(kept, adjoints, strict=True) for one, adjoint in zip(some, own, strict=True)]
         system = first.system
         starts = {part.name: begin.x[part.vertices] for part in system.bodies}
@@ -177,7 +177,7 @@ class Sensitivity:
         if not isinstance(scene, Scene):
             raise SceneError(f"Sensitivity: scene_of gives a {type(scene).__name__}; give a Scene")
         first, workspace = prepared(scene, initial_state(scene), self.solver)
-        refuse(first.system, workspace, self.solver)
+        refuse(first.system, self.solver)
         return first, workspace
 
     def _frames(self, first: Frame, workspace: Workspace) -> Any:
@@ -203,10 +203,11 @@ class Sensitivity:
 
 
 def _backwards(
-    kept: list[list[Kept]], seeds: list[Seeds], workspace: Workspace, n: int
+    kept: list[list[Kept]], seeds: list[Seeds], workspace: Workspace, start: State
 ) -> tuple[list[list[StepAdjoint]], StateAdjoint]:
     """The adjoints of all substeps, and of the state at the start."""
-    at, found = StateAdjoint.zeros(n), []
+    n = len(start.positions)
+    at, found = StateAdjoint.zeros(n, len(kept[0][0].before.internal) if kept else 0), []
     stitched = workspace.system.stitching.rigid
     for some, given in zip(reversed(kept), reversed(seeds), strict=True):
         at.x += given.x

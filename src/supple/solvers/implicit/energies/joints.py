@@ -97,6 +97,11 @@ class JointPotential(ContactPotential):
         """(l,) of the laws [N], [N m]; a positive one pushes towards smaller coordinates."""
         return self.laws.efforts(self._law_values(x), self.law_multipliers)
 
+    @staticmethod
+    def add_by_vectors(geometry: JointGeometry, by_vectors: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Add a gradient by the vertices to `out` (n, 3), from one (s, 4, 3) by the vectors of the functions."""
+        _add(geometry, geometry.arguments, by_vectors, out)
+
     def actions(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The forces (j, 3) [N] on the first bodies, and their torques (j, 3) about the joints' points [N m]."""
         geometry = self.geometry
