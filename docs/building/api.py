@@ -17,7 +17,7 @@ API = (
     ("loads", "Forces and loads", ("scene.loads", "scene.forces", "scene.inputs", "scene.sensors")),
     ("materials", "Materials", ("materials",)),
     ("meshes", "Meshes", ("mesh",)),
-    ("simulation", "Solvers and simulation", ("simulate", "model", "solvers", "results.readings")),
+    ("simulation", "Solvers and simulation", ("simulate", "model", "solvers", "results.readings", "gradients")),
     ("recordings", "Recordings, checks and exports", ("results",)),
     ("runs", "Scene files and runs", ("app.scene_file", "app.runs")),
     ("studies", "Studies", ("app.studies",)),

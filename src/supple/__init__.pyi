@@ -15,6 +15,8 @@ from .errors import SolverError as SolverError
 from .errors import StudyError as StudyError
 from .errors import SuppleError as SuppleError
 from .errors import SuppleWarning as SuppleWarning
+from .gradients.misfit import Misfit as Misfit
+from .gradients.sensitivity import Sensitivity as Sensitivity
 from .materials.elastic import ARAP as ARAP
 from .materials.elastic import EdgesAndVolume as EdgesAndVolume
 from .materials.elastic import FixedCorotated as FixedCorotated

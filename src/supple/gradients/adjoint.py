@@ -40,12 +40,15 @@ from supple.solvers.implicit.natural_modes import (
     unknowns,
 )
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
+from supple.solvers.implicit.newton.minimize import free_norm
 from supple.solvers.implicit.stepping.integrators import History
 
 Floats = NDArray[np.float64]
 
 # Of the extent of the bodies: the step of a difference of strains, which are quadratic but for those of springs.
 _STRAIN_STEP = 1e-4
+# Of contact's forces: what friction of the end may change. The relative error of a gradient is about this.
+_LAGGED = 1e-3
 
 
 @dataclass(eq=False)
@@ -61,13 +64,14 @@ class StateAdjoint:
 
     @classmethod
     def zeros(cls, n: int, internal: int) -> StateAdjoint:
-        return cls(*(np.zeros((n, 3)) for _ in range(4)), np.zeros((internal, 11)))
+        x, v, past_x, past_v = np.zeros((4, n, 3))
+        return cls(x, v, past_x, past_v, np.zeros((internal, 11)))
 
     def with_vertices(self, n: int) -> StateAdjoint:
         """With n vertices: further ones have zeros."""
         parts = (self.x, self.v, self.past_x, self.past_v)
-        longer = (np.concatenate([part[:n], np.zeros((max(0, n - len(part)), 3))]) for part in parts)
-        return StateAdjoint(*longer, self.internal)
+        x, v, past_x, past_v = (np.concatenate([one[:n], np.zeros((max(0, n - len(one)), 3))]) for one in parts)
+        return StateAdjoint(x, v, past_x, past_v, self.internal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +125,9 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     ------
     SolverError : where the equations are singular.
     """
-    plan, x, n = replay.plan, replay.x, len(replay.x)
+    plan, n = replay.plan, len(replay.x)
     welding = replay.workspace.system.welding
+    _refuse_lag(replay)
     seeds = seeds.copy()
     welding.follow(seeds)
     by_end = after.x.copy()
@@ -150,6 +155,20 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     add_by_joints(replay, forces, of_conditions, held, begin.x)
     end = after.x + rate * after.v
     return StepAdjoint(forces, multipliers, rows, held, end, begin.x, after.internal), begin
+
+
+def _refuse_lag(replay: Replay) -> None:
+    """Raise `SolverError` where friction has normal forces that are neither those of the beginning nor of the end."""
+    if not (replay.kept.at_end and replay.lags):
+        return
+    tools = replay.workspace.tools
+    left = free_norm(replay.gradient, tools)
+    of_contact = free_norm(replay.objective.contact_gradient(replay.x), tools)
+    if left > _LAGGED * of_contact:
+        raise SolverError(
+            f"gradient: at t = {replay.kept.end:.6g} s friction has normal forces that are {left / of_contact:.1g} of "
+            "contact's away from those of the step's end; give IPCContact(friction_iterations=1), or 20"
+        )
 
 
 def _solved(K: Any, C: Any, G: Any, right: Floats, of_conditions: Floats) -> tuple[Floats, Floats]:
@@ -187,13 +206,13 @@ def _low_rank(replay: Replay, n: int) -> Any:
 
 
 def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.int64], int]:
-    """C (c, 3 n) of independent conditions, which ones of `Replay.conditions` they are, which laws are among them, and the
-    number of all."""
+    """C (c, 3 n) of independent conditions, which ones of `Replay.conditions` they are, which laws are among them,
+    and the number of all."""
     x, found = replay.x, []
-    for each in replay.posed.actuators:
-        if isinstance(each.law, Held):
-            own = each.coordinate.vertices
-            gradient = each.coordinate.gradient(x[own])
+    for actuator in replay.posed.actuators:
+        if isinstance(actuator.law, Held):
+            own = actuator.coordinate.vertices
+            gradient = actuator.coordinate.gradient(x[own])
             found.append(conditions_of(np.zeros(len(own), dtype=np.int64), own, gradient, 1, x.size))
     held = np.zeros(0, dtype=np.int64)
     if replay.joints is not None:
@@ -204,7 +223,7 @@ def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.int6
             held = np.flatnonzero(active)
             held = held[np.unique(laws.table["function"][held], return_index=True)[1]]
         found.append(joint_conditions(replay.joints, x))
-    C = csr_array(stacked(found, x.size))
+    C: Any = csr_array(stacked(found, x.size))
     rows = independent(csr_array(C @ unknowns(replay.workspace.system))) if C.shape[0] else np.zeros(0, dtype=np.int64)
     return C[rows], rows, held, C.shape[0]
 

@@ -24,18 +24,18 @@ def add_by_end(replay: Replay, by_internal: Floats, out: Floats) -> None:
     if laws is None:
         return
     internal, h = replay.kept.before.internal, replay.kept.h
-    for each, flow, rows in laws.flowing:
-        B = np.ascontiguousarray(each.B @ inverse_flow(internal[rows]))
-        F = deformation_gradients(replay.x, each.tets, B)
+    for tets, flow, rows in laws.flowing:
+        B = np.ascontiguousarray(tets.B @ inverse_flow(internal[rows]))
+        F = deformation_gradients(replay.x, tets.tets, B)
 
-        def value(F: Floats, flow=flow, rows=rows, each=each) -> Floats:
+        def value(F: Floats, flow=flow, rows=rows, tets=tets) -> Floats:
             F = np.ascontiguousarray(F.reshape(-1, 3, 3))
-            return (by_internal[rows] * flow.advanced(F, each.parameters, internal[rows], h)).sum(axis=1)
+            return (by_internal[rows] * flow.advanced(F, tets.parameters, internal[rows], h)).sum(axis=1)
 
         by_F = _by_entries(value, F.reshape(-1, 9), 9).reshape(-1, 3, 3)
         forces = np.empty((len(F), 4, 3))
         element_forces(np.ascontiguousarray(by_F), B, np.ones(len(F)), forces)
-        np.add.at(out, each.tets, forces)
+        np.add.at(out, tets.tets, forces)
 
 
 def by_begin(replay: Replay, forces: Floats, by_internal: Floats) -> Floats:
@@ -45,16 +45,16 @@ def by_begin(replay: Replay, forces: Floats, by_internal: Floats) -> Floats:
     out = np.zeros_like(internal)
     if laws is None:
         return out
-    for each, flow, rows in laws.flowing:
+    for tets, flow, rows in laws.flowing:
 
-        def value(z: Floats, flow=flow, rows=rows, each=each) -> Floats:
-            B = np.ascontiguousarray(each.B @ inverse_flow(z))
-            F = deformation_gradients(replay.x, each.tets, B)
-            p = np.ascontiguousarray(flow.step_parameters(each.parameters, z, h))
+        def value(z: Floats, flow=flow, rows=rows, tets=tets) -> Floats:
+            B = np.ascontiguousarray(tets.B @ inverse_flow(z))
+            F = deformation_gradients(replay.x, tets.tets, B)
+            p = np.ascontiguousarray(flow.step_parameters(tets.parameters, z, h))
             P = flow.step_law.models(F, p, False, False)[1]
-            along = deformation_gradients(forces, each.tets, B)
-            total = each.volumes * np.einsum("eij,eij->e", P, along)
-            return total + (by_internal[rows] * flow.advanced(F, each.parameters, z, h)).sum(axis=1)
+            along = deformation_gradients(forces, tets.tets, B)
+            total = tets.volumes * np.einsum("eij,eij->e", P, along)
+            return total + (by_internal[rows] * flow.advanced(F, tets.parameters, z, h)).sum(axis=1)
 
         out[rows] = _by_entries(value, internal[rows], 10)
         out[rows, 10] += by_internal[rows, 10]  # what was dissipated acts on nothing

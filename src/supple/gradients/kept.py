@@ -129,7 +129,7 @@ class Replay:
             barrier = Barrier(model.collisions, ContactStep.stiffened(posed.contact.stiffness, kept.stiffening))
             lag = x if kept.at_end else before.positions
             frictions = tuple(model.frictions(barrier, lag, before.positions, kept.h))
-            lags = tuple(LaggedFriction.of(each, lag, before.positions) for each in frictions)
+            lags = tuple(LaggedFriction.of(one, lag, before.positions) for one in frictions)
             terms += [barrier, *frictions]
         return cls(kept, workspace, posed, x, Objective(terms), joints, frictions, lags)
 
@@ -148,9 +148,9 @@ class Replay:
         held : (l,) numbers of the laws of joints that are conditions
         """
         values = [
-            np.array([each.coordinate.value(self.x[each.coordinate.vertices]) - each.law.target])
-            for each in self.posed.actuators
-            if isinstance(each.law, Held)
+            np.array([one.coordinate.value(self.x[one.coordinate.vertices]) - one.law.target])
+            for one in self.posed.actuators
+            if isinstance(one.law, Held)
         ]
         if self.joints is not None:
             values.append(self.joints.differences(self.x).ravel())

@@ -41,10 +41,11 @@ class Misfit:
     ----------
     quantity : "positions" [m] or "velocities" [m/s] of a body, or the "reaction" of a pin on what it holds [N].
     of : name of the body, or label of the pin as in `frame.report.details.reaction_forces`.
-    target : (k, 3), or (f, k, 3) of every frame; of a reaction (3,) or (f, 3). What is NaN was not measured.
+    target : what was measured, in the unit of the quantity: (k, 3), or (f, k, 3) of every frame; of a reaction (3,) or
+        (f, 3). What is NaN was not measured.
     vertices : (k,) rows of `frame.positions[body]`; None: all.
     frames : (f,) numbers of frames, from 1; None: the last one, or with (f, k, 3) the last f.
-    weight : of a square.
+    weight : factor of a square.
 
     Raises
     ------
@@ -84,8 +85,10 @@ class Misfit:
         """The numbers of the frames, of a run of so many steps."""
         given = list(range(steps + 1 - len(self.target), steps + 1)) if self._given is None else self._given
         if not given or min(given) < 1 or max(given) > steps:
-            raise SceneError(f"{self.label}: the run has frames 1 to {steps}, and this needs {min(given, default=0)} "
-                             f"to {max(given, default=0)}")
+            raise SceneError(
+                f"{self.label}: the run has frames 1 to {steps}, and this needs {min(given, default=0)} "
+                f"to {max(given, default=0)}"
+            )
         return given
 
     def residuals(self, frame: Frame, row: int) -> Floats:

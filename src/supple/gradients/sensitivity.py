@@ -1,4 +1,4 @@
-"""The derivative of a loss over a whole simulation by parameters of its scene, by the adjoint of its converged steps."""
+"""The derivatives of a loss over a whole simulation by parameters of its scene: the adjoint of its converged steps."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 # Of a parameter: the step of central differences at fixed states. Their error of truncation is about its square, and
 # that of round-off its inverse times 1e-16.
 _STEP = 1e-5
+# Of a loss: the share that round-off of a whole run may change.
+_ROUNDED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,8 @@ class Gradient:
     Attributes
     ----------
     value : of the loss; by_parameters : (q,)
-    start_positions, start_velocities : by name of the body, (n, 3) by where and how fast its vertices start [1/m], [s/m]
+    start_positions, start_velocities : by name of the body, (n, 3) by where and how fast its vertices start [1/m],
+        [s/m]
     """
 
     value: float
@@ -51,18 +54,19 @@ class Check:
 
     Attributes
     ----------
-    directions : (d, q); gradient, differences : (d,); relative : their largest difference, over the largest of them
-    ok : whether that is at most 1e-4
+    directions : (d, q); gradient, differences : (d,); noise : what round-off in the loss makes of differences
+    relative : their largest difference, over the largest of them; ok : whether that is at most 1e-4
     """
 
     directions: Floats
     gradient: Floats
     differences: Floats
+    noise: float
 
     @property
     def relative(self) -> float:
-        largest = float(np.abs(self.differences).max(initial=0.0))
-        return float(np.abs(self.gradient - self.differences).max(initial=0.0)) / max(largest, np.finfo(float).tiny)
+        largest = max(float(np.abs(self.differences).max(initial=0.0)), self.noise)
+        return float(np.abs(self.gradient - self.differences).max(initial=0.0)) / largest if largest else 0.0
 
     @property
     def ok(self) -> bool:
@@ -84,10 +88,10 @@ class Sensitivity:
         laws over time, rest shapes, starts. The meshes have the same vertices and tets for all parameters.
     loss : a `Misfit`, or a function: frame -> None, or the loss's share of that frame and its derivatives by
         `frame.positions`, (n, 3) by name of the body; or several of both, which are added.
-    solver : an `Implicit`. Its `tolerance` limits what the gradient is worth: it is that of the exact minimum of each step.
-    dt, steps : as of `simulate`.
-    scales : (q,) sizes of the parameters, whose 1e-5 is the step of differences at fixed states; None: the parameters,
-        and 1 where one is zero.
+    solver : an `Implicit`. Its `tolerance` limits what the gradient is worth: it is that of each step's exact minimum.
+    dt, steps : time from frame to frame [s], and their number.
+    scales : (q,) sizes of the parameters, in the unit of each, whose 1e-5 is the step of differences at fixed states;
+        None: the parameters, and 1 where one is zero.
 
     Raises
     ------
@@ -106,7 +110,8 @@ class Sensitivity:
     ) -> None:
         if not isinstance(solver, Implicit):
             raise SolverError(
-                f"Sensitivity: {type(solver).__name__} has no equations that hold at the end of a step; give Implicit(...)"
+                f"Sensitivity: {type(solver).__name__} has no equations that hold at the end of a step; "
+                "give Implicit(...)"
             )
         self.dt, self.steps = check_timing("Sensitivity", dt, steps)
         self.scene_of, self.loss, self.solver = scene_of, Loss.of(loss), solver
@@ -146,7 +151,11 @@ class Sensitivity:
             workspace.tape.clear()
         workspace.tape = None
         adjoints, begin = _backwards(kept, seeds, workspace, first.state)
-        steps = [(one, adjoint) for some, own in zip(kept, adjoints, strict=True) for one, adjoint in zip(some, own, strict=True)]
+        steps = [
+            (one, adjoint)
+            for some, own in zip(kept, adjoints, strict=True)
+            for one, adjoint in zip(some, own, strict=True)
+        ]
         system = first.system
         starts = {part.name: begin.x[part.vertices] for part in system.bodies}
         moving = {part.name: begin.v[part.vertices] for part in system.bodies}
@@ -158,16 +167,16 @@ class Sensitivity:
 
         Parameters
         ----------
-        step : of the differences, as a share of the parameters or their `scales`. The solver's `tolerance` has to be far
-            below what it changes.
+        step : of the differences, as a share of the parameters or their `scales`. The solver's `tolerance` has to be
+            far below what it changes.
         """
         p = _vector(p)
-        gradient = self.value_and_gradient(p)[1]
+        value, gradient = self.value_and_gradient(p)
         ways = np.random.default_rng(seed).standard_normal((directions, len(p))) * self._sizes(p)
         if directions == 1 and len(p) == 1:
             ways = self._sizes(p)[None]
         differences = [(self.value(p + step * way) - self.value(p - step * way)) / (2.0 * step) for way in ways]
-        return Check(ways, ways @ gradient, np.array(differences))
+        return Check(ways, ways @ gradient, np.array(differences), _ROUNDED * abs(value) / step)
 
     def _sizes(self, p: Floats) -> Floats:
         return np.where(p == 0.0, 1.0, np.abs(p)) if self.scales is None else np.broadcast_to(self.scales, p.shape)
@@ -208,7 +217,7 @@ def _backwards(
     """The adjoints of all substeps, and of the state at the start."""
     n = len(start.positions)
     at, found = StateAdjoint.zeros(n, len(kept[0][0].before.internal) if kept else 0), []
-    stitched = workspace.system.stitching.rigid
+    bodies_end = workspace.bodies_end
     for some, given in zip(reversed(kept), reversed(seeds), strict=True):
         at.x += given.x
         at.v += given.v
@@ -219,9 +228,10 @@ def _backwards(
             adjoint, at = step_adjoint(Replay.of(one, workspace), at, pins)
             own.append(adjoint)
             pins = np.zeros_like(pins)
-        if len(stitched):
-            for values in (at.x, at.v):
-                stitched.add_forces(values[n : n + len(stitched)], values)
+        for values in (at.x, at.v):
+            placed = np.zeros_like(values)
+            placed[n:bodies_end] = values[n:bodies_end]  # points of rigid bodies that something is stitched to
+            values += workspace.system.welding.reduced(placed)
         past = at.past_x, at.past_v
         at = at.with_vertices(n)
         at.past_x, at.past_v = past
@@ -231,7 +241,9 @@ def _backwards(
 
 def _start_value(begin: StateAdjoint, start: State) -> float:
     n = len(start.positions)
-    return float(np.einsum("ij,ij->", begin.x[:n], start.positions) + np.einsum("ij,ij->", begin.v[:n], start.velocities))
+    return float(
+        np.einsum("ij,ij->", begin.x[:n], start.positions) + np.einsum("ij,ij->", begin.v[:n], start.velocities)
+    )
 
 
 def _same_shape(system: System, other: System, k: int) -> None:
