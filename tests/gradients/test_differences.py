@@ -75,7 +75,7 @@ def test_friction_with_the_normal_forces_of_the_end():
 
 
 def test_friction_whose_normal_forces_are_neither_is_refused():
-    with pytest.raises(sp.SolverError, match="normal forces of friction"):
+    with pytest.raises(sp.SolverError, match="friction has normal forces"):
         sensitivity(scenes.sliding, 4, implicit("backward_euler", 2)).gradient(np.ones(4))
 
 
