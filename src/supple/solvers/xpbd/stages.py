@@ -1,7 +1,7 @@
 """The stages of a substep, compiled: contact is found at x_n, where nothing crosses, and nothing can cross.
 
 The numbers of steps and equations are those of docs/theory/xpbd.md and docs/theory/contact.md. Which stages are
-compiled depends on whether anything is rigid, and touches.
+compiled depends on whether anything is rigid, and may touch.
 """
 
 from __future__ import annotations
@@ -338,7 +338,7 @@ class Stages(NamedTuple):
 
 @cache
 def stages(rigid: bool, touches: bool) -> Stages:
-    """The stages of a scene: whether there are rigid bodies, and pairs that may touch."""
+    """The stages of a scene: whether there are rigid bodies, and things that may touch."""
     name = f"{'rigid' if rigid else 'soft'}_{'touching' if touches else 'apart'}"
     made: dict[str, Any] = {"TOUCHES": touches}
     inner = {

@@ -202,8 +202,8 @@ class XPBDWorkspace:
         return Touching(pairs, contact.near, contact.chosen, *walls), Solving(*room)
 
     def stages(self) -> Stages:
-        """The compiled stages of the scene, with the pairs of its list at present."""
-        return stages(len(self.rigid) > 0, len(self.contact.lists.pairs) > 0)
+        """The compiled stages of the scene."""
+        return stages(len(self.rigid) > 0, bool(self.contact))
 
     def substep(self, time: float, h: float) -> Substep:
         """The arrays of a substep of h [s] that ends at `time` [s]."""

@@ -50,7 +50,6 @@ class SubstepRunner:
         touching, solving = self.ws.touching()
         self.record = self.record._replace(touching=touching, solving=solving)
         share_touching(self._shared, touching, solving)
-        self._stages = self.ws.stages()
 
     def run(self, k: int) -> bool:
         """Simulate substep k; returns whether all positions are known."""
