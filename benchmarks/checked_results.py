@@ -1,4 +1,4 @@
-"""Four scenes in Newton, MuJoCo flex, PyBullet and Supple, all judged by `supple check`.
+"""Four scenes in Newton, MuJoCo flex, PyBullet, SuperDex and Supple, all judged by `supple check`.
 
 usage: python -m benchmarks.checked_results [FOLDER]     (the results stay in the folder, with `supple check` on each)
 """
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import supple as sp
-from benchmarks.measuring import PEERS_PYTHON, peers_installed, run_json
+from benchmarks.measuring import PEERS_PYTHON, SUPERDEX_PYTHON, peers_installed, run_json
 from benchmarks.publishing import publish
 from benchmarks.table import Table
 from supple.results.check.checker import check_series
@@ -27,7 +27,7 @@ sys.path.insert(0, str(PEERS))
 scenes: Any = import_module("checked_scenes")
 
 
-def ours(solver: sp.Solver) -> Callable[[str, Path], dict[str, str]]:
+def ours(solver: Any) -> Callable[[str, Path], dict[str, str]]:
     """Simulates a scene with a solver, and writes the frames as the other programs do."""
 
     def run(name: str, out: Path) -> dict[str, str]:
@@ -52,9 +52,9 @@ def ours(solver: sp.Solver) -> Callable[[str, Path], dict[str, str]]:
     return run
 
 
-def theirs(script: str, *arguments: str) -> Callable[[str, Path], dict[str, str]]:
+def theirs(script: str, *arguments: str, python: Path = PEERS_PYTHON) -> Callable[[str, Path], dict[str, str]]:
     """Runs a script in the environment of the other programs."""
-    return lambda name, out: run_json(PEERS_PYTHON, PEERS / script, name, *arguments, out)
+    return lambda name, out: run_json(python, PEERS / script, name, *arguments, out)
 
 
 def main(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -64,6 +64,7 @@ def main(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         "Newton VBD": theirs("checked_newton.py", "vbd"),
         "MuJoCo flex": theirs("checked_mujoco.py"),
         "PyBullet": theirs("checked_pybullet.py"),
+        "SuperDex": theirs("checked_superdex.py", python=SUPERDEX_PYTHON),
         "Supple XPBD": ours(sp.XPBD()),
         "Supple Implicit": ours(sp.Implicit()),
     }
@@ -97,8 +98,8 @@ def main(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def run() -> None:
     """Measure, and write the tables of "Check your simulator" and of README.md."""
-    if not peers_installed():
-        sys.exit("the other programs are not installed; run `make bench`, which installs them")
+    if not (peers_installed() and SUPERDEX_PYTHON.exists()):
+        sys.exit("the other programs are not installed; run `make peers`, which installs them")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)

@@ -70,3 +70,25 @@ def refuse(version, why):
     """Says that the program cannot solve such a problem."""
     print(json.dumps({"version": version, "refused": why}))
     raise SystemExit
+
+
+class Relaxation:
+    """Statics by dynamics: velocities are set to zero where the kinetic energy has a maximum.
+
+    (Kinetic damping; Cundall 1976.) It ends where a maximum is a millionth of the largest, or after `limit` seconds of
+    the processor.
+    """
+
+    def __init__(self, limit):
+        self.before, self.largest, self.done, self.why = 0.0, 0.0, False, "equilibrium"
+        self.end = time.process_time() + limit
+
+    def stops(self, kinetic):
+        """Whether velocities must be set to zero, after a step with this kinetic energy."""
+        peak, self.before = kinetic < self.before, kinetic
+        if peak:
+            self.done = self.largest > 0 and kinetic < 1e-6 * self.largest
+            self.largest, self.before = max(self.largest, kinetic), 0.0
+        if time.process_time() > self.end:
+            self.done, self.why = True, "stopped before equilibrium"
+        return peak
