@@ -1,9 +1,6 @@
 """One substep backwards: from the derivatives of a loss by the state at its end to those by the state at its beginning.
 
-The unknowns y of a substep are the vertices that are neither pinned nor welded, x = T y + (pins), and the multipliers m
-of conditions c(x) = 0. Its equations are T^T g(x; s, p) = 0, where g contains the forces C^T m of the conditions. With
-the true Hessian K of the objective, in which nothing is projected, and the derivative of friction by the state that its
-normal forces belong to, the adjoint forces l = T l_y + (seeds at pins) and u solve
+With the equations of `supple.gradients.equations`, the adjoint forces l = T l_y + (seeds at pins) and u solve
 
     [ T^T K T  T^T C^T ]^T [ l_y ]     [ T^T (dL/dx + K^T l_pins) ]
     [ C T      0       ]   [ u   ] = - [ C l_pins                 ]
@@ -17,38 +14,20 @@ Dynamics for Multi-Body Systems with Frictional Contact" (2020).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_array, csr_array, eye_array
-from scipy.sparse.linalg import splu
-
-from supple.errors import SolverError
 from supple.gradients.begun import add_by_joints, add_by_loads
+from supple.gradients.equations import Equations
 from supple.gradients.flow import add_by_end, by_begin
 from supple.gradients.kept import Replay
-from supple.model.loads.actuators.laws import Held
 from supple.solvers.implicit.energies.damping import StrainRate
-from supple.solvers.implicit.natural_modes import (
-    column,
-    conditions_of,
-    hessian_matrix,
-    independent,
-    joint_conditions,
-    stacked,
-    unknowns,
-)
-from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
-from supple.solvers.implicit.newton.minimize import free_norm
 from supple.solvers.implicit.stepping.integrators import History
 
 Floats = NDArray[np.float64]
 
 # Of the extent of the bodies: the step of a difference of strains, which are quadratic but for those of springs.
 _STRAIN_STEP = 1e-4
-# Of contact's forces: what friction of the end may change. The relative error of a gradient is about this.
-_LAGGED = 1e-3
 
 
 @dataclass(eq=False)
@@ -125,9 +104,8 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     ------
     SolverError : where the equations are singular.
     """
-    plan, n = replay.plan, len(replay.x)
+    plan = replay.plan
     welding = replay.workspace.system.welding
-    _refuse_lag(replay)
     seeds = seeds.copy()
     welding.follow(seeds)
     by_end = after.x.copy()
@@ -135,97 +113,21 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     by_end += rate * after.v
     if len(after.internal):
         add_by_end(replay, after.internal, by_end)
-    K = _hessian(replay)
-    C, rows, held, count = _conditions(replay)
-    T = unknowns(replay.workspace.system)
-    right = by_end + (K.T @ seeds.ravel()).reshape(n, 3)
-    G = _low_rank(replay, n)
-    if G.shape[1]:
-        right += (G @ (G.T @ seeds.ravel())).reshape(n, 3)
-    solved, multipliers = _solved(T.T @ K @ T, C @ T, T.T @ G, -(T.T @ right.ravel()), -(C @ seeds.ravel()))
-    forces = (T @ solved).reshape(n, 3)
+    equations = Equations.of(replay)
+    right = by_end + equations.transposed_product(seeds)
+    forces, multipliers = equations.solve_transposed(-right, seeds)
     forces += seeds
     welding.follow(forces)
     begin = _by_state(replay, after, forces, rate)
     if len(after.internal):
         begin.internal = by_begin(replay, forces, after.internal)
     add_by_loads(replay, forces, begin.x)
-    of_conditions = np.zeros(count)
+    rows, held = equations.rows, equations.held
+    of_conditions = np.zeros(equations.count)
     of_conditions[rows] = multipliers
     add_by_joints(replay, forces, of_conditions, held, begin.x)
     end = after.x + rate * after.v
     return StepAdjoint(forces, multipliers, rows, held, end, begin.x, after.internal), begin
-
-
-def _refuse_lag(replay: Replay) -> None:
-    """Raise `SolverError` where friction has normal forces that are neither those of the beginning nor of the end."""
-    if not (replay.kept.at_end and replay.lags):
-        return
-    tools = replay.workspace.tools
-    left = free_norm(replay.gradient, tools)
-    of_contact = free_norm(replay.objective.contact_gradient(replay.x), tools)
-    if left > _LAGGED * of_contact:
-        raise SolverError(
-            f"gradient: at t = {replay.kept.end:.6g} s friction has normal forces that are {left / of_contact:.1g} of "
-            "contact's away from those of the step's end; give IPCContact(friction_iterations=1), or 20"
-        )
-
-
-def _solved(K: Any, C: Any, G: Any, right: Floats, of_conditions: Floats) -> tuple[Floats, Floats]:
-    c, g, size = C.shape[0], G.shape[1], K.shape[0]
-    if size == 0:
-        return np.zeros(0), np.zeros(c)
-    A = K
-    if c + g:
-        A = block_array([[K, C.T, G], [C, None, csr_array((c, g))], [G.T, None, -eye_array(g)]])
-    try:
-        solution = splu(A.tocsc()).solve(np.concatenate([right, of_conditions, np.zeros(g)]), trans="T")
-    except RuntimeError as error:
-        raise SolverError(f"gradient: the equations of a step are singular ({error})") from None
-    if not np.isfinite(solution).all():
-        raise SolverError("gradient: the equations of a step are singular; something is free to move at no cost")
-    return solution[:size], solution[size : size + c]
-
-
-def _hessian(replay: Replay) -> Any:
-    """(3 n, 3 n) the sparse part of dg/dx."""
-    hessian, x = replay.workspace.tools.hessian, replay.x
-    for friction in replay.frictions:
-        friction.settle(x)
-    replay.objective.model(x, hessian, ProjectedTerms.NONE)
-    K = hessian_matrix(hessian, replay.workspace.system.elements, len(x))
-    if replay.kept.at_end:
-        for lag in replay.lags:
-            K = K + lag.derivative(x)
-    return csr_array(K)
-
-
-def _low_rank(replay: Replay, n: int) -> Any:
-    parts = replay.workspace.tools.hessian.low_rank
-    return csr_array(block_array([[csr_array((3 * n, 0)), *(column(p.vertices, p.vector, 3 * n) for p in parts)]]))
-
-
-def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.int64], int]:
-    """C (c, 3 n) of independent conditions, which ones of `Replay.conditions` they are, which laws are among them,
-    and the number of all."""
-    x, found = replay.x, []
-    for actuator in replay.posed.actuators:
-        if isinstance(actuator.law, Held):
-            own = actuator.coordinate.vertices
-            gradient = actuator.coordinate.gradient(x[own])
-            found.append(conditions_of(np.zeros(len(own), dtype=np.int64), own, gradient, 1, x.size))
-    held = np.zeros(0, dtype=np.int64)
-    if replay.joints is not None:
-        laws = replay.joints.laws
-        if len(laws.table):
-            g = replay.joints.coordinates(x)[laws.table["function"]]
-            active = laws.table["adapts"] & (laws.stiffness(g, replay.joints.law_multipliers) > 0.0)
-            held = np.flatnonzero(active)
-            held = held[np.unique(laws.table["function"][held], return_index=True)[1]]
-        found.append(joint_conditions(replay.joints, x))
-    C: Any = csr_array(stacked(found, x.size))
-    rows = independent(csr_array(C @ unknowns(replay.workspace.system))) if C.shape[0] else np.zeros(0, dtype=np.int64)
-    return C[rows], rows, held, C.shape[0]
 
 
 def _by_state(replay: Replay, after: StateAdjoint, forces: Floats, rate: float) -> StateAdjoint:

@@ -41,6 +41,7 @@ class Kept:
     at_end : whether friction has the normal forces of the end, and not those of the beginning
     multipliers : of the joints' differences and laws, or None
     held : multipliers of actuators with a given coordinate
+    slips_from : (n, 3) where friction's displacements begin, None: where the substep does
     """
 
     before: State
@@ -54,6 +55,7 @@ class Kept:
     at_end: bool
     multipliers: tuple[NDArray[np.float64], NDArray[np.float64]] | None
     held: tuple[float, ...]
+    slips_from: NDArray[np.float64] | None = None
 
     @classmethod
     def of(cls, taken: tuple[State, Substep, float], first: bool) -> Kept:
@@ -124,12 +126,16 @@ class Replay:
         frictions, lags = (), ()
         model = workspace.contact
         if model is not None:
-            for there in kept.met:
-                model.collisions.keep_weights(there)
             barrier = Barrier(model.collisions, ContactStep.stiffened(posed.contact.stiffness, kept.stiffening))
             lag = x if kept.at_end else before.positions
-            frictions = tuple(model.frictions(barrier, lag, before.positions, kept.h))
-            lags = tuple(LaggedFriction.of(one, lag, before.positions) for one in frictions)
+            begun = before.positions if kept.slips_from is None else kept.slips_from
+            if not kept.at_end:  # before contacts keep weights
+                frictions = tuple(model.frictions(barrier, lag, begun, kept.h))
+            for there in kept.met:
+                model.collisions.keep_weights(there)
+            if kept.at_end:
+                frictions = tuple(model.frictions(barrier, lag, begun, kept.h))
+            lags = tuple(LaggedFriction.of(one, lag, begun) for one in frictions)
             terms += [barrier, *frictions]
         return cls(kept, workspace, posed, x, Objective(terms), joints, frictions, lags)
 

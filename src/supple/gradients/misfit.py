@@ -107,6 +107,15 @@ class Misfit:
             return
         add_of_body(system, self.of, values, self.vertices, seeds.x if self.quantity == "positions" else seeds.v)
 
+    def tangents(self, system: System, row: int, x: Floats, v: Floats, forces: Floats) -> Floats:
+        """The change of `residuals` with changes (n, 3) of positions, velocities, and forces of pins."""
+        if self.quantity == "reaction":
+            change = forces[system.pins[pin_labels(system).index(self.of)].vertices].sum(axis=0)
+        else:
+            change = system.split(x if self.quantity == "positions" else v)[self.of]
+            change = change if self.vertices is None else change[self.vertices]
+        return np.where(np.isnan(self.target[row]), 0.0, np.sqrt(self.weight) * change)
+
     def _reading(self, frame: Frame) -> Floats:
         if self.quantity == "reaction":
             known = frame.report.details.reaction_forces
@@ -153,19 +162,17 @@ class Loss:
         misfits = tuple(part for part in parts if isinstance(part, Misfit))
         return cls(misfits, tuple(part for part in parts if not isinstance(part, Misfit)))
 
-    def residuals(self, frame: Frame, steps: int) -> list[tuple[Misfit, Floats]]:
-        """Of all misfits that this frame is part of."""
-        found = []
-        for misfit in self.misfits:
-            rows = [k for k, number in enumerate(misfit.frames(steps)) if number == frame.index]
-            found += [(misfit, misfit.residuals(frame, k)) for k in rows]
-        return found
+    def rows(self, frame: Frame, steps: int) -> list[tuple[Misfit, int]]:
+        """The misfits that a frame is part of, and the rows of their targets."""
+        numbers = [(misfit, misfit.frames(steps)) for misfit in self.misfits]
+        return [(misfit, k) for misfit, given in numbers for k, number in enumerate(given) if number == frame.index]
 
     def at(self, frame: Frame, steps: int) -> tuple[float, Seeds]:
         """The share of a frame, and its derivatives."""
         system = frame.system
         seeds, total = Seeds.zeros(len(system.rest_positions)), 0.0
-        for misfit, residuals in self.residuals(frame, steps):
+        for misfit, row in self.rows(frame, steps):
+            residuals = misfit.residuals(frame, row)
             total += float((residuals**2).sum())
             misfit.add_seeds(system, 2.0 * residuals, seeds)
         for loss in self.own:

@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError, SolverError
 from supple.gradients.adjoint import StateAdjoint, StepAdjoint, step_adjoint
+from supple.gradients.equations import Equations
 from supple.gradients.kept import Kept, Replay
 from supple.gradients.misfit import Loss, Misfit, OwnLoss, Seeds
 from supple.gradients.refusals import refuse
+from supple.gradients.tangent import Side, StateTangent, step_tangent
 from supple.model.state import State
 from supple.model.system import System, initial_state
 from supple.results.frame import Frame
@@ -129,8 +131,42 @@ class Sensitivity:
         first, workspace = self._begun(_vector(p))
         found = [np.zeros(0)]
         for frame in self._frames(first, workspace):
-            found += [residuals.ravel() for _, residuals in self.loss.residuals(frame, self.steps)]
+            found += [misfit.residuals(frame, row).ravel() for misfit, row in self.loss.rows(frame, self.steps)]
         return np.concatenate(found)
+
+    def residuals_and_jacobian(self, p: ArrayLike) -> tuple[Floats, Floats]:
+        """(r,) as `residuals`, and their derivatives (r, q), from one run that carries those of its states along.
+
+        For a few parameters and many readings, as least squares have. The gradient of the loss is 2 J^T r.
+        """
+        p = _vector(p)
+        first, workspace = self._begun(p)
+        workspace.tape = []
+        steps = _STEP * self._sizes(p)
+        sides = []
+        for k in range(len(p)):
+            ends = []
+            for sign in (1.0, -1.0):
+                there = p.copy()
+                there[k] += sign * steps[k]
+                ends.append(self._begun(there))
+                _same_shape(first.system, ends[-1][0].system, k)
+            sides.append(Side(float(steps[k]), *(workspace for _, workspace in ends), *(f.state for f, _ in ends)))
+        at = [StateTangent.start(side, first.state) for side in sides]
+        residuals, columns = [np.zeros(0)], [np.zeros((0, len(p)))]
+        for frame in self._frames(first, workspace):
+            for number, taken in enumerate(workspace.tape):
+                replay = Replay.of(Kept.of(taken, number == 0), workspace)
+                equations = Equations.of(replay)
+                at = [step_tangent(replay, equations, side, one) for side, one in zip(sides, at, strict=True)]
+            workspace.tape.clear()
+            system = frame.system
+            at = [one.with_vertices(len(first.state.positions)) for one in at]
+            for misfit, row in self.loss.rows(frame, self.steps):
+                residuals.append(misfit.residuals(frame, row).ravel())
+                changes = [misfit.tangents(system, row, one.x, one.v, one.forces).ravel() for one in at]
+                columns.append(np.stack(changes, axis=1))
+        return np.concatenate(residuals), np.concatenate(columns)
 
     def value_and_gradient(self, p: ArrayLike) -> tuple[float, Floats]:
         """The loss at parameters (q,), and its derivatives (q,)."""

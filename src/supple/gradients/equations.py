@@ -1,0 +1,159 @@
+"""The linearized equations of a substep at its end.
+
+The unknowns y are the vertices that are neither pinned nor welded, x = T y + (pins), and the multipliers m of
+conditions c(x) = 0, of joints and of actuators with a given coordinate. The equations are T^T g(x; s, p) = 0 and c = 0, where g
+contains the forces C^T m. K = dg/dx is the true Hessian of the objective, in which nothing is projected, and the
+derivative of friction by the state that its normal forces belong to, where that is the end: then it is not symmetric.
+Actuators add G G^T, which is kept apart so that the matrix is sparse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_array, csr_array, eye_array
+from scipy.sparse.linalg import splu
+
+from supple.errors import SolverError
+from supple.gradients.kept import Replay
+from supple.model.loads.actuators.laws import Held
+from supple.solvers.implicit.natural_modes import (
+    column,
+    conditions_of,
+    hessian_matrix,
+    independent,
+    joint_conditions,
+    stacked,
+    unknowns,
+)
+from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
+from supple.solvers.implicit.newton.minimize import free_norm
+
+Floats = NDArray[np.float64]
+
+# Of contact's forces: what friction of the end may change. The relative error of a gradient is about this.
+_LAGGED = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """See the module.
+
+    Attributes
+    ----------
+    rows : (c,) which of the conditions are independent, of `count`; held : (l,) which laws of joints are conditions
+    """
+
+    K: Any
+    C: Any
+    G: Any
+    T: Any
+    rows: NDArray[np.int64]
+    held: NDArray[np.int64]
+    count: int
+
+    @classmethod
+    def of(cls, replay: Replay) -> Equations:
+        """Raises `SolverError` where friction is neither that of the beginning nor of the end."""
+        _refuse_lag(replay)
+        K, n = _hessian(replay), len(replay.x)
+        C, rows, held, count = _conditions(replay)
+        return cls(K, C, _low_rank(replay, n), unknowns(replay.workspace.system), rows, held, count)
+
+    def product(self, way: Floats) -> Floats:
+        """(n, 3) dg/dx times a way (n, 3)."""
+        return (self.K @ way.ravel() + self.G @ (self.G.T @ way.ravel())).reshape(-1, 3)
+
+    def transposed_product(self, forces: Floats) -> Floats:
+        """(n, 3) the transpose of dg/dx times forces (n, 3)."""
+        return (self.K.T @ forces.ravel() + self.G @ (self.G.T @ forces.ravel())).reshape(-1, 3)
+
+    def solve(self, right: Floats, of_conditions: Floats) -> tuple[Floats, Floats]:
+        """The way (n, 3) of the unknowns, zero at pins, that changes g by `right` (n, 3) and conditions by (c,); and
+        (n, 3) the change of g by what the multipliers do."""
+        solution, u = self._solved(self.T.T @ right.ravel(), of_conditions, "N"), self.T.shape[1]
+        return (self.T @ solution[:u]).reshape(-1, 3), (self.C.T @ solution[u : u + len(self.rows)]).reshape(-1, 3)
+
+    def solve_transposed(self, right: Floats, seeds: Floats) -> tuple[Floats, Floats]:
+        """The forces (n, 3), zero at pins, and u (c,) for a `right` side (n, 3) and forces at pins (n, 3)."""
+        solution, u = self._solved(self.T.T @ right.ravel(), -(self.C @ seeds.ravel()), "T"), self.T.shape[1]
+        return (self.T @ solution[:u]).reshape(-1, 3), solution[u : u + len(self.rows)]
+
+    def _solved(self, right: Floats, of_conditions: Floats, way: str) -> Floats:
+        whole = np.concatenate([right, of_conditions, np.zeros(self.G.shape[1])])
+        if len(right) == 0:
+            return np.zeros_like(whole)
+        solution = self._factors.solve(whole, trans=way)
+        if not np.isfinite(solution).all():
+            raise SolverError("gradient: the equations of a step are singular; something is free to move at no cost")
+        return solution
+
+    @cached_property
+    def _factors(self) -> Any:
+        K, C, G = self.T.T @ self.K @ self.T, self.C @ self.T, self.T.T @ self.G
+        c, g = C.shape[0], G.shape[1]
+        if c + g:
+            K = block_array([[K, C.T, G], [C, None, csr_array((c, g))], [G.T, None, -eye_array(g)]])
+        try:
+            return splu(K.tocsc())
+        except RuntimeError as error:
+            raise SolverError(f"gradient: the equations of a step are singular ({error})") from None
+
+
+def _refuse_lag(replay: Replay) -> None:
+    """Raise `SolverError` where friction has normal forces that are neither those of the beginning nor of the end."""
+    if not (replay.kept.at_end and replay.lags):
+        return
+    tools = replay.workspace.tools
+    left = free_norm(replay.gradient, tools)
+    of_contact = free_norm(replay.objective.contact_gradient(replay.x), tools)
+    if left > _LAGGED * of_contact:
+        raise SolverError(
+            f"gradient: at t = {replay.kept.end:.6g} s friction has normal forces that are {left / of_contact:.1g} of "
+            "contact's away from those of the step's end; give IPCContact(friction_iterations=1), or 20"
+        )
+
+
+def _hessian(replay: Replay) -> Any:
+    """(3 n, 3 n) the sparse part of dg/dx."""
+    hessian, x = replay.workspace.tools.hessian, replay.x
+    for friction in replay.frictions:
+        friction.settle(x)
+    replay.objective.model(x, hessian, ProjectedTerms.NONE)
+    K = hessian_matrix(hessian, replay.workspace.system.elements, len(x))
+    if replay.kept.at_end:
+        for lag in replay.lags:
+            K = K + lag.derivative(x)
+    return csr_array(K)
+
+
+def _low_rank(replay: Replay, n: int) -> Any:
+    parts = replay.workspace.tools.hessian.low_rank
+    return csr_array(block_array([[csr_array((3 * n, 0)), *(column(p.vertices, p.vector, 3 * n) for p in parts)]]))
+
+
+def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.int64], int]:
+    """C (c, 3 n) of independent conditions, which ones of `Replay.conditions` they are, which laws are among them,
+    and the number of all."""
+    x, found = replay.x, []
+    for actuator in replay.posed.actuators:
+        if isinstance(actuator.law, Held):
+            own = actuator.coordinate.vertices
+            gradient = actuator.coordinate.gradient(x[own])
+            found.append(conditions_of(np.zeros(len(own), dtype=np.int64), own, gradient, 1, x.size))
+    held = np.zeros(0, dtype=np.int64)
+    if replay.joints is not None:
+        laws = replay.joints.laws
+        if len(laws.table):
+            g = replay.joints.coordinates(x)[laws.table["function"]]
+            active = laws.table["adapts"] & (laws.stiffness(g, replay.joints.law_multipliers) > 0.0)
+            held = np.flatnonzero(active)
+            held = held[np.unique(laws.table["function"][held], return_index=True)[1]]
+        found.append(joint_conditions(replay.joints, x))
+    C: Any = csr_array(stacked(found, x.size))
+    rows = independent(csr_array(C @ unknowns(replay.workspace.system))) if C.shape[0] else np.zeros(0, dtype=np.int64)
+    return C[rows], rows, held, C.shape[0]
