@@ -15,6 +15,7 @@ from .errors import SolverError as SolverError
 from .errors import StudyError as StudyError
 from .errors import SuppleError as SuppleError
 from .errors import SuppleWarning as SuppleWarning
+from .gradients.fit import fit_simulation as fit_simulation
 from .gradients.misfit import Misfit as Misfit
 from .gradients.sensitivity import Sensitivity as Sensitivity
 from .materials.elastic import ARAP as ARAP

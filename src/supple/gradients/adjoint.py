@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from supple.gradients.begun import add_by_joints, add_by_loads
 from supple.gradients.equations import Equations
 from supple.gradients.flow import add_by_end, by_begin

@@ -1,9 +1,10 @@
 """The linearized equations of a substep at its end.
 
 The unknowns y are the vertices that are neither pinned nor welded, x = T y + (pins), and the multipliers m of
-conditions c(x) = 0, of joints and of actuators with a given coordinate. The equations are T^T g(x; s, p) = 0 and c = 0, where g
-contains the forces C^T m. K = dg/dx is the true Hessian of the objective, in which nothing is projected, and the
-derivative of friction by the state that its normal forces belong to, where that is the end: then it is not symmetric.
+conditions c(x) = 0, of joints and of actuators with a given coordinate. The equations are T^T g(x; s, p) = 0 and c = 0,
+where g contains the forces C^T m. K = dg/dx is the true Hessian of the objective, in which nothing is projected, with
+the derivative of friction by the state that its normal forces belong to, where that is the end: it is not symmetric
+then.
 Actuators add G G^T, which is kept apart so that the matrix is sparse.
 """
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from supple.gradients.lagged import LaggedFriction
 from supple.model.loads.actuators.laws import Held
 from supple.model.state import State
+from supple.numerics.inner_product import norm
 from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.energies.joints import JointPotential
@@ -147,6 +148,20 @@ class Replay:
     def gradient(self) -> NDArray[np.float64]:
         """(n, 3) g of all vertices, those of pins and welds included [N]."""
         return self.objective.gradient(self.x)
+
+    def area_change(self) -> float:
+        """How much contact's forces (n, 3) would change with the areas that contacts have at the end, as a share.
+
+        Afterwards, contacts have those.
+        """
+        model = self.workspace.contact
+        barriers = [term for term in self.objective.terms if isinstance(term, Barrier)]
+        if model is None or not len(model.collisions.at(self.x).kinds):
+            return 0.0
+        kept = Objective(barriers).gradient(self.x)
+        model.collisions.forget_weights()
+        change = norm(Objective(barriers).gradient(self.x) - kept)
+        return change / max(norm(kept), np.finfo(float).tiny)
 
     def conditions(self, held: NDArray[np.int64]) -> NDArray[np.float64]:
         """The values that are zero at the end, of actuators with a given coordinate and of joints.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.errors import SceneError, SolverError
+from supple.errors import SceneError, SolverError, SuppleWarning
 from supple.gradients.adjoint import StateAdjoint, StepAdjoint, step_adjoint
 from supple.gradients.equations import Equations
 from supple.gradients.kept import Kept, Replay
@@ -29,6 +30,8 @@ Floats = NDArray[np.float64]
 # Of a parameter: the step of central differences at fixed states. Their error of truncation is about its square, and
 # that of round-off its inverse times 1e-16.
 _STEP = 1e-5
+# Of contact's forces: a larger change by the areas of contacts is warned of.
+_AREAS = 1e-3
 # Of a loss: the share that round-off of a whole run may change.
 _ROUNDED = 1e-12
 
@@ -141,8 +144,8 @@ class Sensitivity:
         """
         p = _vector(p)
         first, workspace = self._begun(p)
-        workspace.tape = []
-        steps = _STEP * self._sizes(p)
+        workspace.tape = tape = []
+        steps = _STEP * self.sizes(p)
         sides = []
         for k in range(len(p)):
             ends = []
@@ -155,11 +158,11 @@ class Sensitivity:
         at = [StateTangent.start(side, first.state) for side in sides]
         residuals, columns = [np.zeros(0)], [np.zeros((0, len(p)))]
         for frame in self._frames(first, workspace):
-            for number, taken in enumerate(workspace.tape):
+            for number, taken in enumerate(tape):
                 replay = Replay.of(Kept.of(taken, number == 0), workspace)
                 equations = Equations.of(replay)
                 at = [step_tangent(replay, equations, side, one) for side, one in zip(sides, at, strict=True)]
-            workspace.tape.clear()
+            tape.clear()
             system = frame.system
             at = [one.with_vertices(len(first.state.positions)) for one in at]
             for misfit, row in self.loss.rows(frame, self.steps):
@@ -167,6 +170,20 @@ class Sensitivity:
                 changes = [misfit.tangents(system, row, one.x, one.v, one.forces).ravel() for one in at]
                 columns.append(np.stack(changes, axis=1))
         return np.concatenate(residuals), np.concatenate(columns)
+
+    def readings(self, p: ArrayLike) -> tuple[dict[str, Floats], dict[str, Floats]]:
+        """What was measured, and what the run at parameters (q,) gives, (k,) by label of the misfit."""
+        first, workspace = self._begun(_vector(p))
+        seen: dict[str, list[Floats]] = {misfit.label: [] for misfit in self.loss.misfits}
+        run: dict[str, list[Floats]] = {label: [] for label in seen}
+        for frame in self._frames(first, workspace):
+            for misfit, row in self.loss.rows(frame, self.steps):
+                target = misfit.target[row]
+                known = np.isfinite(target)
+                seen[misfit.label].append(target[known])
+                run[misfit.label].append((target + misfit.residuals(frame, row) / np.sqrt(misfit.weight))[known])
+        of_seen, of_run = ({label: np.concatenate(parts) for label, parts in one.items()} for one in (seen, run))
+        return of_seen, of_run
 
     def value_and_gradient(self, p: ArrayLike) -> tuple[float, Floats]:
         """The loss at parameters (q,), and its derivatives (q,)."""
@@ -177,14 +194,14 @@ class Sensitivity:
         """The loss at parameters (q,) and all its derivatives."""
         p = _vector(p)
         first, workspace = self._begun(p)
-        workspace.tape = []
+        workspace.tape = tape = []
         total, kept, seeds = 0.0, [], []
         for frame in self._frames(first, workspace):
             value, at_frame = self.loss.at(frame, self.steps)
             total += value
-            kept.append([Kept.of(taken, k == 0) for k, taken in enumerate(workspace.tape)])
+            kept.append([Kept.of(taken, k == 0) for k, taken in enumerate(tape)])
             seeds.append(at_frame)
-            workspace.tape.clear()
+            tape.clear()
         workspace.tape = None
         adjoints, begin = _backwards(kept, seeds, workspace, first.state)
         steps = [
@@ -208,13 +225,14 @@ class Sensitivity:
         """
         p = _vector(p)
         value, gradient = self.value_and_gradient(p)
-        ways = np.random.default_rng(seed).standard_normal((directions, len(p))) * self._sizes(p)
+        ways = np.random.default_rng(seed).standard_normal((directions, len(p))) * self.sizes(p)
         if directions == 1 and len(p) == 1:
-            ways = self._sizes(p)[None]
+            ways = self.sizes(p)[None]
         differences = [(self.value(p + step * way) - self.value(p - step * way)) / (2.0 * step) for way in ways]
         return Check(ways, ways @ gradient, np.array(differences), _ROUNDED * abs(value) / step)
 
-    def _sizes(self, p: Floats) -> Floats:
+    def sizes(self, p: Floats) -> Floats:
+        """(q,) the scales of parameters, in the unit of each."""
         return np.where(p == 0.0, 1.0, np.abs(p)) if self.scales is None else np.broadcast_to(self.scales, p.shape)
 
     def _begun(self, p: Floats) -> tuple[Frame, Workspace]:
@@ -235,7 +253,7 @@ class Sensitivity:
         self, p: Floats, k: int, steps: list[tuple[Kept, StepAdjoint]], begin: StateAdjoint, system: System
     ) -> float:
         """By parameter k, at fixed states: no step is taken."""
-        e = _STEP * float(self._sizes(p)[k])
+        e = _STEP * float(self.sizes(p)[k])
         sides = []
         for sign in (1.0, -1.0):
             there = p.copy()
@@ -253,7 +271,7 @@ def _backwards(
     """The adjoints of all substeps, and of the state at the start."""
     n = len(start.positions)
     at, found = StateAdjoint.zeros(n, len(kept[0][0].before.internal) if kept else 0), []
-    bodies_end = workspace.bodies_end
+    bodies_end, changes = workspace.bodies_end, [0.0]
     for some, given in zip(reversed(kept), reversed(seeds), strict=True):
         at.x += given.x
         at.v += given.v
@@ -261,8 +279,10 @@ def _backwards(
         at, own, pins = at.with_vertices(whole), [], np.zeros((whole, 3))
         pins[:n] = given.pins
         for one in reversed(some):
-            adjoint, at = step_adjoint(Replay.of(one, workspace), at, pins)
+            replay = Replay.of(one, workspace)
+            adjoint, at = step_adjoint(replay, at, pins)
             own.append(adjoint)
+            changes.append(replay.area_change())
             pins = np.zeros_like(pins)
         for values in (at.x, at.v):
             placed = np.zeros_like(values)
@@ -272,6 +292,13 @@ def _backwards(
         at = at.with_vertices(n)
         at.past_x, at.past_v = past
         found.append(own[::-1])
+    if max(changes, default=0.0) > _AREAS:
+        warnings.warn(
+            f"gradient: the areas of contacts change by up to {100.0 * max(changes):.2g} % in a step; that they depend "
+            "on the parameters is left out, see docs/theory/gradients.md",
+            SuppleWarning,
+            stacklevel=4,
+        )
     return found[::-1], at
 
 
