@@ -7,6 +7,7 @@ moved file or an edited comment compiles nothing, and a changed function compile
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import inspect
 import logging
@@ -54,7 +55,7 @@ _COMPILER = (
     sys.implementation.cache_tag,
     sys.abiflags if hasattr(sys, "abiflags") else "",
     [getattr(config, name, None) for name in _SETTINGS],
-    Path(inner_function.__file__).read_bytes(),
+    ast.dump(ast.parse(Path(inner_function.__file__).read_bytes())),  # without comments, wherever its lines are
 )
 
 logger = logging.getLogger(__name__)
