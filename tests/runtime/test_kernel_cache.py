@@ -145,7 +145,7 @@ def test_of_several_processes_one_compiles(tmp_path):
 @pytest.mark.slow
 def test_a_kernel_runs_where_its_cache_has_no_room(clone, tmp_path):
     _, run = clone
-    no_files = "import resource, sys; sys.dont_write_bytecode = True  # or the modules of the checkout would be cut short"
+    no_files = "import resource, sys; sys.dont_write_bytecode = True"  # or modules of the checkout would be cut short
     limit = f"{no_files}\nresource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
     assert run(SOURCES, limit + RUN_KERNEL) == "[3.0, 2.0, 1.0] 0"
     assert not entries(tmp_path), "nothing incomplete was kept"
