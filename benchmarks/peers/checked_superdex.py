@@ -26,7 +26,7 @@ bodies = []
 for points, velocities, tets in own.bodies():
     given, more = sdp.SoftActorParams(), sdp.experimental.ExperimentalSoftActorParams()
     given.shape = sdp.create_tet_mesh_shape(points.ravel(), tets.ravel().astype(np.int32))
-    # Without a collider, soft bodies pass through each other.
+    # Without a collider, soft bodies have no contact with each other.
     more.collider_type, more.use_recentering = sdp.ColliderType.SDF, False
     material = given.material
     material.density = DENSITY

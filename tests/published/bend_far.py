@@ -18,5 +18,5 @@ CASE = Case(
     source="Bathe 1979",
     references={"end moves by": Reference((-25.04, -47.78, 68.52), "in")},
     solve=solve,
-    meshes=((16, 1, 1), (32, 2, 2)),
+    meshes=((12, 1, 1), (32, 2, 2)),
 )
