@@ -124,7 +124,9 @@ def end_frame(
     if rest.asleep.any():
         memory = replace(memory, at_rest=_at_rest(ws.system, details, rest))
     places = ws.contact.places()
-    message = findings.message(time, _remedy(findings, used.count, shares, accuracy, setting))
+    message = ""
+    if status is not Status.CONVERGED:
+        message = findings.message(time, _remedy(findings, used.count, shares, accuracy, setting))
     report = StepReport(
         status,
         used.count,
