@@ -33,7 +33,7 @@ CASE = Case(
     source="Land 2015",
     references={"height of the end": Reference(4.17, "mm")},
     solve=solve,
-    meshes=((10, 2, 2), (20, 2, 2)),
+    meshes=((8, 2, 2), (20, 2, 2)),
     differs="The bulk modulus is 1 MPa; half of the steps hold the pressure, until its direction stays.",
     look={"color": "von_mises"},
 )
