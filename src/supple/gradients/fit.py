@@ -132,7 +132,7 @@ def fit_simulation(
         found = least_squares(
             lambda q: runs.residuals(q * scales),
             p / scales,
-            jac=lambda q: sensitivity.residuals_and_jacobian(q * scales)[1] * scales,
+            jac=lambda q: sensitivity.residuals_and_jacobian(q * scales)[1] * scales,  # pyright: ignore[reportArgumentType]  # SciPy's stubs know its names only
             bounds=(low / scales, high / scales),
             ftol=tolerance,
             xtol=tolerance,
