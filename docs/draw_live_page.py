@@ -50,48 +50,42 @@ def save(tab, name: str) -> None:
 
 def draw_live(tab, page) -> None:
     """All views of a live simulation."""
-    panel, controller = page.content.panel, page.content.controller
-    client = next(iter(page.server.get_clients().values()))
-    eye, center = np.asarray(client.camera.position), np.asarray(page.content.stage.model.view.center)
-    with client.atomic():
-        client.camera.position = tuple(center + 0.95 * (eye - center))
-        client.camera.look_at = tuple(center - [0.0, 0.12, 0.0])
+    simulation = page.content.simulation
 
-    def settle(seconds: float = 2.5) -> None:
+    def settle(seconds: float = 3.0) -> None:
         tab.wait_for_timeout(1000 * seconds)
 
     def show(name: str, **values) -> None:
-        for key, value in values.items():
-            getattr(panel.views, key).value = value
+        set_values = """(values) => {
+          for (const control of supplePage.gui.controllersRecursive())
+            if (control.domElement.dataset.name in values) control.setValue(values[control.domElement.dataset.name]);
+        }"""
+        tab.evaluate(set_values, values)
         settle()
         save(tab, name)
 
-    controller.simulation.send(Play())
-    while controller.snapshot.time < 0.5:
+    simulation.send(Play())
+    while simulation.latest().time < 0.5:
         settle(0.1)
-    bear = controller.snapshot.body_positions("bear")
+    bear = simulation.latest().body_positions("bear")
     ear = int(np.argmax(bear[:, 1]))
     target = tuple(float(x) for x in bear[ear] + np.array([-0.1, 0.5, 0.0]))
-    controller.simulation.send(Grab(1, "bear", (ear,), (1.0,), target, stiffness=0.05))
-    settle(3.0)
-    controller.simulation.send(SetSpeed(0.05))  # how fast it is here says nothing about the reader's computer
-    settle(2.0)
+    simulation.send(Grab(1, "bear", (ear,), (1.0,), target, stiffness=0.05))
+    settle()
+    for command in (SetSpeed(0.05), Pause()):  # how fast it is here says nothing about the reader's computer
+        simulation.send(command)
+    settle()
     save(tab, "live.png")
-    for command in (ReleaseGrab(1), Pause(), SetSpeed(1.0)):
-        controller.simulation.send(command)
-    for command in (Reset(), SetParameter("youngs", 1.5e4), Step(15)):
-        controller.simulation.send(command)
-    settle(2.0)
-    tab.get_by_role("tab", name="View").click()
-    show("live_stress.png", surface="tets", color_by="von Mises stress")
-    show("live_exploded.png", surface="exploded tets", color_by="volume ratio J")
-    show("live_cut.png", surface="cut", color_by="energy density", cut_axis="z", cut_place=0.5)
-    for command in (Reset(), SetParameter("youngs", 6e4), Step(9)):
-        controller.simulation.send(command)
-    controller.simulation.send(Play())
-    settle(2.0)
-    controller.simulation.send(Pause())
-    show("live_stitches.png", surface="wireframe", color_by="body", contacts=True)
+    for command in (ReleaseGrab(1), SetSpeed(1.0), Reset(), SetParameter("youngs", 1.5e4), Step(15)):
+        simulation.send(command)
+    settle()
+    show("live_stress.png", surface="tets", color=1)
+    show("live_exploded.png", color=0, explode=0.4)
+    show("live_cut.png", color=2, explode=0.0, axis=2, cut=0.5)
+    for command in (Reset(), SetParameter("youngs", 6e4), Step(40)):
+        simulation.send(command)
+    settle()
+    show("live_stitches.png", surface="skin", color=-1, cut=0.0, contacts=True)
 
 
 def main() -> None:
@@ -102,9 +96,7 @@ def main() -> None:
             tab = browser.new_page(viewport=SIZE)
             tab.set_default_timeout(120_000)
             tab.goto(page.url)
-            tab.wait_for_selector("canvas")
-            tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
-            tab.wait_for_timeout(3000)
+            tab.wait_for_timeout(4000)
             draw_live(tab, page)
             tab.close()
         browser.close()

@@ -27,7 +27,7 @@ IMPORT_NAMES = {
 }
 BY_TRIMESH = {"lxml", "networkx"}  # imported by it where it reads 3MF
 # Used as those that need them do, in the versions that these allow: not listed again.
-BROUGHT = {"PIL": "matplotlib", "llvmlite": "numba", "rich": "cyclopts", "websockets": "viser"}
+BROUGHT = {"PIL": "matplotlib", "llvmlite": "numba", "rich": "cyclopts"}
 PARTS = {"mpl_toolkits": "matplotlib"}  # names beside its own that a package installs
 MOST = 16  # packages that a plain install asks for
 # Development tools that are run, or loaded by pytest; no test imports them.

@@ -10,7 +10,7 @@ import pytest
 import supple as sp
 
 HEAVY = [
-    "numba", "scipy", "h5py", "meshio", "viser", "matplotlib", "pyvista", "vtk", "tetgen", "ipctk",
+    "numba", "scipy", "h5py", "meshio", "websockets", "matplotlib", "pyvista", "vtk", "tetgen", "ipctk",
     "pydantic", "yaml", "cyclopts", "rich", "pxr", "trimesh", "distributed",
 ]  # fmt: skip
 

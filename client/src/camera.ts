@@ -12,10 +12,13 @@ export class View {
   private readonly controls: OrbitControls;
   private readonly block: Block;
   private fitted = true;
-  private free = 1; // share of the height that the bar leaves
+  private free = [1, 1]; // shares of width and height that panel and bar leave
+  private readonly panel: number;
 
-  constructor(block: Block, canvas: HTMLCanvasElement, moved: () => void) {
+  /** `panel` is the width that the picture leaves free on its right [pixels]. */
+  constructor(block: Block, canvas: HTMLCanvasElement, panel: number, moved: () => void) {
     this.block = block;
+    this.panel = panel;
     const { up, center, radius } = block.description;
     this.camera.up.set(...up);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -29,10 +32,34 @@ export class View {
   /** The picture has another size; a camera that nobody has moved shows the whole scene again, above the bar. */
   resize(width: number, height: number): void {
     this.camera.aspect = width / height;
-    this.free = Math.max(1 - BAR / height, 0.5);
-    this.camera.setViewOffset(width, height, 0, 0.4 * BAR, width, height);
+    const panel = width >= 600 ? this.panel : 0;
+    this.free = [Math.max(1 - panel / width, 0.5), Math.max(1 - BAR / height, 0.5)];
+    this.camera.setViewOffset(width, height, 0.5 * panel, 0.4 * BAR, width, height);
     if (this.fitted) this.fit();
     else this.camera.updateProjectionMatrix();
+  }
+
+  /** Whether something else takes the mouse. */
+  hold(is: boolean): void {
+    this.controls.enabled = !is;
+  }
+
+  /** Where the camera is and looks, for another scene; null where nobody has moved it. */
+  place(): Vector3[] | null {
+    return this.fitted ? null : [this.camera.position.clone(), this.controls.target.clone()];
+  }
+
+  take(place: Vector3[] | null | undefined): void {
+    if (!place) return;
+    this.fit();
+    this.fitted = false;
+    this.camera.position.copy(place[0]);
+    this.controls.target.copy(place[1]);
+    this.controls.update();
+  }
+
+  dispose(): void {
+    this.controls.dispose();
   }
 
   /** Shows the whole scene, as large as possible. */
@@ -43,7 +70,7 @@ export class View {
     const right = new Vector3().crossVectors(this.camera.up, back).normalize();
     const upward = new Vector3().crossVectors(back, right);
     const slope = Math.tan((this.camera.fov * Math.PI) / 360);
-    const slopes = [slope * this.camera.aspect, slope * this.free];
+    const slopes = [slope * this.camera.aspect * this.free[0], slope * this.free[1]];
     const target = new Vector3(...this.block.description.center);
     let distance = radius;
     const p = new Vector3();

@@ -35,6 +35,8 @@ export interface Obstacle extends Triangles {
 }
 
 export interface Field {
+  /** of a live simulation */
+  key?: string;
   name: string;
   unit: string;
   ends: [number, number];
@@ -78,7 +80,7 @@ const TYPES = {
   f8: Float64Array,
 };
 
-export type Numbers = InstanceType<(typeof TYPES)[keyof typeof TYPES]>;
+export type Numbers = Uint8Array | Uint16Array | Uint32Array | Int16Array | Float32Array | Float64Array;
 
 /** A description and its arrays. */
 export class Block {
@@ -129,8 +131,25 @@ export function summed8(bytes: Numbers, frames: number, size: number): Uint8Arra
   return out;
 }
 
+/** Where the scene takes what moves from: a recording, or a simulation. */
+export interface Source {
+  /** number of frames */
+  readonly count: number;
+  /** The positions (points, 3) at a place between frames, such as 3.5, into `out`. */
+  positions(place: number, out: Float32Array): void;
+  /** The values of a field at the vertices in a frame, from 0 to 255; null where they are not known. */
+  field(field: Field, frame: number): Uint8Array | null;
+  /** The rotation and translation (3, 4) of an obstacle in a frame. */
+  pose(obstacle: number, frame: number): Numbers;
+  /** Pinned points. */
+  pins(): Numbers;
+  /** Ends (k, 2, 3) of the springs of grabs, and of forces of contacts. */
+  grabs(): Numbers;
+  contacts(): Numbers;
+}
+
 /** The frames of a recording: where all points are, and the values of fields, at any time. */
-export class Motion {
+export class Motion implements Source {
   readonly times: Numbers;
   readonly count: number;
   private readonly steps: Uint16Array;
@@ -144,7 +163,6 @@ export class Motion {
     this.steps = summed16(block.array(block.description.motion), this.count, 3 * block.description.points);
   }
 
-  /** The positions (points, 3) at a place between frames, such as 3.5, into `out`. */
   positions(place: number, out: Float32Array): void {
     const { points, groups } = this.block.description;
     const first = Math.min(Math.floor(place), this.count - 1);
@@ -160,7 +178,6 @@ export class Motion {
         }
   }
 
-  /** The values of a field at the vertices in a frame, from 0 to 255. */
   field(field: Field, frame: number): Uint8Array {
     const packed = this.block.array(field.values);
     const size = packed.length / this.count;
@@ -168,4 +185,24 @@ export class Motion {
     if (!all) this.values.set(field, (all = summed8(packed, this.count, size)));
     return all.subarray(frame * size, (frame + 1) * size);
   }
+
+  pose(obstacle: number, frame: number): Numbers {
+    const poses = this.block.array(this.block.description.obstacles[obstacle].poses);
+    const at = poses.length > 12 ? 12 * frame : 0;
+    return poses.subarray(at, at + 12);
+  }
+
+  pins(): Numbers {
+    return this.block.array(this.block.description.pins);
+  }
+
+  grabs(): Numbers {
+    return NONE;
+  }
+
+  contacts(): Numbers {
+    return NONE;
+  }
 }
+
+const NONE = new Float32Array(0);

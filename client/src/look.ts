@@ -148,6 +148,10 @@ export class Look {
     renderer.setRenderTarget(null);
   }
 
+  dispose(): void {
+    for (const target of [this.depth, this.height, this.light]) target.dispose();
+  }
+
   private define(material: ShaderMaterial): void {
     const { SHADOWS: _, ...others } = material.defines;
     const quality = this.quality, cells = quality ? cellsOf(quality) : 0;

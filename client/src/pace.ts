@@ -10,11 +10,11 @@ export interface Quality {
 
 const SLOW = 160; // [ms] between two pictures; a person sees single pictures from about there
 
-/** Measures the time from picture to picture, and goes to lighter ones where it is long. */
+/** Measures how long a picture takes, and goes to lighter ones where that is long. */
 export class Pace {
   private level = 0;
-  private last = 0;
-  private gaps: number[] = [];
+  private costs: number[] = [];
+  private drawn: number[] = [];
   private readonly levels: Quality[];
   private readonly notes = ["", "", "slow renderer: lighter skins", "slow renderer: lighter skins, no shadows"];
 
@@ -41,27 +41,23 @@ export class Pace {
     return this.notes[this.level];
   }
 
-  /** Pictures in a second, of the last ones in a row; 0 where there are none. */
-  get rate(): number {
-    return this.gaps.length ? (1000 * this.gaps.length) / this.gaps.reduce((a, b) => a + b, 0) : 0;
+  /** Pictures in a second, of those of the last two; 0 where there are none. */
+  rate(now: number): number {
+    this.drawn = this.drawn.filter((time) => now - time < 2000);
+    return this.drawn.length > 1 ? (1000 * (this.drawn.length - 1)) / (this.drawn.at(-1)! - this.drawn[0]) : 0;
   }
 
-  /** Called for each picture in a row of them, with the time [ms]. True where the quality has changed. */
-  picture(now: number): boolean {
-    if (this.last) this.gaps.push(now - this.last);
-    this.last = now;
-    if (this.gaps.length > 8) this.gaps.shift();
-    const known = this.gaps.slice(1).sort((a, b) => a - b); // the first one has programs to compile
+  /** A picture was asked of the browser at a time, and it was ready for the next one after `cost` [ms]. True where the
+   * quality has changed. */
+  picture(now: number, cost: number): boolean {
+    this.drawn.push(now);
+    this.costs.push(cost);
+    if (this.costs.length > 8) this.costs.shift();
+    const known = this.costs.slice(1).sort((a, b) => a - b); // the first one has programs to compile
     const middle = known[known.length >> 1];
     if (known.length < (middle > 3 * SLOW ? 2 : 4) || middle < SLOW || this.level === this.levels.length - 1) return false;
     this.level = Math.min(this.level + (middle > 3 * SLOW ? 2 : 1), this.levels.length - 1);
-    this.pause();
+    this.costs = [];
     return true;
-  }
-
-  /** The row of pictures ends. */
-  pause(): void {
-    this.gaps = [];
-    this.last = 0;
   }
 }

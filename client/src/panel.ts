@@ -11,8 +11,9 @@ export interface Actions {
   fit(): void;
 }
 
-export function addPanel(description: Description, shown: Shown, actions: Actions): GUI {
-  const gui = new GUI({ title: "View", width: 230 });
+export function addPanel(description: Description, shown: Shown, live: boolean, actions: Actions): GUI {
+  const top = new GUI({ title: description.title, width: 250 });
+  const gui = live ? top.addFolder("View") : top;
   const { fields, plots, bodies, stitches } = description;
   const plain = { color: -1, plot: -1, fit: () => actions.fit() };
   const soft = bodies.some((body) => body.tets[1] > 0);
@@ -31,19 +32,20 @@ export function addPanel(description: Description, shown: Shown, actions: Action
     update();
   });
   const lines = gui.add(shown, "stitches").onChange(update).show(stitches[1] > 0);
+  const contacts = gui.add(shown, "contacts").onChange(update).show(live);
   const titles = Object.fromEntries(plots.map((plot, k) => [plot.title, k]));
   const plot = gui.add(plain, "plot", { none: -1, ...titles }).onChange(actions.plotted).show(plots.length > 0);
   gui.add(plain, "fit").name("camera to the start");
   if (!soft) for (const item of [surface, colors]) item.hide();
   for (const item of [explode, cut, axis]) item.hide();
-  const names = { surface, cut, axis, explode, color: colors, stitches: lines, plot };
+  const names = { surface, cut, axis, explode, color: colors, stitches: lines, contacts, plot };
   for (const [name, item] of Object.entries(names)) item.domElement.dataset.name = name;
-  if (innerWidth < 600) gui.close();
-  return gui;
+  if (innerWidth < 600) top.close();
+  return top;
 }
 
 /** The colors of the field that is shown, with the values at both ends. */
-function legend({ field }: Shown): void {
+export function legend({ field }: Shown): void {
   const element = document.querySelector<HTMLElement>("#legend")!;
   element.hidden = field === null;
   if (!field) return;

@@ -1,11 +1,11 @@
 // What is seen: bodies as skins or tets, obstacles, ground, stitches, joints and pins.
 
 import {
-  BufferAttribute, BufferGeometry, DynamicDrawUsage, LineBasicMaterial, LineSegments, Matrix4, Mesh, type Object3D,
-  PlaneGeometry, Points, PointsMaterial, Quaternion, Scene, type ShaderMaterial, Vector3,
+  BufferAttribute, BufferGeometry, DynamicDrawUsage, LineBasicMaterial, LineSegments, Mesh, type Object3D,
+  PlaneGeometry, Points, PointsMaterial, Quaternion, type Ray, Scene, type ShaderMaterial, Vector3,
 } from "three";
 import { scaleTexture } from "./colors.ts";
-import type { Block, Body, Field, Motion, Numbers } from "./decode.ts";
+import type { Block, Body, Field, Numbers, Source } from "./decode.ts";
 import { linear, type Look, SHADOW_LAYER } from "./look.ts";
 import { follow, lighter, normals, type Skin, skinOf } from "./skin.ts";
 import { placeTets, type Tets, tetsOf } from "./tets.ts";
@@ -17,6 +17,7 @@ export interface Shown {
   cut: number;
   axis: number;
   stitches: boolean;
+  contacts: boolean;
 }
 
 /** A body on the picture. */
@@ -32,19 +33,18 @@ const LIGHT_SKIN = 700; // vertices of a skin where pictures take long
 export class Stage {
   readonly scene = new Scene();
   private readonly block: Block;
-  private readonly motion: Motion;
+  private readonly motion: Source;
   private readonly look: Look;
   private readonly points: Float32Array;
   private readonly first: Float32Array;
   private drawn: Drawn[] = [];
-  private readonly moving: { objects: Object3D[]; poses: Numbers }[] = [];
-  private readonly lines: { lines: LineSegments; first: number; count: number; stitches: boolean }[] = [];
+  private readonly moving: { objects: Object3D[]; obstacle: number }[] = [];
+  private readonly marks: { object: LineSegments | Points; ends: () => Numbers; shown: () => boolean }[] = [];
   private readonly light = new Map<string, Skin>();
-  private pins: { points: Points; rows: Numbers } | null = null;
   private shown: Shown;
   private coarse = false;
 
-  constructor(block: Block, motion: Motion, look: Look, shown: Shown) {
+  constructor(block: Block, motion: Source, look: Look, shown: Shown) {
     [this.block, this.motion, this.look, this.shown] = [block, motion, look, shown];
     this.points = new Float32Array(3 * block.description.points);
     motion.positions(0, this.points);
@@ -52,7 +52,7 @@ export class Stage {
     this.addBackground();
     this.addGround();
     this.addObstacles();
-    this.addLines();
+    this.addMarks();
     this.build();
   }
 
@@ -63,7 +63,6 @@ export class Stage {
     this.shown = { ...shown };
     this.coarse = coarse;
     if (again) this.build();
-    for (const one of this.lines) one.lines.visible = !one.stitches || shown.stitches;
   }
 
   /** Moves everything to a place between frames. */
@@ -87,26 +86,50 @@ export class Stage {
       }
       position.needsUpdate = true;
     }
-    for (const { objects, poses } of this.moving) {
-      const p = poses.subarray(12 * frame, 12 * frame + 12);
+    for (const { objects, obstacle } of this.moving) {
+      const p = this.motion.pose(obstacle, frame);
       for (const object of objects)
         object.matrix.set(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11], 0, 0, 0, 1);
     }
-    for (const { lines, first, count } of this.lines) {
-      const position = lines.geometry.attributes.position as BufferAttribute;
-      (position.array as Float32Array).set(this.points.subarray(3 * first, 3 * (first + count)));
+    for (const { object, ends, shown } of this.marks) {
+      object.visible = shown();
+      const values = ends(), geometry = object.geometry;
+      let position = geometry.attributes.position as BufferAttribute | undefined;
+      if (!position || position.array.length < values.length) {
+        geometry.dispose();
+        position = new BufferAttribute(new Float32Array(2 * values.length), 3);
+        geometry.setAttribute("position", position);
+      }
+      (position.array as Float32Array).set(values);
       position.needsUpdate = true;
-    }
-    if (this.pins) {
-      const position = this.pins.points.geometry.attributes.position as BufferAttribute;
-      this.pins.rows.forEach((row: number, k: number) =>
-        (position.array as Float32Array).set(this.points.subarray(3 * row, 3 * row + 3), 3 * k));
-      position.needsUpdate = true;
+      geometry.setDrawRange(0, values.length / 3);
     }
   }
 
-  get triangleCount(): number {
-    return this.drawn.reduce((sum, { skin, tets }) => sum + (skin ? skin.triangles.length / 3 : tets!.count * 4), 0);
+  /** Where a ray meets a body first, or null. */
+  firstHit(ray: Ray): Vector3 | null {
+    const corners = [new Vector3(), new Vector3(), new Vector3()], hit = new Vector3();
+    let nearest: Vector3 | null = null, least = Infinity;
+    for (const { mesh } of this.drawn) {
+      const x = mesh.geometry.attributes.position, index = mesh.geometry.index;
+      const count = index ? index.count : mesh.geometry.drawRange.count;
+      for (let t = 0; t < count; t += 3) {
+        corners.forEach((corner, k) => corner.fromBufferAttribute(x, index ? index.getX(t + k) : t + k));
+        if (!ray.intersectTriangle(corners[0], corners[1], corners[2], false, hit)) continue;
+        const away = hit.distanceToSquared(ray.origin);
+        if (away < least) [least, nearest] = [away, hit.clone()];
+      }
+    }
+    return nearest;
+  }
+
+  /** Gives back what the graphics card holds. */
+  dispose(): void {
+    this.scene.traverse((object) => {
+      const { geometry, material } = object as Mesh<BufferGeometry, ShaderMaterial>;
+      geometry?.dispose();
+      material?.dispose();
+    });
   }
 
   private cutAt(): number {
@@ -186,7 +209,7 @@ export class Stage {
   }
 
   private addObstacles(): void {
-    for (const obstacle of this.block.description.obstacles) {
+    for (const [number, obstacle] of this.block.description.obstacles.entries()) {
       if (obstacle.isFloor) continue;
       const geometry = new BufferGeometry();
       const vertices = this.block.array(obstacle.vertices) as Float32Array;
@@ -210,32 +233,32 @@ export class Stage {
         this.scene.add(mesh);
         return mesh;
       });
-      const poses = this.block.array(obstacle.poses);
-      const p = poses.subarray(0, 12);
-      for (const object of objects)
-        object.matrix = new Matrix4().set(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11],
-          0, 0, 0, 1);
-      if (poses.length > 12) this.moving.push({ objects, poses });
+      this.moving.push({ objects, obstacle: number });
     }
   }
 
-  private addLines(): void {
-    const { stitches, joints, pins, radius } = this.block.description;
-    const buffer = (count: number) =>
-      new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(3 * count), 3));
-    for (const [[first, count], color] of [[stitches, 0xc77700], [joints, 0xe17814]] as const) {
-      if (!count) continue;
-      const lines = new LineSegments(buffer(count), new LineBasicMaterial({ color }));
-      lines.frustumCulled = false;
-      this.scene.add(lines);
-      this.lines.push({ lines, first, count, stitches: first === stitches[0] });
-    }
-    const rows = this.block.array(pins);
-    if (!rows.length) return;
-    const points = new Points(buffer(rows.length), new PointsMaterial({ color: 0x141418, size: 0.02 * radius }));
-    points.frustumCulled = false;
-    this.scene.add(points);
-    this.pins = { points, rows };
+  private addMarks(): void {
+    const { stitches, joints, radius } = this.block.description;
+    const part = ([first, count]: [number, number]) => this.points.subarray(3 * first, 3 * (first + count));
+    const add = (object: LineSegments | Points, ends: () => Numbers, shown: () => boolean) => {
+      object.frustumCulled = false;
+      this.scene.add(object);
+      this.marks.push({ object, ends, shown });
+    };
+    const lines = (color: number) => new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color }));
+    const always = () => true;
+    add(lines(0xc77700), () => part(stitches), () => this.shown.stitches);
+    add(lines(0xe17814), () => part(joints), always);
+    add(lines(0x30343c), () => this.motion.grabs(), always);
+    add(lines(0xdc286e), () => this.motion.contacts(), () => this.shown.contacts);
+    const dot = new PointsMaterial({ color: 0x141418, size: 0.03 * radius });
+    add(new Points(new BufferGeometry(), dot), () => this.pinned(), always);
+  }
+
+  private pinned(): Float32Array {
+    const rows = this.motion.pins(), out = new Float32Array(3 * rows.length);
+    rows.forEach((row: number, k: number) => out.set(this.points.subarray(3 * row, 3 * row + 3), 3 * k));
+    return out;
   }
 }
 

@@ -163,7 +163,7 @@ void main() {
 #elif LOOK == 4
   c = base * (.8 * ambient + .6 * sunColor * lit);
 #elif LOOK == 5
-  vec3 mirrored = environment(r, .2) * (.015 + .7 * edge);
+  vec3 mirrored = min(environment(r, .2), vec3(1.1)) * (.015 + .7 * edge);
   alpha = clamp(.5 * opacity + .25 * edge + .5 * mirrored.g, .01, 1.);
   c = mix(.7 * base * ambient, mirrored, clamp(mirrored.g / alpha, 0., 1.)) + mirrored;
 #else

@@ -111,12 +111,13 @@ test("tets are apart from the middle, and end at a cut", () => {
 test("slow pictures lower the quality, once they are known to be slow", () => {
   const run = (gap: number, count: number) => {
     const pace = new Pace(1);
-    for (let k = 0; k < count; k++) pace.picture(1000 + gap * k);
+    for (let k = 0; k < count; k++) pace.picture(1000 + gap * k, gap);
     return pace;
   };
   assert.equal(run(16, 200).note, "");
-  assert.ok(Math.abs(run(16, 200).rate - 62.5) < 1);
-  assert.equal(run(300, 5).quality.sharp, 2);
+  assert.ok(Math.abs(run(16, 200).rate(1000 + 16 * 200) - 62.5) < 1);
+  assert.equal(run(300, 4).quality.sharp, 2);
+  assert.equal(run(300, 5).quality.sharp, 1);
   assert.equal(run(300, 40).quality.shadows, false);
   assert.match(run(300, 40).note, /lighter skins, no shadows/);
   assert.equal(run(300, 40).best.shadows, true);

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.controls.measures import measures_text
 from supple.app.viewer.engine.describe import contact_points, describe, measures
 from supple.app.viewer.engine.scene.changes import change, without_body
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop
 from supple.app.viewer.from_snapshot import RenderFrameBuilder
+from supple.app.viewer.messages import measured
 from supple.app.viewer.protocol import commands
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
-from supple.results.view.layers.joints import JointView
-from supple.results.view.picking import nearest_surface_point, surface_point_on_ray
+from supple.results.view.joints import joint_segments, lines_of_joints
+from supple.results.view.picking import nearest_surface_point
 
 
 @pytest.fixture
@@ -107,9 +107,9 @@ def test_a_drag_pulls_at_the_point_under_the_mouse_and_a_throw_keeps_the_velocit
 
 
 def test_a_dragged_bar_turns_about_its_hinge_and_stops_at_the_limit():
-    live, page = swinging(), Page()
-    drawn = JointView(page, moment_of(live)[0])
-    before = page.points
+    live = swinging()
+    drawn = lines_of_joints(moment_of(live)[0].model)
+    before = joint_segments(moment_of(live)[0], drawn)
     point = nearest_surface_point(moment_of(live)[0], (0.4, 0.02, 0.0))
     change(commands.Grab(1, "bar", tuple(point.vertices), tuple(point.weights), (0.2, 0.6, 0.0), 20.0), live)
     for _ in range(40):
@@ -117,11 +117,10 @@ def test_a_dragged_bar_turns_about_its_hinge_and_stops_at_the_limit():
     reading = measures(live).joints["hinge"]
     assert reading.coordinate == pytest.approx(0.5, abs=1e-5)
     frame, snapshot = moment_of(live)
-    assert "hinge: at 0.5, force" in measures_text(replace(snapshot, description=describe(live)))
+    assert any("hinge: at 0.5, force" in line for line in measured(replace(snapshot, description=describe(live))))
     (joint,) = frame.model.joints
     assert joint.conditions.coordinate.limits == (-0.5, 0.5)
-    drawn.update(frame)
-    lines = page.points
+    lines = joint_segments(frame, drawn)
     assert lines.shape == before.shape
     np.testing.assert_allclose(lines[:3].mean(axis=1), np.zeros((3, 3)), atol=1e-6)  # the cross
     hand, rim = lines[3, 1], lines[-1, 1]  # where the bar is, and the end of the arc
@@ -140,28 +139,20 @@ def test_joints_of_every_kind_are_drawn_where_their_limits_are():
         sp.HingeJoint("d", "c", point=(0, 0, 3), limits=(0.0, np.inf)),
     ]
     live = LiveScene(LiveSource("all", sp.Scene(bodies, joints=joints), sp.Implicit(contact=None), 1 / 60))
-    page = Page()
-    JointView(page, moment_of(live)[0])
-    cone = page.points[4:39]  # after a cross and a hand: the rim, and lines to it
+    frame = moment_of(live)[0]
+    lines = joint_segments(frame, lines_of_joints(frame.model))
+    cone = lines[4:39]  # after a cross and a hand: the rim, and lines to it
     rims = cone[:31].reshape(-1, 3)
     np.testing.assert_allclose(rims[:, 0] / np.linalg.norm(rims, axis=1), np.cos(0.5), atol=1e-6)
-    axis, low, high = page.points[42:45]
+    axis, low, high = lines[42:45]
     np.testing.assert_allclose(axis[:, [0, 2]], [[0, 1], [0, 1]], atol=1e-6)
     np.testing.assert_allclose([low.mean(axis=0), high.mean(axis=0)], [[0, -0.1, 1], [0, 0.3, 1]], atol=1e-6)
-    assert len(page.points) == 45 + 3 + 4  # a cross for the fixed joint, a cross and an axis for the hinge
-
-
-class Page:
-    """Keeps the lines that a layer draws."""
-
-    def add_line_segments(self, name, points, color, **_):
-        self.points = points
-        return self
+    assert len(lines) == 45 + 3 + 4  # a cross for the fixed joint, a cross and an axis for the hinge
 
 
 def test_a_click_pins_the_whole_body_and_another_one_releases_it(live):
     frame, _ = moment_of(live)
-    point = surface_point_on_ray(frame, (0.03, 1.0, 0.01), (0.0, -1.0, 0.0))
+    point = nearest_surface_point(frame, (0.03, 1.0, 0.01))
     assert (point.body.name, point.nearest_vertex, point.place[1]) == ("stone", 0, pytest.approx(0.102))
     change(commands.Pin("stone", point.nearest_vertex), live)
     assert len(live.system.pinned_vertices) == 4

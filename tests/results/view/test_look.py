@@ -2,15 +2,12 @@
 
 import json
 import struct
-from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
 import supple as sp
 from supple.results.export.exporter import export
-from supple.results.view.bounds import View
-from supple.results.view.camera import stay_above
 from supple.results.view.from_recording import model_of_recording
 from supple.results.view.look import LOOKS
 from supple.results.view.surfaces import rim_of, surfaces_of
@@ -49,30 +46,3 @@ def test_a_rim_is_a_closed_tube_about_the_opening():
     assert sp.SurfaceMesh(points, triangles).volume > 0.1
     np.testing.assert_allclose([points[:, 1].min(), points[:, 1].max()], [0.9, 1.1], atol=1e-9)
     assert rim_of(surface.vertices, surface.triangles, np.array([0.0, 1.0, 0.0]), 0.1) is None
-
-
-class Camera:
-    """What a camera of viser has, for `stay_above`."""
-
-    def __init__(self, position):
-        self.position, self.look_at, self.fov, self.aspect = position, (0.0, 0.5, 0.0), 0.6, 1.5
-
-    def atomic(self):
-        return nullcontext()
-
-    @property
-    def camera(self):
-        return self
-
-
-def test_a_camera_under_the_floor_is_raised_above_it():
-    view, floor = View(np.zeros(3), np.ones(3), np.array([0.0, 1.0, 0.0])), np.array([5.0, -0.2, 5.0])
-    below, above, first = Camera((3.0, -2.0, 1.0)), Camera((3.0, 2.0, 1.0)), Camera((3.0, -2.0, 1.0))
-    assert [stay_above(camera, floor, view) for camera in (below, above)] == [True, True]
-    # The camera with which a browser begins is left alone until that of the scene arrives.
-    assert not stay_above(first, floor, view, was_above=False)
-    assert stay_above(above, floor, view, was_above=False)
-    assert first.position == (3.0, -2.0, 1.0)
-    np.testing.assert_allclose(below.position, [3.0, -0.2 + 0.03 * view.radius, 1.0])
-    assert below.look_at == (0.0, 0.5, 0.0)
-    assert above.position == (3.0, 2.0, 1.0)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import html
+import shlex
+import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -10,14 +12,13 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from supple.app.viewer.controls.view.overlay import set_theme
 from supple.app.viewer.engine.engine import Engine
+from supple.app.viewer.gate import Gate, new_token
 from supple.app.viewer.live_page import LivePage
 from supple.app.viewer.protocol.live_source import LiveSource
-from supple.results.view.gate import new_token
-from supple.results.view.server import gated_server, require_free_port
+from supple.app.viewer.server import require_free_port, served
+from supple.results.page.page import client
 
 DEFAULT_PORT = 8080
 
@@ -28,12 +29,12 @@ class OpenPage:
 
     Attributes
     ----------
-    url : for a browser; server : of viser
-    content : draws the page
+    url : for a browser; port : of the server
+    content : what it shows
     """
 
     url: str
-    server: Any
+    port: int
     content: LivePage
 
 
@@ -46,7 +47,7 @@ def opened_page(
     Parameters
     ----------
     port : 0 takes any free port; None takes 8080, or the next free one
-    again : reads the source again, for the button *Reload*; without it, the page lacks that button
+    again : reads the source again, for the button *reload*; without it, the page lacks that button
 
     Raises
     ------
@@ -55,15 +56,15 @@ def opened_page(
     if port is not None:
         require_free_port(port)
     with ExitStack() as ends:
-        engine = ends.enter_context(Engine(source, again))
-        first = engine.latest()
-        assert first is not None  # the constructor of the engine waits for it
         token = new_token()
-        server = ends.enter_context(gated_server(token, DEFAULT_PORT if port is None else port))
-        configure_page(server, source.title)
-        content = LivePage(server, engine, first)
+        gate = Gate(token, client(source.title))
+        engine = ends.enter_context(Engine(source, again))
+        command = shlex.join(["supple", *sys.argv[1:]])
+        content = LivePage(engine, {"title": source.title, "command": command})
+        server = ends.enter_context(served(gate, content.visit, DEFAULT_PORT if port is None else port))
+        content.start(server)
         ends.callback(content.stop)
-        yield OpenPage(f"http://localhost:{server.get_port()}/?token={token}", server, content)
+        yield OpenPage(f"http://localhost:{server.port}/?token={token}", server.port, content)
 
 
 def serve(
@@ -100,10 +101,3 @@ def browser_at(url: str) -> Iterator[None]:
         )
         webbrowser.open(path.as_uri())
         yield
-
-
-def configure_page(server: Any, title: str) -> None:
-    """Configure the page of viser: the panel has the title and is beside the picture, without links of viser."""
-    set_theme(server, dark=False)
-    server.gui.set_panel_label(title)
-    server.gui.main_panel.dock_right()

@@ -16,12 +16,11 @@ from supple.kinds.checks import finite_vector
 from supple.kinds.validators import Limits
 from supple.results.recording.reader import Recording
 from supple.results.view.camera import PRESETS
-from supple.results.view.fields import FIELDS
-from supple.results.view.options import COLOR_BY_BODY
+from supple.results.view.fields import COLOR_BY_BODY, FIELDS
 from supple.runtime.replacing import whole_file
 
 CAMERAS = ("fit", "follow", "orbit")
-DRAWN = ("skin", "tets")  # of SURFACES
+DRAWN = ("skin", "tets")
 COLORS = {field.key: field for field in FIELDS.values()}
 # Of the sides [pixels]: encoders of H.264 take no more than the largest, and no odd ones.
 _LEAST, _MOST = 64, 4096

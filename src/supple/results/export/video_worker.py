@@ -22,9 +22,8 @@ from supple.results.view.camera import direction_of, fitted, upright
 from supple.results.view.fields import NOT_KNOWN_COLOR, Limits, Range, color_map, nodal_values
 from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.from_recording import evenly, model_of_recording, render_frame_of
-from supple.results.view.layers.connections import STITCH_COLOR
-from supple.results.view.layers.joints import JOINT_COLOR, joint_segments, lines_of_joints
-from supple.results.view.look import Color, Look, background, floor_disc, theme
+from supple.results.view.joints import JOINT_COLOR, joint_segments, lines_of_joints
+from supple.results.view.look import STITCH_COLOR, Color, Look, background, floor_disc, theme
 from supple.results.view.model import Model, RenderFrame
 from supple.results.view.occlusion import occlusion
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from supple.results.page.packed import Packer, differences, quantized
 from supple.results.view.camera import direction_of
 from supple.results.view.fields import FIELDS, Field, Limits, Range, color_map, nodal_values
-from supple.results.view.layers.joints import joint_segments, lines_of_joints
+from supple.results.view.joints import Sides, joint_segments, lines_of_joints
 from supple.results.view.look import drawn_as
 from supple.results.view.model import Model, RenderFrame
 from supple.results.view.surfaces import RigidSurface, SoftSurface, Surface, boundary_surface, obstacle_surfaces
@@ -73,7 +73,7 @@ def described_motion(frames: Sequence[tuple[float, RenderFrame]], packer: Packer
     """What changes: points, poses of obstacles, and fields; of at least one frame, each with its time [s]."""
     model, first = frames[0][1].model, frames[0][1]
     lines = lines_of_joints(model)
-    x = np.array([_points(frame, lines) for _, frame in frames])
+    x = np.array([points_of(frame, lines) for _, frame in frames])
     n, ends = len(first.positions), 2 * len(model.stitches)
     groups = [(body.vertices.start, body.vertices.stop) for body in model.bodies]
     groups += [(low, high) for low, high in ((n, n + ends), (n + ends, x.shape[1])) if high > low]
@@ -95,7 +95,7 @@ def described_motion(frames: Sequence[tuple[float, RenderFrame]], packer: Packer
     }
 
 
-def _points(frame: RenderFrame, lines: list[Any]) -> NDArray[np.float64]:
+def points_of(frame: RenderFrame, lines: list[Sides]) -> NDArray[np.float64]:
     """(n + ..., 3) vertices, then ends of stitches and of the lines of joints [m]."""
     joints = joint_segments(frame, lines) if lines else np.zeros((0, 2, 3))
     more = np.concatenate([frame.stitch_segments, joints]).reshape(-1, 3)

@@ -63,14 +63,14 @@ def _page(frames: Sequence[tuple[float, RenderFrame]], plots: Any = lambda packe
     title = ", ".join(body.name for body in model.bodies)[:80]
     described = {"title": title, **described_scene(model, packer), **described_motion(frames, packer)}
     data = zlib.compress(packer.block({**described, "plots": plots(packer)}), 9)
-    text = client().replace(_TITLE, f"<title>{html.escape(title)} · Supple</title>", 1)
-    return text.replace(_DATA, base64.b64encode(data).decode("ascii"), 1)
+    return client(title).replace(_DATA, base64.b64encode(data).decode("ascii"), 1)
 
 
-def client() -> str:
-    """The page without frames."""
+def client(title: str) -> str:
+    """The page without frames, which asks the server that sent it for them."""
     try:
-        return files("supple.results.page").joinpath("page.html").read_text(encoding="utf-8")
+        page = files("supple.results.page").joinpath("page.html").read_text(encoding="utf-8")
+        return page.replace(_TITLE, f"<title>{html.escape(title)} · Supple</title>", 1)
     except OSError:
         raise OutputError("page: the client is not built; run `python client/build.py` in the checkout") from None
 

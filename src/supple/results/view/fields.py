@@ -59,6 +59,7 @@ def _of_laws(frame: RenderFrame, quantity: str) -> NDArray[np.float64]:
     return tet_values(laws, frame.positions, quantity, frame.internal)
 
 
+COLOR_BY_BODY = "body"  # instead of the name of a field
 FIELDS = {
     field.name: field
     for field in (
@@ -69,15 +70,9 @@ FIELDS = {
 }
 
 
-BINS = 24  # colors of a scale; each is one mesh on the page, because a mesh has one color
 NOT_KNOWN_COLOR = (150, 152, 158)
 # A scale grows immediately, and shrinks only where less than this share of it is used: otherwise its ends flicker.
 _SHRINK_BELOW = 0.3
-
-
-def palette(field: Field) -> NDArray[np.uint8]:
-    """(BINS, 3) colors of a scale."""
-    return colors_of(field, np.linspace(0.0, 1.0, BINS), (0.0, 1.0))
 
 
 def colors_of(field: Field, values: NDArray[np.float64], ends: tuple[float, float]) -> NDArray[np.uint8]:
@@ -115,14 +110,6 @@ def nodal_values(frame: RenderFrame, values: NDArray[np.float64]) -> NDArray[np.
         filled = np.bincount(rows, around, minlength=n) / np.maximum(times, 1)
         mean = np.where(np.isnan(mean) & (times > 0), filled, mean)
     return np.nan_to_num(mean)
-
-
-def bin_of(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.int64]:
-    """The color (0 to BINS - 1) of each value; BINS where it is not finite."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        place = np.floor((values - low) / (high - low) * BINS)
-    known = np.isfinite(values)
-    return np.where(known, np.clip(np.where(known, place, 0.0), 0, BINS - 1), BINS).astype(np.int64)
 
 
 @dataclass(frozen=True)

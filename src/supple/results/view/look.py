@@ -45,6 +45,7 @@ LOOKS = {
     "foam": Look(0.95, 0.0, 0.55, 0.7, 0.0, 1.0, ((250, 244, 232), 0.3)),
     "steel": Look(0.3, 0.9, 0.5, 0.6, 0.9, 24.0, ((196, 205, 218), 0.88)),
 }
+STITCH_COLOR = (30, 30, 34)
 OBSTACLE = Look(0.8, 0.0, 0.58, 0.62, 0.05, 10.0)
 
 # Colors that can also be distinguished with color blindness (after Okabe and Ito, brightened).

@@ -1,7 +1,7 @@
 """The data that the page draws, of a live simulation or of a recording.
 
-A `Model` contains what no frame changes; a `RenderFrame` is one frame. Layers use only these two, neither engine nor
-file.
+A `Model` contains what no frame changes; a `RenderFrame` is one frame. What draws them uses only these
+two, neither engine nor file.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.laws.internal import NEVER_FLOWED
-from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.results.view.bounds import View
 from supple.results.view.skin_contact import beyond_tets
@@ -56,12 +55,6 @@ class Model:
         return np.concatenate(tets).astype(np.int32, copy=False)
 
     @cached_property
-    def surface_vertices(self) -> NDArray[np.int64]:
-        """(k,) vertices on the boundaries of all bodies, ascending."""
-        parts = [np.unique(body.boundary) + body.vertices.start for body in self.bodies]
-        return np.concatenate(parts).astype(np.int64)
-
-    @cached_property
     def beyond_tets(self) -> dict[str, tuple[NDArray[np.bool_], float]]:
         """By body: which vertices of a skin that nothing touches are outside of tets, and how far at most [m]."""
         return {
@@ -71,43 +64,10 @@ class Model:
         }
 
     @cached_property
-    def facets(self) -> Facets:
-        """The facets of all tets."""
-        return facets_of(self.tets)
-
-    @cached_property
     def rest_shape_inverse(self) -> NDArray[np.float64]:
         """(m, 3, 3) Dm^-1 of every tet [1/m]."""
         corners = self.rest_positions[self.tets]
         return np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).astype(np.float64, copy=False)
-
-
-@dataclass(frozen=True, eq=False)
-class Facets:
-    """Triangles between tets.
-
-    Attributes
-    ----------
-    triangles : (f, 3) vertices, counter-clockwise as seen from outside of `inner`
-    inner, outer : (f,) the two tets of each; outer is -1 on the boundary
-    """
-
-    triangles: NDArray[np.int32]
-    inner: NDArray[np.int64]
-    outer: NDArray[np.int64]
-
-
-def facets_of(tets: NDArray[np.int32]) -> Facets:
-    """All facets, each one once."""
-    triangles = tets[:, TET_FACETS].reshape(-1, 3)
-    owner = np.repeat(np.arange(len(tets)), 4)
-    key = facet_keys(triangles, int(tets.max()) + 1)
-    order = np.argsort(key, kind="stable")
-    second = np.diff(key[order], prepend=-1) == 0
-    first = np.flatnonzero(~second)
-    outer = np.full(len(key), -1)
-    outer[np.flatnonzero(second) - 1] = owner[order[second]]
-    return Facets(triangles[order[first]], owner[order[first]], outer[first])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Points on the surfaces of bodies, found from points and rays in space."""
+"""Points on the surfaces of bodies, found from points in space."""
 
 from __future__ import annotations
 
@@ -64,37 +64,6 @@ def nearest_surface_point(frame: RenderFrame, place: ArrayLike) -> SurfacePoint:
     points = closest_point(triangles.corners, np.broadcast_to(query, (len(triangles.corners), 3)))
     nearest = int(np.argmin(np.linalg.norm(points - query, axis=1)))
     return _on_triangle(frame.model, triangles, nearest, points[nearest])
-
-
-def surface_point_on_ray(frame: RenderFrame, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
-    """The first intersection of a ray from `origin` (3,) in `direction` (3,) with any boundary, or None."""
-    triangles = _triangles(frame)
-    hit = first_hit(triangles.corners, origin, direction)
-    if hit is None:
-        return None
-    place = np.asarray(origin, dtype=np.float64) + hit[1] * np.asarray(direction)
-    return _on_triangle(frame.model, triangles, hit[0], place)
-
-
-def first_hit(corners: NDArray[np.float64], origin: ArrayLike, direction: ArrayLike) -> tuple[int, float] | None:
-    """The triangle of `corners` (t, 3, 3) that a ray meets first, and the multiple of `direction` to it, or None.
-
-    Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997).
-    """
-    a, b, c = (corners[:, k] for k in range(3))
-    start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
-    h = np.cross(along, c - a)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        inverse = 1.0 / np.einsum("ij,ij->i", b - a, h)
-        u = inverse * np.einsum("ij,ij->i", start - a, h)
-        q = np.cross(start - a, b - a)
-        v = inverse * (q @ along)
-        t = inverse * np.einsum("ij,ij->i", c - a, q)
-        met = np.isfinite(t) & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (t > 0.0)
-    if not met.any():
-        return None
-    first = int(np.argmin(np.where(met, t, np.inf)))
-    return first, float(t[first])
 
 
 def _on_triangle(model: Model, triangles: _Triangles, row: int, place: NDArray[np.float64]) -> SurfacePoint:

@@ -1,7 +1,8 @@
 """A fake simulation for tests of the page: it stores received commands, and sends given snapshots."""
 
 import contextlib
-import re
+import json
+import struct
 import threading
 import time
 from dataclasses import replace
@@ -118,76 +119,24 @@ def fake():
 
 
 class Visitor:
-    """A websocket client that sends the messages of a page, and may read or not."""
+    """A websocket client as the page is one. It reads messages, and says that it has drawn frames, or not.
+
+    Attributes
+    ----------
+    scenes, frames, statuses, notices, files : what came, as dictionaries
+    """
 
     def __init__(self, port: int, query: str = f"?token={TOKEN}", reads: bool = True) -> None:
-        import viser
         from websockets.sync.client import connect
 
-        self.taken = 0  # messages
-
-        self.line = connect(
-            f"ws://127.0.0.1:{port}/{query}",
-            subprotocols=[f"viser-v{viser.__version__}"],
-            max_size=None,
-            close_timeout=0.5,
-        )
+        self.scenes, self.frames, self.statuses, self.notices, self.files = [], [], [], [], []
+        self.arrays = []  # for each frame, reads the arrays to which it refers
+        self.line = connect(f"ws://127.0.0.1:{port}/{query}", max_size=None, close_timeout=0.5, compression=None)
         if reads:
             threading.Thread(target=self._read, daemon=True).start()
-        # The server counts a visitor after it has sent its camera.
-        self.report_camera(position=(0.0, 0.0, -5.0), look_at=(0.0, 0.0, 0.0))
 
-    def report_camera(self, position, look_at) -> None:
-        self.send(
-            "ViewerCameraMessage",
-            wxyz=(1.0, 0.0, 0.0, 0.0),
-            position=_plain(position),
-            fov=0.6,
-            near=0.01,
-            far=100.0,
-            image_height=480,
-            image_width=640,
-            look_at=_plain(look_at),
-            up_direction=(0.0, -1.0, 0.0),
-        )
-
-    def send(self, kind: str, **fields) -> None:
-        import msgspec
-
-        self.line.send(msgspec.msgpack.encode({"type": kind, **fields}))
-
-    def set(self, handle, value) -> None:
-        self.send("GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": value})
-
-    def press(self, button) -> None:
-        self.send("GuiUpdateMessage", uuid=button._impl.uuid, updates={"value": True})
-
-    def drag(self, handle, phase: str, start, end) -> None:
-        self.send(
-            "SceneNodeDragMessage",
-            phase=phase,
-            name=handle.name,
-            instance_index=None,
-            start_position=_plain(start),
-            start_screen_pos=(0.5, 0.5),
-            end_position=_plain(end),
-            end_screen_pos=(0.5, 0.5),
-            button="left",
-            modifier=None,
-            owner="",
-        )
-
-    def click(self, handle, origin, direction, modifier=None) -> None:
-        self.send(
-            "SceneNodeClickMessage",
-            name=handle.name,
-            instance_index=None,
-            ray_origin=_plain(origin),
-            ray_direction=_plain(direction),
-            screen_pos=(0.5, 0.5),
-            modifier=modifier,
-            owner="",
-        )
+    def send(self, act: str, **values) -> None:
+        self.line.send(json.dumps({"act": act, **values}))
 
     def leave(self) -> None:
         self.line.close()
@@ -196,18 +145,26 @@ class Visitor:
         from websockets.exceptions import ConnectionClosed
 
         with contextlib.suppress(ConnectionClosed):
-            for _ in self.line:
-                self.taken += 1
+            for message in self.line:
+                told, array = (json.loads(message), None) if isinstance(message, str) else read_block(message)
+                if told["kind"] == "frame":
+                    self.arrays.append(array)
+                if told["kind"] == "file":
+                    told["content"] = array(told["bytes"]).tobytes()
+                by_kind = {"scene": self.scenes, "frame": self.frames, "status": self.statuses, "file": self.files}
+                by_kind.get(told["kind"], self.notices).append(told)
+                if told["kind"] == "frame":
+                    self.send("drawn")
 
 
-def _plain(point) -> list[float]:
-    return [float(x) for x in point]
+def read_block(block: bytes):
+    """The description in a block, and the arrays to which it refers."""
+    (length,) = struct.unpack("<I", block[:4])
 
+    def array(ref):
+        return np.frombuffer(block, "<" + ref["type"], ref["count"], 4 + length + ref["at"])
 
-@pytest.fixture(scope="session")
-def visit():
-    """Creates visitors: `visit(port)`."""
-    return Visitor
+    return json.loads(block[4 : 4 + length]), array
 
 
 @pytest.fixture(scope="session")
@@ -226,138 +183,90 @@ def until():
 
 
 @pytest.fixture
-def server():
-    """A server of pages."""
-    from supple.app.viewer.app import configure_page
-    from supple.results.view.server import gated_server
-
-    with gated_server(TOKEN) as made:
-        configure_page(made, "boxes")
+def live(fake):
+    """A served page of the fake simulation; its `port`."""
+    with served_page(fake) as made:
         yield made
 
 
-@pytest.fixture
-def live(server, fake):
-    """A page of the fake simulation."""
+@contextlib.contextmanager
+def served_page(simulation, port: int = 0):
+    from supple.app.viewer.gate import Gate
     from supple.app.viewer.live_page import LivePage
+    from supple.app.viewer.server import served
+    from supple.results.page.page import client
 
-    page = LivePage(server, fake, fake.snapshot)
-    yield page
-    page.stop()
+    page = LivePage(simulation, {"title": "boxes", "command": "supple view boxes.yaml"})
+    with served(Gate(TOKEN, client("boxes")), page.visit, port) as server:
+        page.start(server)
+        page.port = server.port
+        try:
+            yield page
+        finally:
+            page.stop()
 
 
 @pytest.fixture
-def visitor(live, server, visit, until):
-    """A visitor of the page of the fake simulation."""
-    made = visit(server.get_port())
-    until(server.get_clients)
+def visitor(live, until):
+    """A visitor of the page of the fake simulation, who has the first frame."""
+    made = Visitor(live.port)
+    until(lambda: made.frames)
     yield made
     made.leave()
 
 
 class Screen:
-    """A browser with a page, and the actions of a person there.
+    """A browser with a page, and the actions of a person there; `tab` is Playwright's page."""
 
-    Attributes
-    ----------
-    tab : Playwright's page; server : viser's
-    """
-
-    def __init__(self, browser, pixels, url: str, server) -> None:
-        self._pixels, self.server = pixels, server
+    def __init__(self, browser, pixels, url: str) -> None:
+        self._pixels = pixels
         self.errors: list[str] = []
         self.tab = browser.new_page(viewport={"width": 720, "height": 420})
         self.tab.set_default_timeout(90_000)  # software rendering on a busy machine
         self.tab.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.tab.on("console", self._hear)
+        self.tab.on("console", lambda said: self.errors.append(said.text) if said.type == "error" else None)
         self.tab.goto(url)
-        self.tab.wait_for_selector("canvas")
-        # A notification about software OpenGL has the color of a body.
-        self.tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
-        self.wait(lambda: server.get_clients(), "the browser as a visitor")
-
-    def close(self) -> None:
-        """Must be called at the end of the test: software rendering would slow down the others."""
-        self.tab.close()
+        self.holds("globalThis.supplePage?.pictures > 0")
 
     def wait(self, holds, what: str, seconds: float = 90.0):
         """Wait until a condition holds, while the browser runs."""
         end = time.monotonic() + seconds
         while not (found := holds()):
             if time.monotonic() > end:
-                self.tab.screenshot(path="screenshot-of-failure.png")
                 raise AssertionError(f"{what} did not come within {seconds:g} s")
             self.tab.wait_for_timeout(50)
         return found
 
-    def _hear(self, message) -> None:
-        # A known warning of sliders about their event listeners.
-        if message.type == "error" and "passive event listener" not in message.text:
-            self.errors.append(message.text)
-
-    @property
-    def client(self):
-        return list(self.server.get_clients().values())[-1]
+    def holds(self, condition: str) -> None:
+        """Wait for a condition in JavaScript, which the page's own policy does not let it evaluate."""
+        self.wait(lambda: self.tab.evaluate(f"Boolean({condition})"), condition)
 
     def shot(self) -> np.ndarray:
-        """(h, w, 3): the picture without the panel."""
-        box = self.tab.locator("canvas").first.bounding_box()
-        return self._pixels(self.tab, clip=box)
+        """(h, w, 3): the picture without the panel and the bar."""
+        return self._pixels(self.tab, clip={"x": 0, "y": 30, "width": 460, "height": 320})
 
     def place(self, point) -> tuple[float, float]:
         """Position of a point on the screen [pixels]."""
-        camera = self.client.camera
-        eye, ahead = np.asarray(camera.position), np.asarray(camera.look_at) - np.asarray(camera.position)
-        ahead /= np.linalg.norm(ahead)
-        right = np.cross(ahead, np.asarray(camera.up_direction))
-        right /= np.linalg.norm(right)
-        away = np.asarray(point) - eye
-        box = self.tab.locator("canvas").first.bounding_box()
-        scale = 0.5 * box["height"] / np.tan(0.5 * camera.fov) / (away @ ahead)
-        x, y = scale * (away @ right), scale * (away @ np.cross(right, ahead))
-        return 0.5 * box["width"] + float(x), 0.5 * box["height"] - float(y)
-
-    def press(self, name: str) -> None:
-        """Click a button where it has come to rest: on a busy machine, a folder that opens moves it under the mouse."""
-        named = self.tab.get_by_role("button", name=name, exact=True)
-        # A label above the picture that presses a button gives it a name of its own.
-        button = named.or_(self.tab.locator("button", has_text=re.compile(f"^{re.escape(name)}$"))).first
-        button.scroll_into_view_if_needed()
-        places = [button.bounding_box()]
-        while len(places) < 4 or places[-1] != places[-4]:
-            self.tab.wait_for_timeout(100)
-            places.append(button.bounding_box())
-        button.click()
-
-    def choose(self, handle, option: str) -> None:
-        self.tab.locator(f'[id="{handle._impl.uuid}"]').click()
-        self.tab.get_by_role("option", name=option, exact=True).click()
-
-    def slide(self, handle, key: str, times: int = 1) -> None:
-        thumb = self._thumb(handle)
-        for _ in range(times):
-            thumb.press(key)
-
-    def reads(self, handle) -> float:
-        """The value of a slider in the browser."""
-        return float(self._thumb(handle).get_attribute("aria-valuenow"))
-
-    def _thumb(self, handle):
-        return self.tab.locator(f'[id="{handle._impl.uuid}"] [role=slider]')
+        at = """(x) => {
+          const camera = supplePage.view.camera;
+          const p = camera.position.clone().set(...x).project(camera);
+          return [(0.5 + 0.5 * p.x) * innerWidth, (0.5 - 0.5 * p.y) * innerHeight];
+        }"""
+        return tuple(self.tab.evaluate(at, [float(x) for x in point]))
 
 
 @pytest.fixture(scope="session")
 def look(browser, pixels):
-    """Opens pages in the browser: `look(url, server)`."""
+    """Opens pages in the browser: `look(url)`."""
     opened = []
 
-    def open_page(url: str, server) -> Screen:
-        opened.append(Screen(browser, pixels, url, server))
+    def open_page(url: str) -> Screen:
+        opened.append(Screen(browser, pixels, url))
         return opened[-1]
 
     yield open_page
     for screen in opened:
-        screen.close()
+        screen.tab.close()
 
 
 @pytest.fixture(scope="session")

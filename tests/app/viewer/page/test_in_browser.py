@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.app.viewer.page.conftest import TOKEN, served_page
 
 import supple as sp
 from supple.app.viewer.app import opened_page
@@ -19,75 +20,70 @@ def live(look, spot):
     rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.02)
     ball = sp.Body("ball", sp.shapes.sphere(radius=RADIUS, edge_length=0.2), rubber, position=(0.0, START, 0.0))
     scene = sp.Scene([ball], obstacles=[sp.HalfSpace(friction=0.5)])
-    source = LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60)
-    with opened_page(source, 0) as page:
-        screen = look(page.url + "&fixedDpr=0.5", page.server)  # few pixels: they are drawn in software
-        controller = page.content.controller
-        made = SimpleNamespace(screen=screen, page=page.content, panel=page.content.panel)
-        made.snapshot = lambda: controller.snapshot
-        made.middle = lambda: controller.snapshot.positions.mean(axis=0)
-        made.height = lambda: float(np.ptp(controller.snapshot.positions[:, 1]))
+    with opened_page(LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60), 0) as page:
+        screen = look(page.url)
+        made = SimpleNamespace(screen=screen, tab=screen.tab, content=page.content)
+        made.snapshot = lambda: page.content.simulation.latest()
+        made.middle = lambda: made.snapshot().positions.mean(axis=0)
         made.red = lambda: spot(screen.shot(), "red")
-        made.seen = lambda: made.red()[1]
-
-        def drawn(holds, what):
-            """Wait for the picture, which is later than the state."""
-            return screen.wait(lambda: holds(made.red()), what)
-
-        made.drawn = drawn
+        made.drawn = lambda holds, what: screen.wait(lambda: holds(made.red()), what)
         yield made
-        screen.close()
+        screen.tab.close()
 
 
 @pytest.fixture
 def still(live):
     """The page at the start of time, paused."""
     if not live.snapshot().paused:
-        live.screen.press("Pause")
+        live.tab.locator("#play").click()
         live.screen.wait(lambda: live.snapshot().paused, "the pause")
-    live.screen.press("reset")
+    live.tab.locator("#reset").click()
     live.screen.wait(lambda: live.snapshot().frame == 0 and abs(live.middle()[1] - START) < 1e-3, "the start")
-    where = live.screen.place(live.middle())
-    live.drawn(lambda red: red[0] > 300 and np.abs(red[1] - where).max() < 25, "the ball at its start")
+    x, y = live.screen.place(live.middle())
+    live.drawn(lambda red: red[0] > 300 and np.abs(red[1] - [x, y - 30]).max() < 25, "the ball at its start")
     return live
 
 
 @pytest.fixture
 def resting(still):
     """The ball at rest on the floor, while time runs."""
-    still.screen.press("Play")
+    still.tab.locator("#play").click()
     speed = lambda: np.sqrt(2.0 * still.snapshot().measures.kinetic_energy / MASS)  # noqa: E731
     still.screen.wait(
         lambda: still.snapshot().time > 0.6 and still.middle()[1] < 0.32 and speed() < 0.03, "the ball on the floor"
     )
-    still.drawn(lambda red: abs(red[1][1] - still.screen.place(still.middle())[1]) < 25, "the ball on the floor")
     return still
 
 
 def test_play_pause_step_and_reset(still):
-    screen, before = still.screen, still.seen()
-    screen.press("Play")
+    screen, before = still.screen, still.red()[1]
+    still.tab.locator("#play").click()
     screen.wait(lambda: still.middle()[1] < 0.35, "the fall")
     still.drawn(lambda red: red[1][1] > before[1] + 8, "the fall in the picture")
-    screen.press("Pause")
+    still.tab.keyboard.press(" ")
     screen.wait(lambda: still.snapshot().paused, "the pause")
     frame = still.snapshot().frame
-    screen.tab.wait_for_timeout(200)
+    still.tab.wait_for_timeout(200)
     assert still.snapshot().frame == frame
-    low = still.seen()
-    screen.press("step")
+    still.tab.keyboard.press("n")
     screen.wait(lambda: still.snapshot().frame == frame + 1, "one frame")
-    screen.press("reset")
+    still.tab.keyboard.press("r")
     screen.wait(lambda: still.snapshot().frame == 0, "the start")
-    assert still.middle()[1] == pytest.approx(START, abs=1e-3)
     still.drawn(lambda red: np.abs(red[1] - before).max() < 4, "the picture of the start")
-    assert low[1] > before[1] + 8
     assert screen.errors == []
 
 
+def test_nothing_is_drawn_while_time_stands(still):
+    still.tab.wait_for_timeout(1500)  # the better picture
+    before = still.tab.evaluate("supplePage.pictures")
+    still.tab.wait_for_timeout(1000)
+    assert still.tab.evaluate("supplePage.pictures") == before
+
+
 def test_a_body_follows_the_mouse_until_it_is_released(resting):
-    screen, mouse = resting.screen, resting.screen.tab.mouse
-    low = resting.seen()
+    screen, mouse = resting.screen, resting.tab.mouse
+    low = resting.red()[1]
+    camera = resting.tab.evaluate("supplePage.view.camera.position.toArray()")
     grip, up = resting.middle() + np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.2, 0.0])
     mouse.move(*screen.place(grip))
     mouse.down()
@@ -96,52 +92,103 @@ def test_a_body_follows_the_mouse_until_it_is_released(resting):
     mouse.move(*screen.place(grip + 3.0 * up), steps=3)
     screen.wait(lambda: resting.middle()[1] > 0.45, "the ball in the air")
     resting.drawn(lambda red: red[1][1] < low[1] - 12, "the ball in the air in the picture")
-    length = screen.tab.get_by_text(" cm").or_(screen.tab.get_by_text(" mm"))
-    screen.wait(lambda: length.count() >= 1, "how long the spring is")
     mouse.up()
     screen.wait(lambda: not resting.snapshot().grabs, "the end of the spring")
     screen.wait(lambda: resting.middle()[1] < 0.35, "the fall")
-    where = lambda: np.array(screen.place(resting.middle()))  # noqa: E731 - thrown, it may have rolled
-    resting.drawn(lambda red: np.abs(red[1] - where()).max() < 25, "the fall in the picture")
+    assert resting.tab.evaluate("supplePage.view.camera.position.toArray()") == camera
 
 
-@pytest.mark.slow
-def test_a_click_pins_a_vertex_and_another_one_unpins_it(resting):
-    screen, tab = resting.screen, resting.screen.tab
-    top = resting.snapshot().positions[np.argmax(resting.snapshot().positions[:, 1])]
-    x, y = screen.place(top - [0.0, 0.05, 0.0])
-
-    def dark() -> int:
-        shot = screen.shot()[int(y) - 30 : int(y) + 30, int(x) - 40 : int(x) + 40]
-        return int((shot.max(axis=2) < 60).sum())
-
-    screen.wait(lambda: dark() < 5, "a ball without a pin in the picture")
-    tab.mouse.click(x, y)
-    screen.wait(lambda: len(resting.snapshot().pinned) == 1, "the pin")
-    screen.wait(lambda: dark() > 10, "the pin in the picture")
-    tab.wait_for_timeout(500)  # two clicks within a shorter time are one double click
-    tab.mouse.click(x, y)
-    screen.wait(lambda: len(resting.snapshot().pinned) == 0, "no pin")
-    screen.wait(lambda: dark() < 5, "no pin in the picture")
+def test_a_drag_beside_a_body_turns_the_camera(still):
+    camera = still.tab.evaluate("supplePage.view.camera.position.toArray()")
+    mouse = still.tab.mouse
+    mouse.move(40, 80)
+    mouse.down()
+    mouse.move(90, 90, steps=3)
+    mouse.up()
+    assert still.tab.evaluate("supplePage.view.camera.position.toArray()") != camera
+    assert not still.snapshot().grabs
+    still.tab.evaluate("supplePage.view.fit()")
 
 
-def test_a_body_is_added_and_removed(still, spot):
-    screen, bodies = still.screen, still.panel.bodies
-    blue = lambda: spot(screen.shot(), "blue")[0]  # noqa: E731
-    assert blue() < 20
-    screen.tab.get_by_text("Add a body").click()
-    screen.press("Add")
-    screen.wait(lambda: len(still.snapshot().description.bodies) == 2, "a second body")
-    screen.wait(lambda: blue() > 60, "the second body in the picture")
-    name = still.snapshot().description.bodies[1].name
-    screen.wait(lambda: name in bodies.which.options, "its name")
-    screen.choose(bodies.which, name)
-    screen.press("remove")
-    screen.wait(lambda: len(still.snapshot().description.bodies) == 1, "no second body")
-    screen.wait(lambda: blue() < 20, "no second body in the picture")
-    screen.tab.get_by_text("Add a body").click()
+def test_a_click_pins_a_vertex_and_another_one_unpins_it(still):
+    top = still.snapshot().positions[np.argmax(still.snapshot().positions[:, 1])]
+    place = still.screen.place(top - [0.0, 0.05, 0.0])
+    still.tab.mouse.click(*place)
+    still.screen.wait(lambda: len(still.snapshot().pinned) == 1, "the pin")
+    still.screen.wait(lambda: still.tab.evaluate("suppleLive.pins().length") == 1, "the pin on the page")
+    still.tab.mouse.click(*place)
+    still.screen.wait(lambda: len(still.snapshot().pinned) == 0, "no pin")
+
+
+def number(live, name):
+    return live.tab.locator(f"[data-name='{name}'] input").first
+
+
+def test_parameters_have_units_and_reach_the_simulation(still):
+    still.tab.evaluate("supplePage.gui.foldersRecursive().forEach((folder) => folder.open())")
+    assert float(number(still, "youngs").input_value()) == 100.0  # kPa
+    number(still, "youngs").fill("40")
+    number(still, "youngs").press("Enter")
+    values = lambda: still.snapshot().description.bodies[0].values  # noqa: E731
+    still.screen.wait(lambda: values()["youngs"] == 4e4, "the softer ball")
+    number(still, "youngs").fill("1e99")
+    number(still, "youngs").press("Enter")
+    notice = still.tab.locator("#notice")
+    still.screen.wait(notice.is_visible, "the rejection")
+    assert notice.inner_text().startswith("Rejected: youngs is 1e+102; it must be from 100 to 1e+11")
+    still.screen.wait(lambda: float(number(still, "youngs").input_value()) == 40.0, "the value of the simulation")
+    still.tab.locator("[data-name='solver'] select").select_option("implicit")
+    still.screen.wait(lambda: still.snapshot().description.solver == "implicit", "the other solver")
+    still.tab.locator("[data-name='solver'] select").select_option("xpbd")
+    still.screen.wait(lambda: still.snapshot().description.solver == "xpbd", "the first solver")
+
+
+def test_a_field_is_asked_for_and_has_a_legend(still):
+    still.tab.locator("[data-name='color'] select").select_option("volume ratio J")
+    still.screen.wait(lambda: still.snapshot().tet_quantity == "J", "the field")
+    still.screen.holds("suppleLive.latest.field")
+    still.screen.wait(lambda: still.tab.locator("#legend .low").inner_text() == "0.98", "the legend")
+    still.tab.locator("[data-name='color'] select").select_option("body")
+    still.screen.wait(lambda: still.snapshot().tet_quantity is None, "no field")
+
+
+def test_two_tabs_show_the_same_and_a_reload_continues(still, look):
+    other = look(still.tab.url)
+    still.tab.locator("#play").click()
+    for screen in (still.screen, other):
+        screen.holds("suppleLive.latest.frame > 20 && !suppleLive.latest.paused")
+    other.tab.reload()
+    other.holds("globalThis.suppleLive?.latest?.frame > 40")
+    assert other.errors == []
+    other.tab.close()
 
 
 def test_the_browser_reported_no_errors(live):
     assert live.screen.errors == []
     assert np.isfinite(live.snapshot().positions).all()
+
+
+def test_the_page_says_that_its_server_has_ended_and_reconnects(fake, look, spot):
+    with served_page(fake) as page:
+        port = page.port
+        screen = look(f"http://127.0.0.1:{port}/?token={TOKEN}")
+        screen.wait(lambda: spot(screen.shot(), "red")[0] > 100, "the picture")
+        assert not screen.tab.locator("#banner").is_visible()
+    banner = screen.tab.locator("#banner")
+    screen.wait(banner.is_visible, "word that the server is gone")
+    said = "The server has ended. Start it again in a terminal: supple view boxes.yaml"
+    assert banner.locator("span").inner_text() == said
+    before = spot(screen.shot(), "red")
+    assert before[0] > 100  # the last picture stays
+    fake.show(positions=fake.snapshot.positions[::-1].copy(), time=1.0)  # the bodies exchange their positions
+    with served_page(fake, port):
+        screen.wait(lambda: not banner.is_visible(), "the connection")
+        screen.wait(lambda: spot(screen.shot(), "red")[1][0] > before[1][0] + 50, "the new state in the picture")
+        fake.error = "out of <b>memory</b>"
+        screen.wait(banner.is_visible, "word that the simulation has ended")
+        assert banner.locator("span").inner_text() == "The simulation has ended: out of <b>memory</b>"
+        banner.locator("button").click()
+        screen.wait(lambda: fake.starts == 1, "the restart")
+        screen.wait(lambda: not banner.is_visible(), "no word of an end")
+        screen.tab.close()
+    assert [error for error in screen.errors if "WebSocket" not in error] == []

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 SCENE_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
-PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "websockets", "pydantic")
 EXTRAS = ("pymeshfix", "pycollada", "loky", "usd-core", "pyvista")
 
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.controls.view.color_scale import bar_html
 from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
-from supple.results.view.fields import BINS, FIELDS, Limits, Range, bin_of
+from supple.results.view.fields import FIELDS, Limits, Range
 
 J, MISES, ENERGY = FIELDS.values()
 
@@ -47,11 +46,6 @@ def test_values_of_the_simulation_are_used(stretched):
     np.testing.assert_array_equal(MISES.values(replace(stretched, tet_values={"von_mises": values})), values)
 
 
-def test_bins_of_values_within_and_beyond_the_scale():
-    values = np.array([-5.0, 0.0, 0.499, 0.5, 1.0, 9.0, np.nan, np.inf])
-    assert list(bin_of(values, 0.0, 1.0)) == [0, 0, BINS // 2 - 1, BINS // 2, BINS - 1, BINS - 1, BINS, BINS]
-
-
 def test_ends_of_scales_are_round_and_stable():
     limits = Limits(MISES, Range())
     assert limits.follow(np.full(10, 37.0)) == (0.0, 50.0)
@@ -65,12 +59,3 @@ def test_ends_of_scales_are_round_and_stable():
     assert Limits(MISES, Range(0.98)).follow(values) == (0.0, 20.0)
     assert Limits(MISES, Range(1.0)).follow(values) == (0.0, 1000.0)
     assert Limits(MISES, Range(fixed=(5.0, 70.0))).follow(values) == (5.0, 70.0)
-
-
-def test_the_legend_has_name_numbers_and_units_or_says_that_nothing_is_known():
-    bar = bar_html(replace(MISES, name="<b>"), (0.0, 2e4))
-    assert "&lt;b&gt;" in bar
-    assert [text in bar for text in (">0 Pa<", ">10 kPa<", ">20 kPa<")] == [True] * 3
-    assert bar.count("rgb(") == BINS
-    assert "not known" in bar_html(MISES, None)
-    assert "rgb(" not in bar_html(MISES, None)

@@ -2,24 +2,7 @@
 
 import numpy as np
 
-import supple as sp
 from supple.app.viewer.from_snapshot import RenderFrameBuilder
-from supple.results.view.model import facets_of
-
-
-def test_every_facet_is_found_once_and_outer_facets_are_the_surface():
-    mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(3, 2, 2))
-    facets = facets_of(mesh.tets)
-    outer = facets.triangles[facets.outer < 0]
-    assert 2 * (len(facets.outer) - len(outer)) + len(outer) == 4 * len(mesh.tets)
-    # The same triangles, turned the same way: the first corner is the lowest vertex of each.
-    turned = [
-        np.array(sorted(tuple(np.roll(t, -int(np.argmin(t)))) for t in triangles))
-        for triangles in (outer, mesh.surface.triangles)
-    ]
-    np.testing.assert_array_equal(*turned)
-    for inner, outer in zip(facets.inner, facets.outer, strict=True):
-        assert outer < 0 or len(set(mesh.tets[inner]) & set(mesh.tets[outer])) == 3
 
 
 def test_a_snapshot_becomes_a_render_frame(fake):
@@ -33,7 +16,7 @@ def test_a_snapshot_becomes_a_render_frame(fake):
     np.testing.assert_array_equal(frame.tet_values["J"], values)
     np.testing.assert_allclose(np.linalg.det(frame.deformation_gradients), 1.0)
     np.testing.assert_array_equal(frame.poses[0], np.eye(4)[:3])
-    # The same generation has the same model, so that no layer is created again.
+    # The same generation has the same model, so that the scene is not sent again.
     assert translator.frame(fake.show()).model is frame.model
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from supple.app.viewer.from_snapshot import RenderFrameBuilder
-from supple.results.view.picking import nearest_surface_point, surface_point_on_ray
+from supple.results.view.picking import nearest_surface_point
 
 
 @pytest.fixture
@@ -31,15 +31,3 @@ def point_of(frame, low):
     """The corner of the nearer body that is nearest to what lies below and before both."""
     offsets = np.linalg.norm(frame.positions - (low - 1.0), axis=1)
     return frame.positions[np.argmin(offsets)]
-
-
-def test_first_intersection_of_a_ray(frame):
-    low, high = frame.positions.min(axis=0), frame.positions.max(axis=0)
-    across = 0.5 * (low + high) + [0.0, 0.07, 0.03]
-    point = surface_point_on_ray(frame, [low[0] - 3.0, *across[1:]], [1.0, 0.0, 0.0])
-    assert point.body.name == "body 0"
-    np.testing.assert_allclose(place_of(frame, point), [low[0], *across[1:]], atol=1e-9)
-    vertex = frame.positions[point.nearest_vertex + point.body.vertices.start]
-    assert np.linalg.norm(vertex - point.place) <= 0.36  # half the diagonal of a facet
-    assert surface_point_on_ray(frame, [low[0] - 3.0, *across[1:]], [-1.0, 0.0, 0.0]) is None
-    assert surface_point_on_ray(frame, [low[0] - 3.0, *across[1:]], [0.0, 0.0, 0.0]) is None

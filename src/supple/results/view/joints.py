@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.results.view.layers.layer import Layer, single
 from supple.results.view.model import Model, RenderFrame
 from supple.scene.joints.placed import PlacedJoint
 
@@ -16,28 +15,6 @@ JOINT_COLOR = (225, 120, 20)
 _ARC = 32  # lines of a whole turn
 # Lengths as shares of the longest distance of the first body's control points: axes reach out of the body.
 _AXIS, _LIMIT, _POINT = 0.7, 0.35, 0.08
-
-
-class JointView(Layer):
-    """Lines for each joint.
-
-    A cross is its point, a line the axis. An arc, a line along the axis or the rim of a cone shows limits; it moves
-    with the second side, and a line that moves with the first shows where the joint is.
-    """
-
-    def __init__(self, scene: Any, frame: RenderFrame) -> None:
-        joints = frame.model.joints
-        self._lines = lines_of_joints(frame.model)
-        self.nodes = []
-        if joints:
-            ends = single(joint_segments(frame, self._lines))
-            self.nodes = [
-                scene.add_line_segments("/joints", ends, JOINT_COLOR, thickness=3.0, thickness_units="screen")
-            ]
-
-    def update(self, frame: RenderFrame) -> None:
-        for handle in self.nodes:
-            handle.points = single(joint_segments(frame, self._lines))
 
 
 def lines_of_joints(model: Model) -> list[Sides]:
@@ -49,7 +26,11 @@ Sides = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def joint_segments(frame: RenderFrame, lines: list[Sides]) -> NDArray[np.float64]:
-    """(k, 2, 3) ends of all lines [m], of those in the coordinates of the two sides of each joint."""
+    """(k, 2, 3) ends of all lines [m], of those in the coordinates of the two sides of each joint.
+
+    A cross is its point, a line the axis. An arc, a line along the axis or the rim of a cone shows limits; it moves
+    with the second side, and a line that moves with the first shows where the joint is.
+    """
     placed = []
     for joint, sides in zip(frame.model.joints, lines, strict=True):
         for side, own in zip(joint.sides, sides, strict=True):

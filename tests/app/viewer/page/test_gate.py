@@ -1,4 +1,4 @@
-"""The gate before viser's server: tokens, other sites, nonsense, many connections."""
+"""The gate before the page: tokens, other sites, nonsense, many connections."""
 
 import contextlib
 import http.client
@@ -9,35 +9,33 @@ import time
 import urllib.error
 import urllib.request
 
-import msgspec
 import pytest
-import viser
+from tests.app.viewer.page.conftest import served_page, two_boxes
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from supple.app.viewer import gate
+from supple.app.viewer.gate import new_token
+from supple.app.viewer.server import require_free_port
 from supple.errors import OutputError
-from supple.results.view import gate
-from supple.results.view.gate import Gate, new_token
-from supple.results.view.server import _serving_behind, gated_server, require_free_port
 
-PROTOCOL = f"viser-v{viser.__version__}"
 TIMEOUT = 30.0
 TOKEN = "the-token-of-the-tests"
 
 
 @pytest.fixture(scope="module")
 def server():
-    with gated_server(TOKEN) as server:
+    with served_page(two_boxes()) as server:
         yield server
 
 
 def dial(server, path=f"/?token={TOKEN}", **headers):
-    url = f"ws://127.0.0.1:{server.get_port()}{path}"
-    return connect(url, subprotocols=[PROTOCOL], additional_headers=headers, open_timeout=TIMEOUT, max_size=None)
+    url = f"ws://127.0.0.1:{server.port}{path}"
+    return connect(url, additional_headers=headers, open_timeout=TIMEOUT, max_size=None)
 
 
 def fetch(server, path=f"/?token={TOKEN}", **headers):
-    request = urllib.request.Request(f"http://127.0.0.1:{server.get_port()}{path}", headers=headers)
+    request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", headers=headers)
     with urllib.request.urlopen(request, timeout=TIMEOUT) as response:
         return response.status, response.headers, response.read()
 
@@ -79,6 +77,7 @@ def test_the_page_sets_a_cookie_that_its_websocket_uses(server):
     status, headers, body = fetch(server)
     assert status == 200
     assert b"<html" in body[:1000].lower()
+    assert b"<title>boxes \xc2\xb7 Supple</title>" in body
     assert headers["Referrer-Policy"] == "no-referrer"
     cookie = headers["Set-Cookie"]
     assert {"HttpOnly", "SameSite=Strict"} <= {part.strip() for part in cookie.split(";")}
@@ -101,7 +100,7 @@ def test_a_page_of_another_site_is_refused_though_its_browser_holds_the_cookie(s
 
 
 def test_the_page_itself_is_let_in(server):
-    with dial(server, Origin=f"http://127.0.0.1:{server.get_port()}") as connection:
+    with dial(server, Origin=f"http://127.0.0.1:{server.port}") as connection:
         assert connection.recv(timeout=TIMEOUT)
 
 
@@ -120,7 +119,7 @@ def test_hosts_of_this_machine_and_of_tunnels_are_served(server, host):
 
 
 def test_two_hosts_are_refused(server):
-    with socket.create_connection(("127.0.0.1", server.get_port()), timeout=TIMEOUT) as raw:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=TIMEOUT) as raw:
         raw.sendall(f"GET /?token={TOKEN} HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n\r\n".encode())
         assert raw.recv(100).split()[1] == b"403"
 
@@ -129,14 +128,14 @@ def test_a_page_of_another_site_in_a_browser_reaches_nothing(server, browser):
     """The browser holds the cookie, and runs the script of a page at another port."""
     context = browser.new_context()
     own = context.new_page()
-    own.goto(f"http://127.0.0.1:{server.get_port()}/?token={TOKEN}")
+    own.goto(f"http://127.0.0.1:{server.port}/?token={TOKEN}")
     foreign = context.new_page()
     foreign.route("http://evil.example/", lambda route: route.fulfill(body="<html></html>", content_type="text/html"))
     foreign.goto("http://evil.example/")
-    port, token = server.get_port(), TOKEN
+    port, token = server.port, TOKEN
     opened = foreign.evaluate(
         f"""() => Promise.all(["/", "/?token={token}"].map((path) => new Promise((resolve) => {{
-          const line = new WebSocket("ws://127.0.0.1:{port}" + path, "{PROTOCOL}");
+          const line = new WebSocket("ws://127.0.0.1:{port}" + path);
           line.onopen = () => resolve("open");
           line.onerror = () => resolve("refused");
         }})))"""
@@ -163,9 +162,21 @@ NONSENSE = {
     "random bytes": RANDOM.randbytes(60_000),
     "nothing": b"",
     "text": "hello",
-    "deep nesting": b"\x91" * 5_000,
-    "a map without a kind": b"\x80",
-    "an unknown kind": b"\x81\xa4type\xaa__import__",
+    "deep nesting": "[" * 20_000,
+    "deep objects": '{"a":' * 10_000,
+    "a number": "1e999",
+    "no act": "{}",
+    "an unknown act": '{"act": "__import__"}',
+    "an act that is a list": '{"act": ["Play"]}',
+    "unknown fields": '{"act": "Play", "body": 1}',
+    "a method": '{"act": "put", "kind": "x", "message": "y"}',
+    "infinity": '{"act": "grab", "point": [Infinity, 0, 0], "target": [0, 0, NaN]}',
+    "a huge number": '{"act": "SetSpeed", "factor": 1' + "0" * 5000 + "}",
+    "no point": '{"act": "grab", "point": "here", "target": null}',
+    "an unknown solver": '{"act": "SetSolver", "kind": "<script>"}',
+    "an unknown field": '{"act": "view", "field": [], "contacts": 3}',
+    "a release of nothing": '{"act": "release"}',
+    "a surrogate": '{"act": "\\ud800"}',
 }
 
 
@@ -185,16 +196,22 @@ def test_a_message_beyond_the_size_limit_is_not_read(server):
         assert ended(bad) == 1009
 
 
-def test_a_file_closes_its_connection(server):
-    start = {"type": "FileTransferStartUpload", "filename": "x", "mime_type": "", "part_count": 99, "size_bytes": 9}
-    with dial(server) as bad, dial(server) as good:
-        bad.send(msgspec.msgpack.encode(start | {"source_component_uuid": "a", "transfer_uuid": "b"}))
-        assert ended(bad) == 1008
-        good.ping().wait(TIMEOUT)
+@pytest.mark.parametrize("path", ["/index.html", "/../etc/passwd", "/%2e%2e/", "/data"])
+def test_nothing_but_the_page_is_served(server, path):
+    with pytest.raises(urllib.error.HTTPError) as caught:
+        fetch(server, f"{path}?token={TOKEN}")
+    assert caught.value.code in (403, 404)
+
+
+def test_the_page_may_ask_nobody_else(server):
+    policy = fetch(server)[1]["Content-Security-Policy"]
+    assert policy.startswith("default-src 'none'")
+    assert "frame-ancestors 'none'" in policy
+    assert f"connect-src 'self' ws://127.0.0.1:{server.port};" in policy
 
 
 def test_a_thousand_connections_are_survived(server):
-    place = ("127.0.0.1", server.get_port())
+    place = ("127.0.0.1", server.port)
     with dial(server) as good, contextlib.ExitStack() as ends:
         for k in range(1000):
             silent = ends.enter_context(socket.create_connection(place, timeout=TIMEOUT))
@@ -212,28 +229,28 @@ def test_a_thousand_connections_are_survived(server):
 
 
 def test_a_server_can_restart_at_the_same_port():
-    with gated_server(TOKEN) as server, dial(server) as connection:
+    with served_page(two_boxes()) as server, dial(server) as connection:
         connection.recv(timeout=TIMEOUT)
-        port = server.get_port()
+        port = server.port
     for _ in range(2):
         require_free_port(port)
-        with gated_server(TOKEN, port) as again:
-            assert again.get_port() == port
+        with served_page(two_boxes(), port) as again:
+            assert again.port == port
             assert fetch(again)[0] == 200
+
+
+def test_the_next_free_port_is_taken(server):
+    with served_page(two_boxes(), server.port) as other:
+        assert server.port < other.port <= server.port + 200
 
 
 def test_a_used_port_is_refused(server):
     with pytest.raises(OutputError, match="--port"):
-        require_free_port(server.get_port())
+        require_free_port(server.port)
 
 
 def test_only_the_loopback_interface_is_served(server):
     addresses = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
     for address in addresses - {"127.0.0.1", "127.0.1.1"}:
         with pytest.raises(OSError, match="refused"):
-            socket.create_connection((address, server.get_port()), timeout=5.0)
-
-
-def test_a_server_that_is_not_behind_the_gate_is_an_error():
-    with pytest.raises(OutputError, match="cannot be protected"), _serving_behind(Gate(TOKEN)):
-        pass
+            socket.create_connection((address, server.port), timeout=5.0)
