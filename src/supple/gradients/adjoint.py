@@ -63,7 +63,7 @@ class StepAdjoint:
     forces : (n, 3) l
     multipliers : (c,) u, of the conditions `rows` among all; held : (l,) which laws of joints are conditions
     end : (n, 3) dL/dx; begin : (n, 3) derivative by the positions where it begins
-    internal : (k, 11) by the internal variables at the end
+    internal : (k, 11) by the internal variables at the end; anchors : (a, 3) by where pins are then
     """
 
     forces: Floats
@@ -73,6 +73,7 @@ class StepAdjoint:
     end: Floats
     begin: Floats
     internal: Floats
+    anchors: Floats
 
     def value(self, replay: Replay) -> float:
         """A function of the scene alone, whose derivative by the parameters is that of the loss in this substep."""
@@ -128,7 +129,9 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     of_conditions[rows] = multipliers
     add_by_joints(replay, forces, of_conditions, held, begin.x)
     end = after.x + rate * after.v
-    return StepAdjoint(forces, multipliers, rows, held, end, begin.x, after.internal), begin
+    whole = end + equations.transposed_product(forces) + (equations.C.T @ multipliers).reshape(-1, 3)
+    anchors = whole[replay.workspace.system.pinned_vertices]
+    return StepAdjoint(forces, multipliers, rows, held, end, begin.x, after.internal, anchors), begin
 
 
 def _by_state(replay: Replay, after: StateAdjoint, forces: Floats, rate: float) -> StateAdjoint:

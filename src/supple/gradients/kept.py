@@ -149,18 +149,21 @@ class Replay:
         """(n, 3) g of all vertices, those of pins and welds included [N]."""
         return self.objective.gradient(self.x)
 
+    @property
+    def contact_gradient(self) -> NDArray[np.float64]:
+        """(n, 3) of the barrier [N]."""
+        return Objective([term for term in self.objective.terms if isinstance(term, Barrier)]).gradient(self.x)
+
     def area_change(self) -> float:
         """How much contact's forces (n, 3) would change with the areas that contacts have at the end, as a share.
 
         Afterwards, contacts have those.
         """
-        model = self.workspace.contact
-        barriers = [term for term in self.objective.terms if isinstance(term, Barrier)]
+        model, kept = self.workspace.contact, self.contact_gradient
         if model is None or not len(model.collisions.at(self.x).kinds):
             return 0.0
-        kept = Objective(barriers).gradient(self.x)
         model.collisions.forget_weights()
-        change = norm(Objective(barriers).gradient(self.x) - kept)
+        change = norm(self.contact_gradient - kept)
         return change / max(norm(kept), np.finfo(float).tiny)
 
     def conditions(self, held: NDArray[np.int64]) -> NDArray[np.float64]:

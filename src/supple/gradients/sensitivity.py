@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError, SolverError, SuppleWarning
 from supple.gradients.adjoint import StateAdjoint, StepAdjoint, step_adjoint
 from supple.gradients.equations import Equations
+from supple.gradients.fields import by_anchors, fields_of
 from supple.gradients.kept import Kept, Replay
 from supple.gradients.misfit import Loss, Misfit, OwnLoss, Seeds
 from supple.gradients.refusals import refuse
@@ -20,6 +21,7 @@ from supple.gradients.tangent import Side, StateTangent, step_tangent
 from supple.model.state import State
 from supple.model.system import System, initial_state
 from supple.results.frame import Frame
+from supple.scene.rotation import rotation_matrix
 from supple.scene.scene import Scene
 from supple.simulate import check_timing, frames_from, prepared
 from supple.solvers.implicit.solver import Implicit
@@ -44,13 +46,17 @@ class Gradient:
     ----------
     value : of the loss; by_parameters : (q,)
     start_positions, start_velocities : by name of the body, (n, 3) by where and how fast its vertices start [1/m],
-        [s/m]
+        [s/m]; pins hold vertices where they start
+    moduli : by name of the body, (m,) by the logarithm of all moduli of each tet, if asked for
+    rest_positions : by name of the body, (n, 3) by its mesh's vertices, from whose places it starts [1/m], if asked for
     """
 
     value: float
     by_parameters: Floats
     start_positions: dict[str, Floats]
     start_velocities: dict[str, Floats]
+    moduli: dict[str, Floats]
+    rest_positions: dict[str, Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,8 +196,17 @@ class Sensitivity:
         found = self.gradient(p)
         return found.value, found.by_parameters
 
-    def gradient(self, p: ArrayLike) -> Gradient:
-        """The loss at parameters (q,) and all its derivatives."""
+    def gradient(
+        self, p: ArrayLike, parameters: Sequence[int] | None = None, *, moduli: bool = False, rest: bool = False
+    ) -> Gradient:
+        """The loss at parameters (q,) and its derivatives.
+
+        Parameters
+        ----------
+        parameters : numbers of those to differentiate by; None: all. Each costs two evaluations of each step's forces.
+        moduli, rest : whether to differentiate by the moduli of every tet, and by rest positions: in all, a pass or 24
+            passes over the tets of each step. Contact's areas count as constant.
+        """
         p = _vector(p)
         first, workspace = self._begun(p)
         workspace.tape = tape = []
@@ -210,10 +225,18 @@ class Sensitivity:
             for one, adjoint in zip(some, own, strict=True)
         ]
         system = first.system
-        starts = {part.name: begin.x[part.vertices] for part in system.bodies}
-        moving = {part.name: begin.v[part.vertices] for part in system.bodies}
-        by_parameters = np.array([self._derivative(p, k, steps, begin, system) for k in range(len(p))])
-        return Gradient(total, by_parameters, starts, moving)
+        starts = by_anchors(system, steps, begin.x)
+        by_moduli, by_rest = fields_of(workspace, steps, self.solver, moduli=moduli, rest=rest)
+        chosen = range(len(p)) if parameters is None else parameters
+        by_parameters = np.array([self._derivative(p, k, steps, begin, system) for k in chosen])
+        of_moduli = {part.name: by_moduli[part.tets] for part in system.bodies} if moduli else {}
+        shapes = {}
+        for part in system.bodies if rest else ():
+            turn = rotation_matrix(part.body.rotation)
+            shapes[part.name] = by_rest[part.vertices] + starts[part.vertices] @ turn
+        own = {part.name: (starts[part.vertices], begin.v[part.vertices]) for part in system.bodies}
+        places, rates = ({name: both[k] for name, both in own.items()} for k in (0, 1))
+        return Gradient(total, by_parameters, places, rates, of_moduli, shapes)
 
     def check(self, p: ArrayLike, directions: int = 2, *, step: float = 1e-4, seed: int = 0) -> Check:
         """Compare with central differences of whole runs along random directions.

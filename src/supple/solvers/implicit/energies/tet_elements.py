@@ -69,9 +69,13 @@ class TetPotential(Potential):
         return x, self.elements.tets, self.elements.rest_shape_inverse, *self.parameters
 
     def value(self, x: NDArray[np.float64]) -> float:
+        return float(self.energies(x).sum())
+
+    def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m,) of each tet [J]."""
         out = np.empty(len(self.elements))
         self.kernels[0](*self._arguments(x), out)
-        return float(out.sum())
+        return out
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         gradients = np.empty((len(self.elements), 4, 3))
