@@ -215,3 +215,33 @@ def test_the_study_of_the_slope_follows_coulomb_s_law(tmp_path):
     expected = [max(0.0, 0.5 * (4.905 - mu * 8.495709)) for mu in table["obstacles.slope.friction"]]
     assert table["slid"] == pytest.approx(expected, rel=0.03, abs=2e-3)
     assert table.units == {"obstacles.slope.friction": "", "slid": "m"}
+
+
+def test_16_the_law_of_a_foam_follows_from_a_crush_test(tmp_path):
+    found = run_example("16", tmp_path / "fit.png")
+    assert found["off"] < 2.0  # standard errors
+    assert found["youngs"] == pytest.approx(8e4, rel=0.03)
+
+
+def test_17_moduli_of_regions_follow_from_a_film():
+    assert run_example("17")["off"] < 3.0  # standard errors
+    assert run_example("17", noise=0.0)["relative"] < 1e-3
+
+
+def test_18_pressures_bring_a_finger_onto_a_path():
+    found = run_example("18")
+    assert found["off"] < 1e-3
+    assert found["runs"] <= 40
+
+
+def test_19_a_throw_lands_in_a_bowl():
+    found = run_example("19")
+    assert found["off"] < 1e-3
+    assert found["runs"] <= 40
+
+
+def test_20_an_arm_is_made_such_that_it_is_straight():
+    found = run_example("20")
+    assert found["off"] < 1e-2
+    assert found["runs"] <= 40
+    assert found["rise"] > 0.01

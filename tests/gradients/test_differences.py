@@ -83,6 +83,7 @@ def test_reactions_and_velocities():
     loss = [
         sp.Misfit("reaction", "pin of body 'bar'", [[1.0, 2.0, 3.0], [0.5, 0.0, 0.0]], frames=[2, 6], weight=1e-3),
         sp.Misfit("velocities", "bar", np.full((2, 3), 0.1), vertices=[7, 9]),
+        sp.Misfit("center", "bar", [1.0, 0.5, np.nan], vertices=[3, 7, 9]),
     ]
     check = sensitivity(scenes.damped, 3, implicit(), loss=loss).check(np.ones(3), 1, step=1e-5)
     assert check.relative <= 1e-6, str(check)

@@ -43,6 +43,16 @@ def test_standard_errors_say_what_noise_does():
     assert "+-" in str(found)
 
 
+def test_what_readings_do_not_determine_has_no_standard_error():
+    """Of an undamped body, they give modulus over density."""
+    frames = sp.simulate(scenes.damped([1.2, 1, 0]), implicit(), dt=0.01, steps=STEPS)
+    loss = sp.Misfit("positions", "bar", [frame.positions["bar"] for frame in frames])
+    one = sp.Sensitivity(lambda p: scenes.damped([p[0], p[1], 0]), loss, implicit(), dt=0.01, steps=STEPS)
+    found = sp.fit_simulation(one, [1.0, 1.0], bounds=(0.1, 10))
+    assert found.values[0] / found.values[1] == pytest.approx(1.2, rel=1e-4)
+    assert np.isnan(found.standard_errors).all()
+
+
 def test_a_loss_of_ones_own_goes_to_the_gradient():
     height = film([1.3, 1])[-1, -1, 1]
 
@@ -81,3 +91,19 @@ def test_jacobians_and_gradients_agree(name):
     gradient = one.value_and_gradient(np.ones(q))[1]
     residuals, J = one.residuals_and_jacobian(np.ones(q))
     assert np.abs(2 * residuals @ J - gradient).max() <= 1e-5 * np.abs(gradient).max()
+
+
+def test_what_does_not_exist_is_named():
+    for quantity, of, text in (("reaction", "grip", "pin 'grip' does not exist"), ("positions", "baar", "'baar'")):
+        target = [0.0, 0.0, 0.0] if quantity == "reaction" else np.zeros((1, 3))
+        one = sp.Sensitivity(
+            lambda p: scenes.damped([p[0], 1, 1]), sp.Misfit(quantity, of, target), implicit(), 0.01, 1
+        )
+        with pytest.raises(sp.SceneError, match=text):
+            one.value([1.0])
+    with pytest.raises(sp.SceneError, match="quantity 'place' does not exist"):
+        sp.Misfit("place", "bar", np.zeros((1, 3)))
+    with pytest.raises(sp.SceneError, match="frames 1 to 6"):
+        misfit_of(np.zeros((9, 20, 3)))
+    with pytest.raises(sp.SceneError, match="2 names for 1 parameters"):
+        sp.fit_simulation(misfit_of(np.zeros((20, 3))), [1.0], names=["a", "b"])

@@ -141,7 +141,7 @@ def by_anchors(system: System, steps: Sequence[tuple[Kept, StepAdjoint]], begin:
             out[pin.vertices] += adjoint.anchors[rows] @ _turn(pin.motion, kept.end)
     for part in system.soft_targets:
         for kept, adjoint in steps:
-            pulls = -part.target.stiffness * adjoint.forces[part.vertices]
+            pulls = -np.asarray(part.target.stiffness) * adjoint.forces[part.vertices]
             np.add.at(out, part.vertices, pulls @ _turn(part.target.motion, kept.end))
     return out
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.errors import SceneError, SolverError
+from supple.errors import SceneError, SuppleError
 from supple.gradients.sensitivity import Sensitivity
 from supple.runtime.figures import paper_figure
 
@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 _FAILED = 1e3
 # Of least squares: more parameters than this make Jacobians dearer than gradients.
 _MOST_COLUMNS = 50
+# Condition of a Jacobian, whose digits are eight, beyond which the readings do not determine the parameters.
+_SINGULAR = 1e7
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +169,7 @@ class _Runs:
     def residuals(self, p: Floats) -> Floats:
         try:
             found = self.of.residuals(p)
-        except SolverError as error:
+        except SuppleError as error:
             if self.first is None:
                 raise
             self._note(p, np.inf, str(error))
@@ -179,7 +181,7 @@ class _Runs:
     def gradient(self, p: Floats, scales: Floats) -> tuple[float, Floats]:
         try:
             value, by = self.of.value_and_gradient(p)
-        except SolverError as error:
+        except SuppleError as error:
             if not self.count:
                 raise
             self._note(p, np.inf, str(error))
@@ -215,7 +217,7 @@ def _at_end(of: Sensitivity, p: Floats, scales: Floats, jacobian: Floats | None)
     seen = sum(len(values) for values in measured.values())
     freedom = seen - len(p)
     R = np.linalg.qr(jacobian, mode="r")
-    if freedom > 0 and np.linalg.cond(R) < 1e12:
+    if freedom > 0 and np.linalg.cond(R) < _SINGULAR:
         spread = float(residuals @ residuals) / freedom
         errors = scales * np.sqrt(spread * (np.linalg.inv(R) ** 2).sum(axis=1))
     return errors, measured, simulated

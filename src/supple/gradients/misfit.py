@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.kinds.suggestion import suggestion
 from supple.model.pin_reactions import pin_labels
-from supple.model.system import System
+from supple.model.system import PinRange, System
 from supple.results.frame import Frame
 
 Floats = NDArray[np.float64]
 OwnLoss = Callable[[Frame], "tuple[float, Mapping[str, ArrayLike]] | None"]
 
-_QUANTITIES = ("positions", "velocities", "reaction")
+_QUANTITIES = ("positions", "velocities", "center", "reaction")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +39,11 @@ class Misfit:
 
     Parameters
     ----------
-    quantity : "positions" [m] or "velocities" [m/s] of a body, or the "reaction" of a pin on what it holds [N].
-    of : name of the body, or label of the pin as in `frame.report.details.reaction_forces`.
-    target : what was measured, in the unit of the quantity: (k, 3), or (f, k, 3) of every frame; of a reaction (3,) or
-        (f, 3). What is NaN was not measured.
+    quantity : "positions" [m] or "velocities" [m/s] of a body's vertices, the "center" of these, which is the mean of
+        their positions [m], or the "reaction" of a pin on what it holds [N].
+    of : name of the body, or name or label of the pin, see `frame.report.details.reaction_forces`.
+    target : what was measured, in the unit of the quantity: (k, 3), or (f, k, 3) of every frame; of a center
+        or reaction (3,) or (f, 3). What is NaN was not measured.
     vertices : (k,) rows of `frame.positions[body]`; None: all.
     frames : (f,) numbers of frames, from 1; None: the last one, or with (f, k, 3) the last f.
     weight : factor of a square.
@@ -67,7 +68,7 @@ class Misfit:
         self.quantity, self.of, self.weight = quantity, of, float(weight)
         self.vertices = None if vertices is None else np.asarray(vertices, dtype=np.int64)
         values = np.asarray(target, dtype=np.float64)
-        one = 1 if quantity == "reaction" else 2
+        one = 1 if quantity in ("center", "reaction") else 2
         if values.ndim not in (one, one + 1) or values.shape[-1] != 3:
             raise SceneError(f"{self.label}: target has shape {values.shape}; give rows of x, y and z")
         if values.ndim == one:
@@ -102,33 +103,44 @@ class Misfit:
         """Add the derivatives of a loss with these derivatives by `residuals`."""
         values = np.sqrt(self.weight) * by_residual
         if self.quantity == "reaction":
-            pin = system.pins[pin_labels(system).index(self.of)]
-            seeds.pins[pin.vertices] += values
+            seeds.pins[self._pin(system)[1].vertices] += values
             return
-        add_of_body(system, self.of, values, self.vertices, seeds.x if self.quantity == "positions" else seeds.v)
+        if self.quantity == "center":
+            count = len(system.split(seeds.x)[self.of]) if self.vertices is None else len(self.vertices)
+            values = np.tile(values / count, (count, 1))
+        add_of_body(system, self.of, values, self.vertices, seeds.v if self.quantity == "velocities" else seeds.x)
 
     def tangents(self, system: System, row: int, x: Floats, v: Floats, forces: Floats) -> Floats:
         """The change of `residuals` with changes (n, 3) of positions, velocities, and forces of pins."""
         if self.quantity == "reaction":
-            change = forces[system.pins[pin_labels(system).index(self.of)].vertices].sum(axis=0)
+            change = forces[self._pin(system)[1].vertices].sum(axis=0)
         else:
-            change = system.split(x if self.quantity == "positions" else v)[self.of]
-            change = change if self.vertices is None else change[self.vertices]
+            change = system.split(v if self.quantity == "velocities" else x)[self.of]
+            change = self._of_rows(change)
         return np.where(np.isnan(self.target[row]), 0.0, np.sqrt(self.weight) * change)
+
+    def _pin(self, system: System) -> tuple[str, PinRange]:
+        """The label of the pin that this is about, and its vertices."""
+        labels = pin_labels(system)
+        for label, pin in zip(labels, system.pins, strict=True):
+            if self.of in (label, pin.pin.name):
+                return label, pin
+        raise SceneError(f"{self.label}: pin {self.of!r} does not exist; {suggestion(self.of, labels)}")
 
     def _reading(self, frame: Frame) -> Floats:
         if self.quantity == "reaction":
-            known = frame.report.details.reaction_forces
-        else:
-            known = frame.system.split(getattr(frame.state, self.quantity))
-        if self.of not in known:
-            raise SceneError(f"{self.label}: {self.of!r} does not exist; {suggestion(self.of, list(known))}")
-        values = np.asarray(known[self.of])
-        if self.vertices is None or self.quantity == "reaction":
-            return values
-        if len(self.vertices) and not 0 <= self.vertices.min() <= self.vertices.max() < len(values):
-            raise SceneError(f"{self.label}: the body has vertices 0 to {len(values) - 1}")
-        return values[self.vertices]
+            return frame.report.details.reaction_forces[self._pin(frame.system)[0]]
+        state = frame.state
+        known = frame.system.split(state.velocities if self.quantity == "velocities" else state.positions)
+        return self._of_rows(known[self.of])  # says what exists
+
+    def _of_rows(self, values: Floats) -> Floats:
+        """The reading, from the values of all points of the body."""
+        if self.vertices is not None:
+            if len(self.vertices) and not 0 <= self.vertices.min() <= self.vertices.max() < len(values):
+                raise SceneError(f"{self.label}: the body has vertices 0 to {len(values) - 1}")
+            values = values[self.vertices]
+        return values.mean(axis=0) if self.quantity == "center" else values
 
 
 def add_of_body(system: System, name: str, values: Floats, rows: NDArray[np.int64] | None, out: Floats) -> None:
