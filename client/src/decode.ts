@@ -143,9 +143,10 @@ export interface Source {
   pose(obstacle: number, frame: number): Numbers;
   /** Pinned points. */
   pins(): Numbers;
-  /** Ends (k, 2, 3) of the springs of grabs, and of forces of contacts. */
+  /** Ends (k, 2, 3) of the springs of grabs, and of forces of contacts; and points (k, 3) of contacts. */
   grabs(): Numbers;
   contacts(): Numbers;
+  touching(): Numbers;
 }
 
 /** The frames of a recording: where all points are, and the values of fields, at any time. */
@@ -201,6 +202,10 @@ export class Motion implements Source {
   }
 
   contacts(): Numbers {
+    return NONE;
+  }
+
+  touching(): Numbers {
     return NONE;
   }
 }

@@ -29,6 +29,7 @@ export interface FrameMessage {
   pins: Ref;
   grabs: Ref;
   contacts: Ref;
+  touching: Ref;
   field: { key: string; ends: [number, number]; values: Ref } | null;
   solver: string;
   values: Values;
@@ -97,6 +98,10 @@ export class Live implements Source {
 
   contacts(): Numbers {
     return this.array(this.latest!.contacts);
+  }
+
+  touching(): Numbers {
+    return this.array(this.latest!.touching);
   }
 
   private array(ref: Ref): Numbers {

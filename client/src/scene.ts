@@ -251,8 +251,10 @@ export class Stage {
     add(lines(0xe17814), () => part(joints), always);
     add(lines(0x30343c), () => this.motion.grabs(), always);
     add(lines(0xdc286e), () => this.motion.contacts(), () => this.shown.contacts);
-    const dot = new PointsMaterial({ color: 0x141418, size: 0.03 * radius });
-    add(new Points(new BufferGeometry(), dot), () => this.pinned(), always);
+    const dots = (color: number, size: number) =>
+      new Points(new BufferGeometry(), new PointsMaterial({ color, size: size * radius }));
+    add(dots(0xdc286e, 0.015), () => this.motion.touching(), () => this.shown.contacts);
+    add(dots(0x141418, 0.03), () => this.pinned(), always);
   }
 
   private pinned(): Float32Array {

@@ -1,5 +1,8 @@
 """Small scenes for the live page."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import supple as sp
@@ -34,6 +37,22 @@ def free_source(**changes):
 def run(live, steps):
     for _ in range(steps):
         assert live.step().status.can_go_on
+
+
+def squash(live, factor):
+    """Scale the height of what is not pinned along gravity; it gets wider, keeps its volume, and starts at rest."""
+    x, v = live.state.positions.copy(), live.state.velocities.copy()
+    pinned = live.system.pinned_vertices
+    for part in live.system.bodies:
+        if not np.isin(pinned, np.arange(part.vertices.start, part.vertices.stop)).any():
+            own = x[part.vertices]
+            heights = own @ live.up
+            flat = own - heights[:, None] * live.up
+            middle, low = flat.mean(axis=0), heights.min()
+            height = low + factor * (heights - low)
+            x[part.vertices] = middle + (flat - middle) / np.sqrt(factor) + height[:, None] * live.up
+            v[part.vertices] = 0.0
+    live.adopt_checked(live.setup, replace(live.state, positions=x, velocities=v, memory=None))
 
 
 def corner_grab(target, **more):

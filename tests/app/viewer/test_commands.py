@@ -6,18 +6,14 @@ import numpy as np
 import pytest
 
 from supple.app.viewer.protocol.commands import (
-    AddBody,
-    CopyBody,
     Grab,
     MoveGrab,
     Pin,
     ReleaseGrab,
-    RemoveBody,
     SetParameter,
     SetSolver,
     SetSpeed,
     SetView,
-    Squash,
     Step,
     Unpin,
 )
@@ -71,18 +67,6 @@ HOSTILE = [
     (Pin, ("ball", 2**40)),
     (Pin, (None, 1)),
     (Unpin, ("ball",)),
-    (Squash, (0.0,)),
-    (Squash, (-1.0,)),
-    (Squash, (100.0,)),
-    (AddBody, ("teapot",)),
-    (AddBody, ("box", 0.0)),
-    (AddBody, ("box", 1e9)),
-    (AddBody, ("box", 1.0, 10_000)),
-    (AddBody, ("box", 1.0, 4, (0, 0, NAN))),
-    (AddBody, ("box", 1.0, 4, None, 1e5, 0.5)),
-    (AddBody, ("box", 1.0, 4, None, 1e5, 0.4, 1e3, "a/b")),
-    (CopyBody, (7,)),
-    (RemoveBody, ("x" * 1000,)),
 ]
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.app.viewer.engine.describe import contact_points, describe, measures
-from supple.app.viewer.engine.scene.changes import change, without_body
+from supple.app.viewer.engine.scene.changes import change
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop
 from supple.app.viewer.from_snapshot import RenderFrameBuilder
@@ -51,18 +51,6 @@ def test_friction_changes_and_a_pin_holds_it(live):
     before = live.body_positions("stone").copy()
     live.step()
     np.testing.assert_array_equal(live.body_positions("stone"), before)
-
-
-def test_joints_and_welds_go_with_their_bodies():
-    cube, box = sp.shapes.box_surface((0.1, 0.1, 0.1), (1, 1, 1)), sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1))
-    soft = sp.Body("soft", box, sp.StableNeoHookean(youngs=1e5, poisson=0.3), position=(0, 0, 0.1))
-    bodies = [sp.RigidBody("a", cube, mass=1.0), sp.RigidBody("b", cube, mass=1.0, position=(0.2, 0, 0)), soft]
-    joints = [sp.BallJoint("a", point=(0, 0.1, 0)), sp.HingeJoint("b", "a", point=(0.1, 0, 0))]
-    scene = sp.Scene(bodies, joints=joints, welds=[sp.Weld("soft", "a", max_distance=1e-6)])
-    assert [joint.name for joint in without_body(scene, "b").joints] == ["BallJoint 1"]
-    assert len(without_body(scene, "b").welds) == 1
-    alone = without_body(scene, "a")
-    assert (alone.joints, alone.welds) == ((), ())
 
 
 def swinging():
@@ -162,8 +150,3 @@ def test_a_click_pins_the_whole_body_and_another_one_releases_it(live):
     held = LiveScene(LiveSource("held", replace(live.setup.scene, pins=[sp.Pin("stone")]), sp.Implicit(), 1 / 60))
     change(commands.Unpin("stone", 0), held)
     assert len(held.system.pinned_vertices) == 0
-
-
-def test_rigid_bodies_are_not_squashed(live):
-    with pytest.raises(sp.SuppleError, match="every body is pinned or rigid"):
-        change(commands.Squash(0.5), live)

@@ -13,13 +13,11 @@ class RenderFrameBuilder:
     """Converts snapshots to frames. Data that do not change are converted once."""
 
     def __init__(self) -> None:
-        self._generation: int | None = None
         self._model: Model | None = None
 
     def frame(self, snapshot: Snapshot) -> RenderFrame:
         """The frame of a snapshot."""
-        if self._model is None or snapshot.description.generation != self._generation:
-            self._generation = snapshot.description.generation
+        if self._model is None:
             scene = snapshot.description
             view = view_of_scene(box_corners(scene.low, scene.high), np.asarray(scene.up), scene.obstacles)
             self._model = Model(scene.bodies, scene.obstacles, view, scene.stitches, scene.joints)
@@ -32,7 +30,6 @@ class RenderFrameBuilder:
             self._model,
             snapshot.time,
             snapshot.positions,
-            snapshot.velocities,
             poses,
             contact_points=snapshot.contact_points,
             contact_forces=snapshot.contact_forces,

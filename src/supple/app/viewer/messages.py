@@ -70,6 +70,7 @@ class Messages:
             "pins": packer.add(frame.pinned, "u4"),
             "grabs": packer.add(springs, "f4"),
             "contacts": packer.add(self._arrows(frame), "f4"),
+            "touching": packer.add([] if frame.contact_points is None else np.nan_to_num(frame.contact_points), "f4"),
             "field": self._field(snapshot, frame, packer),
             "solver": description.solver,
             "values": description.values,

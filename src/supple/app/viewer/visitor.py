@@ -140,7 +140,7 @@ class Visitor:
         return nearest_surface_point(self._page.frame, checked_point(point, "point"))
 
     def _view(self, field: object, contacts: object) -> None:
-        self._page.view(SetView(field, False, contacts))  # pyright: ignore[reportArgumentType] - it checks them
+        self._page.view(SetView(field, contacts))  # pyright: ignore[reportArgumentType] - it checks them
 
 
 def _read(message: str | bytes) -> dict[str, Any]:

@@ -22,7 +22,6 @@ def render_frame_of(model: Model, frame: RecordedFrame) -> RenderFrame:
         model,
         frame.time,
         frame.state.positions,
-        frame.state.velocities,
         frame.obstacle_poses,
         internal=frame.state.internal,
         broken_stitches=frame.state.broken_stitches,

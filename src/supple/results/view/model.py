@@ -77,7 +77,7 @@ class RenderFrame:
     Attributes
     ----------
     model : its constant data; time : [s]
-    positions : (n, 3) [m]; velocities : (n, 3) [m/s], or None where they are not known
+    positions : (n, 3) [m]
     poses : (obstacles, 3, 4) rotation and translation of each obstacle since time 0
     contact_points : (c, 3) [m], or None where they are not known
     contact_forces : points (c, 3) [m] and forces (c, 3) [N] of contacts, or None where they are not known
@@ -92,7 +92,6 @@ class RenderFrame:
     model: Model
     time: float
     positions: NDArray[np.float64]
-    velocities: NDArray[np.float64] | None
     poses: NDArray[np.float64]
     contact_points: NDArray[np.float64] | None = None
     contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None

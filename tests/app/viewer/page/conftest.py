@@ -69,7 +69,6 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
     x = np.concatenate([mesh.vertices for mesh in meshes])
     floor = sp.HalfSpace(name="floor")
     made = SceneDescription(
-        generation=1,
         revision=1,
         bodies=tuple(bodies),
         obstacles=(floor,),

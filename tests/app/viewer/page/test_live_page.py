@@ -66,7 +66,8 @@ def test_nothing_is_sent_while_nothing_changes(visitor, until):
 
 
 def test_another_scene_is_sent_before_its_frames(visitor, fake, until):
-    fake.snapshot = snapshot_of(replace(describe(sp.shapes.box((1, 1, 1), (1, 1, 1))), generation=2))
+    fake.snapshot = snapshot_of(describe(sp.shapes.box((1, 1, 1), (1, 1, 1))))
+    fake.starts += 1
     until(lambda: len(visitor.scenes) == 2)
     until(lambda: visitor.frames[-1]["points"]["count"] == 3 * 8)
     assert [body["name"] for body in visitor.scenes[1]["bodies"]] == ["body 0"]
@@ -83,7 +84,7 @@ def test_acts_become_commands(visitor, received):
         ("SetParameter", {"name": "youngs", "value": 3e4, "body": "body 1"}, SetParameter("youngs", 3e4, "body 1")),
         ("SetParameter", {"name": "gravity", "value": 0, "body": None}, SetParameter("gravity", 0.0)),
         ("Unpin", {}, Unpin()),
-        ("view", {"field": "J", "contacts": True}, SetView("J", False, True)),
+        ("view", {"field": "J", "contacts": True}, SetView("J", True)),
     ):
         visitor.send(act, **values)
         assert received() == command
@@ -169,10 +170,11 @@ def test_springs_contacts_and_fields_are_in_frames(visitor, fake, until):
     forces = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), np.array([[0.0, 5.0, 0.0], [0.0, 10.0, 0.0]])
     values = np.linspace(0.5, 1.5, fake.snapshot.description.n_tets)
     spring = GrabState(1, "body 0", (0.0, 1.0, 2.0), (3.0, 4.0, 5.0))
-    fake.show(grabs=(spring,), contact_forces=forces, tet_values=values, tet_quantity="J")
+    fake.show(grabs=(spring,), contact_points=forces[0], contact_forces=forces, tet_values=values, tet_quantity="J")
     until(lambda: visitor.frames[-1]["field"])
     frame, array = visitor.frames[-1], visitor.arrays[-1]
     np.testing.assert_array_equal(array(frame["grabs"]), [0, 1, 2, 3, 4, 5])
+    np.testing.assert_array_equal(array(frame["touching"]), forces[0].ravel())
     arrows = array(frame["contacts"]).reshape(-1, 2, 3)
     np.testing.assert_array_equal(arrows[:, 0], forces[0])
     lengths = np.linalg.norm(arrows[:, 1] - arrows[:, 0], axis=1)

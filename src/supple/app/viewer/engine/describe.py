@@ -31,9 +31,8 @@ def describe(live: LiveScene) -> SceneDescription:
     gravity = -float(np.asarray(setup.scene.gravity) @ live.up)
     positions = system.points.positions(live.state.positions)
     return SceneDescription(
-        generation=live.generation,
         revision=live.revision,
-        bodies=tuple(_body(part, system.masses, setup.added) for part in system.bodies),
+        bodies=tuple(_body(part, system.masses) for part in system.bodies),
         obstacles=tuple(replace(obstacle, motion=None) for obstacle in system.obstacles),
         solver=kind_of(setup.solver),
         values={**solver_values(setup.solver), "dt": setup.dt, "gravity": gravity},
@@ -48,14 +47,14 @@ def describe(live: LiveScene) -> SceneDescription:
     )
 
 
-def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -> BodyDescription:
+def _body(part: BodyRange, masses: NDArray[np.float64]) -> BodyDescription:
     body = part.body
     values = {"friction": body.friction, **({} if part.rigid else _material_values(body.material))}
     if isinstance(body.material, EnergyMaterial):  # what is compiled stays here
         body = body.changed(material=body.material.recorded())
     _ = body.attached_skin  # found once, and sent with the body
     rows = part.number, part.vertices, part.tets
-    return BodyDescription(body, *rows, values, float(masses[part.vertices].sum()), part.name in added)
+    return BodyDescription(body, *rows, values, float(masses[part.vertices].sum()))
 
 
 def _material_values(material: Any) -> dict[str, Value]:

@@ -41,7 +41,6 @@ def within_step(live: LiveScene, last: Snapshot, shown: float) -> Snapshot | Non
         last,
         time=state.time,
         positions=state.positions,
-        velocities=None if last.velocities is None else state.velocities,
         obstacle_poses=ObstaclePoses(system.obstacles).at(state.time),
         grabs=tuple(spring.drawn(points[spring.command.body]) for spring in setup.grabs.values()),
     )

@@ -227,7 +227,6 @@ class SimulationLoop:
             timing=self.pacing.timing(now, self.speed, self.playing),
             notices=tuple(self.notices),
             applied=self.applied,
-            velocities=state.velocities if self.view.velocities else None,
             tet_values=values,
             tet_quantity=self.view.tet_values,
             contact_points=contacts,

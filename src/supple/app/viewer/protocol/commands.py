@@ -16,10 +16,8 @@ from supple.app.viewer.protocol.parameters import Value, find_parameter
 from supple.app.viewer.protocol.values import (
     Point,
     checked_index,
-    checked_length,
     checked_name,
     checked_point,
-    checked_shape,
     checked_vertices,
     checked_weights,
     displayed,
@@ -64,7 +62,7 @@ class Step(Command):
 
 @dataclass(frozen=True)
 class Reset(Command):
-    """Return to the start. Added bodies stay where they were added. Grabs, and pins made on the page, are removed.
+    """Return to the start. Grabs, and pins made on the page, are removed.
 
     Parameters and solver do not change.
     """
@@ -132,19 +130,17 @@ class SetView(Command):
     Parameters
     ----------
     tet_values : None, "J", "von_mises" [Pa] or "energy" [J/m^3]
-    velocities, contacts : whether snapshots contain them
+    contacts : whether snapshots contain them
     """
 
     tet_values: str | None = None
-    velocities: bool = False
     contacts: bool = False
 
     def __post_init__(self) -> None:
         if self.tet_values not in (None, "J", "von_mises", "energy"):
             raise CommandError(f"tet_values is {displayed(self.tet_values)}; give J, von_mises, energy or None")
-        for name in ("velocities", "contacts"):
-            if not isinstance(getattr(self, name), bool):
-                raise CommandError(f"{name} is {displayed(getattr(self, name))}; give true or false")
+        if not isinstance(self.contacts, bool):
+            raise CommandError(f"contacts is {displayed(self.contacts)}; give true or false")
 
 
 @dataclass(frozen=True)
@@ -211,64 +207,8 @@ class Unpin(Command):
         super().__post_init__()
 
 
-@dataclass(frozen=True)
-class Squash(Command):
-    """Scale the height of all free bodies, along gravity, by `factor`. They get wider and keep their volume.
-
-    A factor above 1 stretches them. The bodies start from this shape at rest. The lowest point does not move.
-    """
-
-    factor: float = 0.5
-
-    def __post_init__(self) -> None:
-        _set(self, "factor", number(self.factor, "factor", limits.FLATTEST, limits.TALLEST))
-
-
-@dataclass(frozen=True)
-class AddBody(Command):
-    """Add a body of stable Neo-Hookean rubber.
-
-    Parameters
-    ----------
-    shape : one of `limits.SHAPES`.
-    size : edge, diameter or height of the shape [m].
-    resolution : number of edges across the shape.
-    position : (3,) of its center [m], or None: above all other bodies.
-    youngs [Pa], poisson, density [kg/m^3]
-    name : None for the name of the shape with a number.
-    """
-
-    shape: str
-    size: float = 0.5
-    resolution: int = 8
-    position: Point | None = None
-    youngs: float = 1e5
-    poisson: float = 0.45
-    density: float = 1000.0
-    name: str | None = None
-
-
-@dataclass(frozen=True)
-class CopyBody(Command):
-    """Add an undeformed copy of a body, at rest; `position` as for `AddBody`."""
-
-    body: str
-    position: Point | None = None
-
-
-@dataclass(frozen=True)
-class RemoveBody(Command):
-    """Remove a body, and the pins, forces, springs and stitches on it. The last body cannot be removed."""
-
-    body: str
-
-
 def _set(command: Command, name: str, value: object) -> None:
     object.__setattr__(command, name, value)
-
-
-def _parameter(value: object, what: str) -> Value:
-    return find_parameter(what).checked(value)
 
 
 # By name of the field: equal names have equal meanings. Fields that are not here are checked by their own class.
@@ -278,13 +218,6 @@ _CHECKS: dict[str, Callable[[Any, str], object]] = {
     "grab": checked_index,
     "vertex": checked_index,
     "target": checked_point,
-    "position": checked_point,
-    "size": checked_length,
     "count": partial(whole, low=1, high=limits.MOST_STEPS),
-    "resolution": partial(whole, low=limits.COARSEST, high=limits.FINEST),
     "stiffness": partial(number, low=limits.WEAKEST_GRAB, high=limits.STRONGEST_GRAB),
-    "shape": checked_shape,
-    "youngs": _parameter,
-    "poisson": _parameter,
-    "density": _parameter,
 }

@@ -1,18 +1,11 @@
 """The limits of what a page may request from the simulation."""
 
-# Lengths and coordinates in a command [m].
-SMALLEST_LENGTH, LARGEST_LENGTH = 1e-4, 1e3
+# Coordinates in a command [m].
 FARTHEST = 1e4
 
 # Of one live scene.
-MOST_BODIES = 64
-MOST_TETS = 400_000
 MOST_GRABS = 16
 MOST_PINS = 256  # vertices pinned on the page
-
-# Of one new body.
-SHAPES = ("box", "sphere", "cylinder", "torus", "gummy_bear")
-COARSEST, FINEST = 3, 24  # edges across the shape
 
 # Of time.
 SLOWEST_MOTION, FASTEST_MOTION = 0.01, 1.0
@@ -20,9 +13,6 @@ MOST_STEPS = 1_000  # of one Step command
 # A step that takes longer is given up; where a pause or reset is requested meanwhile, after the second time [s].
 LONGEST_STEP, LONGEST_STEP_WHEN_ASKED = 20.0, 1.0
 FRAMES_PER_SECOND = 60.0  # snapshots that the simulation sends
-
-# Squash and stretch, as a factor of the current height.
-FLATTEST, TALLEST = 0.2, 3.0
 
 # Stiffness of the spring of a grab, as a factor of its default.
 WEAKEST_GRAB, STRONGEST_GRAB = 0.01, 100.0

@@ -27,12 +27,10 @@ class BodyDescription(BodyRows):
     ----------
     values : of the parameters that a page can change, by name
     mass : [kg]
-    added : whether it was added on the page
     """
 
     values: dict[str, Value]
     mass: float
-    added: bool = False
 
     @property
     def material(self) -> str:
@@ -47,7 +45,6 @@ class SceneDescription:
     Attributes
     ----------
     obstacles : at time 0; `Snapshot.obstacle_poses` transforms them to other times
-    generation : changes where bodies or obstacles are added or removed; the page then has to draw all of them again
     revision : changes with every change, also of a parameter or of the solver
     solver : "xpbd" or "implicit"; values : of the parameters of solver and scene, by name
     up : (3,) unit vector against gravity
@@ -57,7 +54,6 @@ class SceneDescription:
     n_vertices, n_tets, n_constraints : of the whole scene; constraints are the solver's, 0 where it has none
     """
 
-    generation: int
     revision: int
     bodies: tuple[BodyDescription, ...]
     obstacles: tuple[Obstacle, ...]
@@ -179,7 +175,7 @@ class Snapshot:
     measures, timing : numbers for the panel
     notices : the newest ones; see `Notice`
     applied : number of the newest command that was executed, see `Engine.send`
-    velocities : (n, 3) [m/s], tet_values : (m,), contact_points : (c, 3) [m], where `SetView` requests them
+    tet_values : (m,), contact_points : (c, 3) [m], where `SetView` requests them
     contact_forces : points (c, 3) [m] and forces (c, 3) [N] of the strongest contacts, each on the first of its two
         bodies, where `SetView` requests contacts and the solver knows them
     readings : of sensors, cavities and cables
@@ -200,7 +196,6 @@ class Snapshot:
     timing: Timing
     notices: tuple[Notice, ...] = ()
     applied: int = 0
-    velocities: NDArray[np.float64] | None = None
     tet_values: NDArray[np.float64] | None = None
     tet_quantity: str | None = None
     contact_points: NDArray[np.float64] | None = None

@@ -73,16 +73,6 @@ def checked_index(value: object, what: str) -> int:
     return whole(value, what, 0, 2**31 - 1)
 
 
-def checked_length(value: object, what: str) -> float:
-    return number(value, what, limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH)
-
-
-def checked_shape(value: object, what: str) -> str:
-    if value not in limits.SHAPES:
-        raise CommandError(f"{what} {displayed(value)} does not exist; there are {', '.join(limits.SHAPES)}")
-    return str(value)
-
-
 def checked_name(value: object, what: str) -> str:
     try:
         check_name(value, what)

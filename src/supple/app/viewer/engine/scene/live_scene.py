@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from supple.app.viewer.engine.scene.costs import without_long_repetitions
 from supple.app.viewer.engine.scene.grab_spring import GrabSpring, grabbed, make_spring, workspace_for
-from supple.app.viewer.engine.scene.new_bodies import moved_apart
 from supple.app.viewer.engine.scene.solvers import kind_of
 from supple.app.viewer.protocol.commands import Grab, MoveGrab
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -35,7 +34,6 @@ class Setup:
     ----------
     scene : without what the page adds to it:
     page_pins : pins made on the page, by body and vertex; grabs : by number
-    added : names of bodies that were added on the page
     """
 
     scene: Scene
@@ -43,7 +41,6 @@ class Setup:
     dt: float
     page_pins: Mapping[tuple[str, int], Pin] = field(default_factory=lambda: MappingProxyType({}))
     grabs: Mapping[int, GrabSpring] = field(default_factory=lambda: MappingProxyType({}))
-    added: frozenset[str] = frozenset()
 
     def whole_scene(self) -> Scene:
         """The scene with pins and grabs of the page."""
@@ -70,7 +67,7 @@ class Start:
     def serves(self, setup: Setup) -> bool:
         """Whether a reset with this setup leads here. Grabs and pins of the page end with a reset."""
         same = self.setup
-        return setup.scene is same.scene and setup.solver is same.solver and setup.added == same.added
+        return setup.scene is same.scene and setup.solver is same.solver
 
 
 Anchors = Mapping[Pin | SoftTarget, NDArray[np.float64]]
@@ -86,7 +83,7 @@ class LiveScene:
     solvers : by kind, with the settings used last
     starts : by body name, (n, 3) of bodies with deformed initial positions; pins : those of the source
     report : of the last step
-    generation, revision : see `SceneDescription`
+    revision : see `SceneDescription`
 
     Raises
     ------
@@ -98,7 +95,7 @@ class LiveScene:
         self.starts = dict(source.initial_positions)
         self.pins = tuple(source.scene.pins)
         self.solvers: dict[str, Solver] = {kind_of(source.solver): source.solver}
-        self.generation = self.revision = 0
+        self.revision = 0
         self.frame = 0
         self.report = StepReport(Status.CONVERGED, 0)
         self.workspace: Any = None
@@ -129,8 +126,6 @@ class LiveScene:
         # Later changes may put bodies into each other, which XPBD then pushes apart.
         if not hasattr(self, "setup") or kind_of(setup.solver) != "xpbd":
             setup.solver.check(system, state, workspace)
-        if not hasattr(self, "setup") or _shapes(self.system.scene) != _shapes(scene):
-            self.generation += 1
         self.revision += 1
         self.setup, self.state, self.system, self.workspace = setup, state, system, workspace
         self._anchors = _anchors_of(system)
@@ -244,10 +239,7 @@ class LiveScene:
         return without_long_repetitions(setup.solver, self.system, setup.dt, self._usual[1])
 
     def reset(self) -> None:
-        """Return to the start, with the current bodies, parameters and solver.
-
-        Added bodies return to where they were added. Where another body starts there, they are placed above all bodies.
-        """
+        """Return to the start, with the current parameters and solver."""
         if self._start is not None and self._start.serves(self.setup):
             self._return(self._start)
         else:
@@ -258,8 +250,6 @@ class LiveScene:
 
     def _return(self, start: Start) -> None:
         """Return to a start without computing again what has not changed."""
-        if _shapes(self.system.scene) != _shapes(start.system.scene):
-            self.generation += 1
         self.revision += 1
         self.setup = replace(start.setup, dt=self.setup.dt)
         self.state, self.system, self.workspace = start.state, start.system, start.workspace
@@ -271,16 +261,10 @@ class LiveScene:
             self._start = Start(self.setup, self.state, self.system, self.workspace)
 
     def _restart(self) -> None:
-        """Compute the start of the current bodies, parameters and solver."""
-        names = {body.name for body in self.setup.scene.bodies}
-        scene = replace(self.setup.scene, pins=tuple(pin for pin in self.pins if pin.body in names))
-        starts = {name: start for name, start in self.starts.items() if name in names}
-        scene = moved_apart(scene, self.setup.added, starts, self.up)
-        self.adopt_checked(
-            Setup(scene, self.setup.solver, self.setup.dt, added=self.setup.added),
-            initial_state(scene, starts),
-            anchors={},
-        )
+        """Compute the start with the current parameters and solver."""
+        scene = replace(self.setup.scene, pins=self.pins)
+        start = initial_state(scene, self.starts)
+        self.adopt_checked(Setup(scene, self.setup.solver, self.setup.dt), start, anchors={})
 
     def part(self, name: str) -> BodyRange:
         """The rows of one body; raises `CommandError` where none exists of that name."""
@@ -312,9 +296,3 @@ def _anchored(system: System, kept: Anchors) -> System:
     pins = tuple(replace(held, anchors=kept.get(held.pin, held.anchors)) for held in system.pins)
     softs = tuple(replace(soft, anchors=kept.get(soft.target, soft.anchors)) for soft in system.soft_targets)
     return replace(system, pins=pins, soft_targets=softs)
-
-
-def _shapes(scene: Scene) -> list[tuple[Any, ...]]:
-    """The shapes to draw, as a key for comparison."""
-    bodies = [(body.name, body.mesh, body.skin) for body in scene.bodies]
-    return [*bodies, *((type(obstacle), obstacle.name, obstacle.motion) for obstacle in scene.obstacles)]
