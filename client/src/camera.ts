@@ -7,6 +7,28 @@ import type { Block } from "./decode.ts";
 const MARGIN = 1.06;
 const BAR = 70; // height of the bar below and its margins [pixels]
 
+/**
+ * The point at which a camera looks, and its distance, from which points just fill the picture.
+ *
+ * A point at x across and z towards the camera is in the picture where |x - t| <= slope (distance - z), with the middle
+ * t: distance >= a - t / slope and distance >= b + t / slope, with the largest z + x / slope and z - x / slope. The
+ * least distance is where both are equal.
+ */
+export function framed(points: ArrayLike<number>, center: Vector3, axes: Vector3[], slopes: number[]): [Vector3, number] {
+  const most = [[-Infinity, -Infinity], [-Infinity, -Infinity]];
+  const p = new Vector3(), target = center.clone();
+  for (let i = 0; i < points.length; i += 3) {
+    p.set(points[i], points[i + 1], points[i + 2]).sub(center);
+    const [x, y, z] = axes.map((axis) => p.dot(axis));
+    [x, y].forEach((across, k) => {
+      most[k][0] = Math.max(most[k][0], z + across / slopes[k]);
+      most[k][1] = Math.max(most[k][1], z - across / slopes[k]);
+    });
+  }
+  most.forEach(([a, b], k) => target.addScaledVector(axes[k], 0.5 * slopes[k] * (a - b)));
+  return [target, MARGIN * Math.max(...most.map(([a, b]) => 0.5 * (a + b)), 1e-6)];
+}
+
 export class View {
   readonly camera = new PerspectiveCamera(35, 1, 0.01, 100);
   private readonly controls: OrbitControls;
@@ -71,26 +93,8 @@ export class View {
     const upward = new Vector3().crossVectors(back, right);
     const slope = Math.tan((this.camera.fov * Math.PI) / 360);
     const slopes = [slope * this.camera.aspect * this.free[0], slope * this.free[1]];
-    const target = new Vector3(...this.block.description.center);
-    let distance = radius;
-    const p = new Vector3();
-    for (let turn = 0; turn < 6; turn++) {
-      // The distance from which all points are within the picture; then the middle between its extremes.
-      const ends = [[Infinity, -Infinity], [Infinity, -Infinity]];
-      let needed = 1e-6;
-      for (let i = 0; i < points.length; i += 3) {
-        p.set(points[i], points[i + 1], points[i + 2]).sub(target);
-        const along = p.dot(back), across = [p.dot(right), p.dot(upward)];
-        across.forEach((x, k) => (needed = Math.max(needed, Math.abs(x) / slopes[k] + along)));
-        const depth = Math.max(distance - along, 0.1 * distance);
-        across.forEach((x, k) => {
-          ends[k][0] = Math.min(ends[k][0], x / depth);
-          ends[k][1] = Math.max(ends[k][1], x / depth);
-        });
-      }
-      distance = MARGIN * needed;
-      [right, upward].forEach((axis, k) => target.addScaledVector(axis, 0.5 * distance * (ends[k][0] + ends[k][1])));
-    }
+    const center = new Vector3(...this.block.description.center);
+    const [target, distance] = framed(points, center, [right, upward, back], slopes);
     this.controls.target.copy(target);
     this.camera.position.copy(target).addScaledVector(back, distance);
     this.camera.near = 0.02 * radius;

@@ -1,5 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { Vector3 } from "three";
+import { framed } from "../src/camera.ts";
 import { colorAt } from "../src/colors.ts";
 import { Block, inflated, summed16, summed8 } from "../src/decode.ts";
 import { Pace } from "../src/pace.ts";
@@ -24,6 +26,22 @@ function sphere(rings: number): Skin {
     triangles: Uint32Array.from(triangles), rest: Float32Array.from(rest),
   };
 }
+
+test("a camera shows all points, as near as it can", () => {
+  const corners = [0.1, -0.1].flatMap((x) => [0.1, 0.3].flatMap((y) => [0.1, -0.1].map((z) => [x, y, z])));
+  const points = Float32Array.from([...corners, [0, 0, 0]].flat()); // a box above a point of the floor
+  const back = new Vector3(0.45, 0.5, 0.84).normalize();
+  const right = new Vector3().crossVectors(new Vector3(0, 1, 0), back).normalize();
+  const axes = [right, new Vector3().crossVectors(back, right), back], slopes = [0.37, 0.29];
+  const [target, distance] = framed(points, new Vector3(0, 0.15, 0), axes, slopes);
+  let widest = 0;
+  for (let i = 0; i < points.length; i += 3) {
+    const p = new Vector3(points[i], points[i + 1], points[i + 2]).sub(target);
+    const [x, y, z] = axes.map((axis) => p.dot(axis));
+    widest = Math.max(widest, Math.abs(x) / slopes[0] / (distance - z), Math.abs(y) / slopes[1] / (distance - z));
+  }
+  assert.ok(widest < 1 && widest > 0.9, `${widest}`);
+});
 
 test("differences are summed over frames", () => {
   // 5, 70000 mod 2^16, then -3 and +2 against the frame before: folded as 5 -> 10, -3 -> 5, +2 -> 4
