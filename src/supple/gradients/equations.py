@@ -22,6 +22,7 @@ from scipy.sparse.linalg import splu
 from supple.errors import SolverError
 from supple.gradients.kept import Replay
 from supple.model.loads.actuators.laws import Held
+from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.natural_modes import (
     column,
     conditions_of,
@@ -38,21 +39,25 @@ Floats = NDArray[np.float64]
 
 # Of contact's forces: what friction of the end may change. The relative error of a gradient is about this.
 _LAGGED = 1e-3
+# Relative, of systems that the step's own solver can solve: those that are symmetric and have no conditions.
+_EXACT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """See the module.
+    """See the module. They are those of the latest substep that was linearized in their workspace.
 
     Attributes
     ----------
-    rows : (c,) which of the conditions are independent, of `count`; held : (l,) which laws of joints are conditions
+    lag : (3 n, 3 n) the derivative of friction by the state of its normal forces; None where that is not the end
+    rows : (c,) which of the conditions C (c, 3 n) are independent, of `count`; held : (l,) which laws of joints are
+        conditions
     """
 
-    K: Any
+    replay: Replay
+    blocks: HessianBlocks
+    lag: Any
     C: Any
-    G: Any
-    T: Any
     rows: NDArray[np.int64]
     held: NDArray[np.int64]
     count: int
@@ -61,37 +66,78 @@ class Equations:
     def of(cls, replay: Replay) -> Equations:
         """Raises `SolverError` where friction is neither that of the beginning nor of the end."""
         _refuse_lag(replay)
-        K, n = _hessian(replay), len(replay.x)
-        C, rows, held, count = _conditions(replay)
-        return cls(K, C, _low_rank(replay, n), unknowns(replay.workspace.system), rows, held, count)
+        blocks, x, lag = replay.workspace.tools.hessian, replay.x, None
+        for friction in replay.frictions:
+            friction.settle(x)
+        replay.objective.model(x, blocks, ProjectedTerms.NONE)
+        if replay.kept.at_end and replay.lags:
+            lag = sum(one.derivative(x) for one in replay.lags)
+        return cls(replay, blocks, lag, *_conditions(replay))
 
     def product(self, way: Floats) -> Floats:
         """(n, 3) dg/dx times a way (n, 3)."""
-        return (self.K @ way.ravel() + self.G @ (self.G.T @ way.ravel())).reshape(-1, 3)
+        own = self._symmetric_product(way)
+        return own if self.lag is None else own + (self.lag @ way.ravel()).reshape(-1, 3)
 
     def transposed_product(self, forces: Floats) -> Floats:
         """(n, 3) the transpose of dg/dx times forces (n, 3)."""
-        return (self.K.T @ forces.ravel() + self.G @ (self.G.T @ forces.ravel())).reshape(-1, 3)
+        own = self._symmetric_product(forces)
+        return own if self.lag is None else own + (self.lag.T @ forces.ravel()).reshape(-1, 3)
 
     def solve(self, right: Floats, of_conditions: Floats) -> tuple[Floats, Floats]:
         """The way (n, 3) of the unknowns, zero at pins, that changes g by `right` (n, 3) and conditions by (c,); and
         (n, 3) the change of g by what the multipliers do."""
-        solution, u = self._solved(self.T.T @ right.ravel(), of_conditions, "N"), self.T.shape[1]
-        return (self.T @ solution[:u]).reshape(-1, 3), (self.C.T @ solution[u : u + len(self.rows)]).reshape(-1, 3)
+        way, multipliers = self._solved(right, of_conditions, "N")
+        return way, (self.C.T @ multipliers).reshape(-1, 3)
 
     def solve_transposed(self, right: Floats, seeds: Floats) -> tuple[Floats, Floats]:
         """The forces (n, 3), zero at pins, and u (c,) for a `right` side (n, 3) and forces at pins (n, 3)."""
-        solution, u = self._solved(self.T.T @ right.ravel(), -(self.C @ seeds.ravel()), "T"), self.T.shape[1]
-        return (self.T @ solution[:u]).reshape(-1, 3), solution[u : u + len(self.rows)]
+        return self._solved(right, -(self.C @ seeds.ravel()), "T")
 
-    def _solved(self, right: Floats, of_conditions: Floats, way: str) -> Floats:
-        whole = np.concatenate([right, of_conditions, np.zeros(self.G.shape[1])])
-        if len(right) == 0:
-            return np.zeros_like(whole)
-        solution = self._factors.solve(whole, trans=way)
-        if not np.isfinite(solution).all():
+    def _solved(self, right: Floats, of_conditions: Floats, way: str) -> tuple[Floats, Floats]:
+        tools = self.replay.workspace.tools
+        if self.lag is None and not len(self.rows):
+            if way == "T" or "_assembled" not in vars(self):
+                tools.linear_solver.begin_step()
+                tools.linear_solver.assemble(self.blocks)
+                object.__setattr__(self, "_assembled", True)
+            solution, _ = tools.linear_solver.solve(tools.freed(right), _EXACT, convex=False)
+            if solution is not None and np.isfinite(solution).all():
+                return solution, np.zeros(0)
+        whole = np.concatenate([self.T.T @ right.ravel(), of_conditions, np.zeros(self.G.shape[1])])
+        u = self.T.shape[1]
+        if u == 0:
+            return np.zeros_like(right), np.zeros(len(self.rows))
+        solved = self._factors.solve(whole, trans=way)
+        if not np.isfinite(solved).all():
             raise SolverError("gradient: the equations of a step are singular; something is free to move at no cost")
-        return solution
+        return (self.T @ solved[:u]).reshape(-1, 3), solved[u : u + len(self.rows)]
+
+    def _symmetric_product(self, way: Floats) -> Floats:
+        nodes, out = self.replay.workspace.system.elements, np.zeros((len(way) + 1, 3))
+        # One row more, for the nodes without a vertex, number -1.
+        own = np.concatenate([way, np.zeros((1, 3))])[nodes].reshape(-1, 12, 1)
+        np.add.at(out, nodes, (self.blocks.elements @ own).reshape(-1, 4, 3))
+        out = out[:-1] + np.einsum("nij,nj->ni", self.blocks.vertices, way)
+        for part in (*self.blocks.beyond_elements, *self.blocks.low_rank):
+            part.add_product(way, out)
+        return out
+
+    @cached_property
+    def T(self) -> Any:
+        return unknowns(self.replay.workspace.system)
+
+    @cached_property
+    def G(self) -> Any:
+        size = self.replay.x.size
+        columns = (column(part.vertices, part.vector, size) for part in self.blocks.low_rank)
+        return csr_array(block_array([[csr_array((size, 0)), *columns]]))
+
+    @cached_property
+    def K(self) -> Any:
+        """(3 n, 3 n) dg/dx without actuators' G G^T."""
+        K = hessian_matrix(self.blocks, self.replay.workspace.system.elements, len(self.replay.x))
+        return csr_array(K if self.lag is None else K + self.lag)
 
     @cached_property
     def _factors(self) -> Any:
@@ -117,24 +163,6 @@ def _refuse_lag(replay: Replay) -> None:
             f"gradient: at t = {replay.kept.end:.6g} s friction has normal forces that are {left / of_contact:.1g} of "
             "contact's away from those of the step's end; give IPCContact(friction_iterations=1), or 20"
         )
-
-
-def _hessian(replay: Replay) -> Any:
-    """(3 n, 3 n) the sparse part of dg/dx."""
-    hessian, x = replay.workspace.tools.hessian, replay.x
-    for friction in replay.frictions:
-        friction.settle(x)
-    replay.objective.model(x, hessian, ProjectedTerms.NONE)
-    K = hessian_matrix(hessian, replay.workspace.system.elements, len(x))
-    if replay.kept.at_end:
-        for lag in replay.lags:
-            K = K + lag.derivative(x)
-    return csr_array(K)
-
-
-def _low_rank(replay: Replay, n: int) -> Any:
-    parts = replay.workspace.tools.hessian.low_rank
-    return csr_array(block_array([[csr_array((3 * n, 0)), *(column(p.vertices, p.vector, 3 * n) for p in parts)]]))
 
 
 def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.int64], int]:
