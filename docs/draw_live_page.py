@@ -92,7 +92,7 @@ def main() -> None:
     """All pictures."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS.split())
-        with opened_page(scene(), 0) as page:
+        with opened_page("pictures", 0) as page, page.simulating(scene()):
             tab = browser.new_page(viewport=SIZE)
             tab.set_default_timeout(120_000)
             tab.goto(page.url)

@@ -14,7 +14,6 @@ export type Values = Record<string, number | boolean>;
 export interface SceneMessage extends Description {
   kind: "scene";
   parameters: Parameter[];
-  command: string;
   reload: boolean;
 }
 
@@ -42,6 +41,7 @@ export interface FrameMessage {
 export interface Status {
   error: string | null;
   busy: string;
+  command: string;
   recording: boolean;
 }
 

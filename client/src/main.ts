@@ -160,7 +160,7 @@ class LivePage {
   private page: Page | null = null;
   private controls: Controls | null = null;
   private scene: SceneMessage | null = null;
-  private status: Status = { error: null, busy: "", recording: false };
+  private status: Status = { error: null, busy: "", command: "supple view", recording: false };
   private connected = true;
   private notices = 0;
   private readonly live: Live;
@@ -214,7 +214,7 @@ class LivePage {
   /** One line where something is wrong, or lasts. */
   private banner(): void {
     const { error, busy } = this.status, element = find("#banner");
-    const gone = `The server has ended. Start it again in a terminal: ${this.scene?.command ?? "supple view"}`;
+    const gone = `The server has ended. Start it again in a terminal: ${this.status.command}`;
     const text = !this.connected ? gone : error ? `The simulation has ended: ${error}` : busy || this.live.latest?.slow;
     element.hidden = !text;
     if (!text) return;

@@ -43,9 +43,11 @@ def served(monkeypatch):
     """The arguments of `serve`."""
     calls = Calls()
 
-    def serve(source, port, *, open_browser, again):
+    def serve(read, title, port, *, open_browser, reload):
+        source = read()
+        assert source.title == title
         calls.append((source, port, open_browser))
-        calls.again = again
+        calls.again = read if reload else None
 
     monkeypatch.setattr("supple.app.viewer.app.serve", serve)
     return calls

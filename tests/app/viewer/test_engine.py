@@ -228,7 +228,7 @@ def test_a_program_without_the_guard_ends_with_one_line(tmp_path):
 
         body = sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
         source = LiveSource("cube", sp.Scene([body]), sp.XPBD(substeps=2), 0.01)
-        serve(source, 0, open_browser=False)
+        serve(lambda: source, "cube", 0, open_browser=False, reload=False)
         """)
     )
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=TIMEOUT)

@@ -8,7 +8,7 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,11 +21,12 @@ from supple.app.viewer.server import require_free_port, served
 from supple.results.page.page import client
 
 DEFAULT_PORT = 8080
+_SOON = 1.0  # [s] after which the address is told, though the scene is not there yet
 
 
 @dataclass(frozen=True, eq=False)
 class OpenPage:
-    """A page while it is served.
+    """A page while it is served; it tells that it waits until `simulating`.
 
     Attributes
     ----------
@@ -37,30 +38,39 @@ class OpenPage:
     port: int
     content: LivePage
 
+    @contextmanager
+    def simulating(self, source: LiveSource, again: Callable[[], LiveSource] | None = None) -> Iterator[None]:
+        """Show a live scene within a block; see `Engine`.
+
+        Raises
+        ------
+        SceneError, SolverError : where the source cannot be simulated.
+        """
+        with Engine(source, again, wait=False) as engine:
+            self.content.attach(engine)
+            engine.wait_for_start()
+            self.content.wait_for_frame()
+            yield
+
 
 @contextmanager
-def opened_page(
-    source: LiveSource, port: int | None = None, again: Callable[[], LiveSource] | None = None
-) -> Iterator[OpenPage]:
-    """Serve a live scene within a block.
+def opened_page(title: str, port: int | None = None) -> Iterator[OpenPage]:
+    """Serve a page within a block.
 
     Parameters
     ----------
     port : 0 takes any free port; None takes 8080, or the next free one
-    again : reads the source again, for the button *reload*; without it, the page lacks that button
 
     Raises
     ------
-    SceneError, SolverError, OutputError : where the source cannot be simulated, or the port is not free.
+    OutputError : where the port is not free.
     """
     if port is not None:
         require_free_port(port)
     with ExitStack() as ends:
         token = new_token()
-        gate = Gate(token, client(source.title))
-        engine = ends.enter_context(Engine(source, again))
-        command = shlex.join(["supple", *sys.argv[1:]])
-        content = LivePage(engine, {"title": source.title, "command": command})
+        content = LivePage({"title": title, "command": shlex.join(["supple", *sys.argv[1:]])})
+        gate = Gate(token, client(title))
         server = ends.enter_context(served(gate, content.visit, DEFAULT_PORT if port is None else port))
         content.start(server)
         ends.callback(content.stop)
@@ -68,21 +78,38 @@ def opened_page(
 
 
 def serve(
-    source: LiveSource,
-    port: int | None = None,
-    *,
-    open_browser: bool = True,
-    again: Callable[[], LiveSource] | None = None,
+    read: Callable[[], LiveSource], title: str, port: int | None = None, *, open_browser: bool = True, reload: bool
 ) -> None:
-    """Serve a live scene until interrupted; see `opened_page`.
+    """Serve a live scene until interrupted.
+
+    Where the scene takes long to read or to mesh, its address is printed, and opened, before it is there.
+
+    Parameters
+    ----------
+    read : the scene; reload : whether the page may have it read again
+    port : see `opened_page`
 
     Raises
     ------
-    SceneError, SolverError, OutputError : see `opened_page`.
+    SceneError, SolverError, OutputError : where the scene cannot be read or simulated, or the port is not free.
     """
-    with opened_page(source, port, again) as page:
-        print(f"{page.url}  (press Ctrl+C to end)", flush=True)
-        with browser_at(page.url) if open_browser else nullcontext(), suppress(KeyboardInterrupt):
+    with opened_page(title, port) as page, ExitStack() as ends, suppress(KeyboardInterrupt):
+        once = threading.Lock()
+
+        def announce() -> None:
+            if once.acquire(blocking=False):
+                print(f"{page.url}  (press Ctrl+C to end)", flush=True)
+                if open_browser:
+                    ends.enter_context(browser_at(page.url))
+
+        timer = threading.Timer(_SOON, announce)
+        timer.start()
+        try:
+            source = read()
+        finally:
+            timer.cancel()
+        announce()
+        with page.simulating(source, read if reload else None):
             threading.Event().wait()
 
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 from supple.app.viewer.from_snapshot import RenderFrameBuilder
 from supple.app.viewer.messages import Messages, waiting_text
-from supple.app.viewer.protocol.commands import SetView, Watch
+from supple.app.viewer.protocol.commands import Command, SetView, Watch
 from supple.app.viewer.protocol.snapshots import Progress, Snapshot
 from supple.app.viewer.visitor import Visitor
-from supple.errors import SuppleError
+from supple.errors import CommandError, SuppleError
 from supple.results.page.packed import Packer
 from supple.results.page.page import page_of_frames
 from supple.results.view.model import RenderFrame
@@ -44,27 +44,50 @@ class LivePage:
 
     Parameters
     ----------
-    simulation : see `Engine`; about : the title, and the command that starts the page again
+    about : the title, and the command that starts the page again
 
     Attributes
     ----------
-    frame : the newest one
+    simulation : see `attach`; frame : the newest one; None before they are there
     """
 
-    def __init__(self, simulation: Engine, about: dict[str, Any]) -> None:
-        self.simulation = simulation
-        self._about = {**about, "reload": simulation.again is not None}
+    def __init__(self, about: dict[str, Any]) -> None:
+        self.simulation: Engine | None = None
+        self.frame: RenderFrame | None = None
+        self._snapshot: Snapshot | None = None
+        self._about = about
         self._visitors: set[Visitor] = set()
-        self._number, self._starts, self._view = 0, simulation.starts, SetView()
+        self._number, self._starts, self._view = 0, 0, SetView()
         self._notice, self._status, self._told_at = 0, "", 0.0
         self._watched, self._seen_at = True, time.monotonic()
         self._recorded: tuple[float, list[tuple[float, RenderFrame]]] | None = None
         self._restarts = threading.Lock()
         self._end = threading.Event()
         self._builder = RenderFrameBuilder()
-        first = simulation.latest()
-        assert first is not None  # the constructor of the engine waits for it
-        self._show(first)
+
+    def attach(self, simulation: Engine) -> None:
+        """Show a simulation; see `Engine`."""
+        self._about = {**self._about, "reload": simulation.again is not None}
+        self._starts = simulation.starts
+        if self._view != SetView():
+            simulation.send(self._view)
+        self.simulation = simulation
+
+    def wait_for_frame(self) -> None:
+        """Wait until the first frame is shown."""
+        while self.frame is None and not self._end.wait(_IDLE / 10.0):
+            pass
+
+    def send(self, command: Command) -> None:
+        """Send a command of a visitor.
+
+        Raises
+        ------
+        CommandError : where the simulation is not there yet.
+        """
+        if self.simulation is None:
+            raise CommandError("the simulation has not started yet")
+        self.simulation.send(command)
 
     def start(self, server: PageServer) -> None:
         """Start the thread that sends frames."""
@@ -97,11 +120,12 @@ class LivePage:
     def view(self, wanted: SetView) -> None:
         """Ask the simulation for the values to draw, which computes no others."""
         self._view = wanted
-        self.simulation.send(wanted)
+        if self.simulation is not None:
+            self.simulation.send(wanted)
 
     def record(self, visitor: Visitor, on: object) -> None:
         """Begin to record frames, or give the visitor a page that plays them."""
-        if on is True:
+        if on is True and self.frame is not None:
             self._recorded = time.monotonic(), [(0.0, self.frame)]
         elif self._recorded is not None:
             (_, frames), self._recorded = self._recorded, None
@@ -114,8 +138,11 @@ class LivePage:
 
     def start_again(self, visitor: Visitor, *, reload: bool) -> None:
         """Start a simulation that has ended, or read its source again."""
-        if (self._about["reload"] if reload else self.simulation.error is not None) and self._restarts.acquire(False):
-            act = self.simulation.reload if reload else self.simulation.restart
+        simulation = self.simulation
+        if simulation is None or not (self._about["reload"] if reload else simulation.error is not None):
+            return
+        if self._restarts.acquire(blocking=False):
+            act = simulation.reload if reload else simulation.restart
             threading.Thread(target=self._start, args=(visitor, act), name="restart", daemon=True).start()
 
     def _start(self, visitor: Visitor, act: Any) -> None:
@@ -128,16 +155,20 @@ class LivePage:
 
     def _run(self) -> None:
         while not self._end.is_set():
-            self.simulation.wait_for_news(_IDLE)
+            simulation = self.simulation
             try:
-                self._notice_visitors()
-                self._send_newest()
-                self._send_status()
+                if simulation is None:
+                    self._end.wait(_IDLE)
+                else:
+                    simulation.wait_for_news(_IDLE)
+                    self._notice_visitors(simulation)
+                    self._send_newest(simulation)
+                self._send_status(simulation)
             except Exception:
                 logger.exception("page: a snapshot could not be sent")  # the next ones can
             self._end.wait(0.002)
 
-    def _notice_visitors(self) -> None:
+    def _notice_visitors(self, simulation: Engine) -> None:
         """Tell the simulation whether anybody watches."""
         now = time.monotonic()
         if self._visitors:
@@ -145,13 +176,13 @@ class LivePage:
         watched = now - self._seen_at < _UNWATCHED_AFTER
         if watched != self._watched:
             self._watched = watched
-            self.simulation.send(Watch(watched))
+            simulation.send(Watch(watched))
 
-    def _send_newest(self) -> None:
-        if self.simulation.starts != self._starts:
-            self._starts, self._notice, self._builder = self.simulation.starts, 0, RenderFrameBuilder()
-            self.simulation.send(self._view)  # the new process does not know it
-        snapshot = self.simulation.latest()
+    def _send_newest(self, simulation: Engine) -> None:
+        snapshot = simulation.latest()
+        if simulation.starts != self._starts:
+            self._starts, self._notice, self._builder = simulation.starts, 0, RenderFrameBuilder()
+            simulation.send(self._view)  # the new process does not know it
         if snapshot is None:
             return
         if snapshot is not self._snapshot:
@@ -164,12 +195,13 @@ class LivePage:
                 continue
             visitor.is_free, visitor.seen = False, snapshot
             if self._message is None:
+                assert self.frame is not None
                 self._message = self._messages.of(snapshot, self.frame)
             self._server.soon(visitor.put, "frame", self._message)
 
     def _show(self, snapshot: Snapshot) -> None:
         frame, self._snapshot = self._builder.frame(snapshot), snapshot
-        if not self._number or frame.model is not self.frame.model:
+        if self.frame is None or frame.model is not self.frame.model:
             self._number += 1
             self._messages = Messages(frame, self._about)
         self.frame, self._message = frame, None
@@ -184,15 +216,19 @@ class LivePage:
             if seconds < _MOST_SECONDS and 2 * len(frames) * frame.positions.nbytes < _MOST_BYTES:
                 frames.append((seconds, replace(frame, tet_values={})))
 
-    def _send_status(self) -> None:
+    def _send_status(self, simulation: Engine | None) -> None:
         now = time.monotonic()
         if now - self._told_at < _STATUS_EVERY:
             return
-        simulation = self.simulation
-        silent = max(0.0, now - simulation.heard_at)
-        progress = simulation.progress or (Progress(silent) if silent > _SILENT_AFTER else None)
-        busy = "" if progress is None else waiting_text(progress, self._snapshot.description.solver)
-        told = {"kind": "status", "error": simulation.error, "busy": busy, "recording": self._recorded is not None}
+        told = {"kind": "status", "error": None, "recording": self._recorded is not None, **self._about}
+        if simulation is None:
+            told["busy"] = "Reading and meshing"
+        else:
+            silent = max(0.0, now - simulation.heard_at)
+            late = silent > _SILENT_AFTER or self._snapshot is None
+            progress = simulation.progress or (Progress(silent) if late else None)
+            solver = "xpbd" if self._snapshot is None else self._snapshot.description.solver
+            told |= {"error": simulation.error, "busy": "" if progress is None else waiting_text(progress, solver)}
         status = json.dumps(told)
         if status != self._status:
             self._status, self._told_at = status, now

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from supple.app.viewer.protocol.commands import (
+    Command,
     Grab,
     MoveGrab,
     Pause,
@@ -36,8 +37,9 @@ _numbers = itertools.count(1)  # of grabs
 class Shown(Protocol):
     """The page of which a visitor asks something; `LivePage` is one."""
 
-    simulation: Any
-    frame: RenderFrame
+    frame: RenderFrame | None
+
+    def send(self, command: Command) -> None: ...
 
     def view(self, wanted: SetView) -> None: ...
 
@@ -98,7 +100,7 @@ class Visitor:
             asked = _read(message)
             name = asked.pop("act", None)
             if isinstance(name, str) and name in _COMMANDS:
-                self._page.simulation.send(_made(_COMMANDS[name], asked))
+                self._page.send(_made(_COMMANDS[name], asked))
             elif isinstance(name, str) and name in self._acts:
                 _made(self._acts[name], asked)
             else:
@@ -115,29 +117,32 @@ class Visitor:
         vertices, weights = tuple(int(v) for v in at.vertices), tuple(float(w) for w in at.weights)
         command = Grab(next(_numbers), at.body.name, vertices, weights, checked_point(target, "target"), strength)
         self._grab = command.grab
-        self._page.simulation.send(command)
+        self._page.send(command)
 
     def _move(self, target: object) -> None:
         if self._grab is not None:
-            self._page.simulation.send(MoveGrab(self._grab, checked_point(target, "target")))
+            self._page.send(MoveGrab(self._grab, checked_point(target, "target")))
 
     def release(self) -> None:
         """End the grab, where there is one."""
         if self._grab is not None:
-            self._page.simulation.send(ReleaseGrab(self._grab))
+            self._page.send(ReleaseGrab(self._grab))
         self._grab = None
 
     def _click(self, point: object) -> None:
         """Pin the vertex there, or unpin it."""
         at, frame = self._at(point), self._page.frame
         vertex = at.nearest_vertex
-        held = vertex + at.body.vertices.start in frame.pinned
-        self._page.simulation.send((Unpin if held else Pin)(at.body.name, vertex))
+        held = frame is not None and vertex + at.body.vertices.start in frame.pinned
+        self._page.send((Unpin if held else Pin)(at.body.name, vertex))
 
     def _at(self, point: object) -> SurfacePoint:
         from supple.results.view.picking import nearest_surface_point
 
-        return nearest_surface_point(self._page.frame, checked_point(point, "point"))
+        frame = self._page.frame
+        if frame is None:
+            raise CommandError("the simulation has not started yet")
+        return nearest_surface_point(frame, checked_point(point, "point"))
 
     def _view(self, field: object, contacts: object) -> None:
         self._page.view(SetView(field, contacts))  # pyright: ignore[reportArgumentType] - it checks them

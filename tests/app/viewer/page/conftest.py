@@ -195,7 +195,9 @@ def served_page(simulation, port: int = 0):
     from supple.app.viewer.server import served
     from supple.results.page.page import client
 
-    page = LivePage(simulation, {"title": "boxes", "command": "supple view boxes.yaml"})
+    page = LivePage({"title": "boxes", "command": "supple view boxes.yaml"})
+    if simulation is not None:
+        page.attach(simulation)
     with served(Gate(TOKEN, client("boxes")), page.visit, port) as server:
         page.start(server)
         page.port = server.port

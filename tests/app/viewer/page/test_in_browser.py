@@ -20,7 +20,8 @@ def live(look, spot):
     rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.02)
     ball = sp.Body("ball", sp.shapes.sphere(radius=RADIUS, edge_length=0.2), rubber, position=(0.0, START, 0.0))
     scene = sp.Scene([ball], obstacles=[sp.HalfSpace(friction=0.5)])
-    with opened_page(LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60), 0) as page:
+    source = LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60)
+    with opened_page("ball", 0) as page, page.simulating(source):
         screen = look(page.url)
         made = SimpleNamespace(screen=screen, tab=screen.tab, content=page.content)
         made.snapshot = lambda: page.content.simulation.latest()

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.app.viewer.page.conftest import Visitor, describe, snapshot_of
+from tests.app.viewer.page.conftest import Visitor, describe, served_page, snapshot_of
 
 import supple as sp
 from supple.app.viewer import live_page
@@ -225,8 +225,6 @@ def test_a_simulation_that_has_ended_is_started_again(visitor, fake, received, u
 
 
 def test_reload_sends_the_scene_that_is_read_again(fake, until):
-    from tests.app.viewer.page.conftest import served_page
-
     fake.show(notices=(Notice(7, "info", "seven"),))
     one = snapshot_of(describe(sp.shapes.box((1, 1, 1), (1, 1, 1))))
     fake.again = lambda: fake.__setattr__("snapshot", one)
@@ -259,6 +257,33 @@ def test_the_progress_of_a_long_step(visitor, fake, until, monkeypatch):
     until(lambda: said() == "")
     monkeypatch.setattr(live_page, "_SILENT_AFTER", -1.0)  # without any message of the simulation
     until(lambda: "Busy for 0 s" in said())
+
+
+def test_the_page_is_there_before_the_simulation(fake, until):
+    with served_page(None) as page:
+        visitor = Visitor(page.port)
+        until(lambda: visitor.statuses and visitor.statuses[-1]["busy"] == "Reading and meshing")
+        assert visitor.statuses[-1]["command"] == "supple view boxes.yaml"
+        for act, values in (
+            ("Play", {}),
+            ("click", {"point": [0, 0, 0]}),
+            ("grab", {"point": [0] * 3, "target": [0] * 3}),
+        ):
+            visitor.send(act, **values)
+            until(lambda: visitor.notices)
+            assert visitor.notices.pop()["text"] == "Rejected: the simulation has not started yet"
+        for act in ("restart", "reload", "release"):
+            visitor.send(act)
+        visitor.send("record", on=True)
+        shown, fake.snapshot, fake.progress = fake.snapshot, None, Progress(3.0, 0, kernels=(2, 9))
+        page.attach(fake)
+        until(lambda: visitor.statuses[-1]["busy"] == "Busy for 3 s: compiling kernel 2 of 9, once on this machine")
+        assert visitor.scenes == []
+        fake.snapshot, fake.progress = shown, None
+        until(lambda: visitor.frames)
+        until(lambda: visitor.statuses[-1]["busy"] == "")
+        assert (fake.received, visitor.notices) == ([], [])
+        visitor.leave()
 
 
 def test_nobody_watches_without_a_browser(live, fake, until, monkeypatch):

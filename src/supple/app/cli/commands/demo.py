@@ -84,8 +84,11 @@ def demo(
         from supple.app.cli.commands.view import serve_page
         from supple.app.viewer.protocol.live_source import LiveSource
 
-        scene, used = chosen.scene(), chosen.solver(solver)
-        serve_page(LiveSource(chosen.name, scene, used, chosen.dt, {}, not full, solver is not None), port, open_)
+        def read() -> LiveSource:
+            used = chosen.solver(solver)
+            return LiveSource(chosen.name, chosen.scene(), used, chosen.dt, {}, not full, solver is not None)
+
+        serve_page(read, chosen.name, port, open_)
         return ExitCode.OK
 
     from supple.app.cli.session import Products, run_session

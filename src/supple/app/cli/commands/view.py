@@ -73,6 +73,8 @@ def view(
     from supple.app.viewer.protocol.live_source import LiveSource
     from supple.solvers.registry import solver_of_kind
 
+    title = ", ".join(path.stem for path in paths)
+
     def read() -> LiveSource:
         with reading(yes):
             run = load_run_of(paths, confine=confine)
@@ -81,10 +83,9 @@ def view(
         used = run.chosen_solver
         if used.because:
             print(f"solver {used.kind}: {used.because}")
-        title = ", ".join(path.stem for path in paths)
         return LiveSource(title, run.scene, used, run.dt, run.initial_positions, not full, solver is not None)
 
-    serve_page(read(), port, open_, read)
+    serve_page(read, title, port, open_, reload=True)
 
 
 def show_recording(path: Path, unused: list[str], open_browser: bool) -> None:
@@ -123,7 +124,7 @@ def find_source(path: Path) -> Path:
 
 
 def serve_page(
-    source: LiveSource, port: int | None, open_browser: bool, again: Callable[[], LiveSource] | None = None
+    read: Callable[[], LiveSource], title: str, port: int | None, open_browser: bool, *, reload: bool = False
 ) -> None:
     """Serve a live scene until Ctrl-C.
 
@@ -131,15 +132,15 @@ def serve_page(
 
     Parameters
     ----------
-    again : reads the source again, for the button *Reload*
+    read : the scene; reload : whether the page has the button *reload*, which reads it again
 
     Raises
     ------
-    SuppleError : where the source cannot be shown, or the port cannot be used.
+    SuppleError : where the source cannot be read or shown, or the port cannot be used.
     """
     from supple.app.viewer.app import serve
     from supple.errors import OutputError
 
     if port is not None and not 0 <= port <= 65535:
         raise OutputError(f"--port is {port}; give a number from 1 to 65535, or 0 for any free one")
-    serve(source, port, open_browser=open_browser, again=again)
+    serve(read, title, port, open_browser=open_browser, reload=reload)

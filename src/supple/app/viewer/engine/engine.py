@@ -34,6 +34,7 @@ class Engine:
     ----------
     source : what to simulate; again : reads it again, where it comes from files
     start_timeout : longest time to wait for the first snapshot [s]; on a new machine, kernels are compiled before it.
+    wait : whether the constructor waits for it; see `wait_for_start`
 
     Attributes
     ----------
@@ -47,7 +48,12 @@ class Engine:
     """
 
     def __init__(
-        self, source: LiveSource, again: Callable[[], LiveSource] | None = None, start_timeout: float = 600.0
+        self,
+        source: LiveSource,
+        again: Callable[[], LiveSource] | None = None,
+        start_timeout: float = 600.0,
+        *,
+        wait: bool = True,
     ) -> None:
         self.source, self.again = source, again
         self.starts = 0
@@ -57,12 +63,16 @@ class Engine:
         self._number_lock = threading.Lock()
         self._latest: Snapshot | None = None
         self._start()
+        if wait:
+            self.wait_for_start()
 
     def _start(self) -> None:
-        """Start the process, and wait for its first snapshot."""
+        """Start the process."""
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             raise SystemExit(_UNGUARDED)
         source = self.source
+        self.starts += 1  # before any snapshot of it comes
+        self._begun = False  # whether one has come
         self._description: SceneDescription | None = None
         self._raw: tuple[SceneDescription, memoryview] | None = None
         self.error: str | None = None
@@ -93,13 +103,20 @@ class Engine:
         self._reader = threading.Thread(target=self._read, name="snapshots", daemon=True)
         self._reader.start()
         threading.Thread(target=self._write, args=(self._outgoing,), name="commands", daemon=True).start()
+
+    def wait_for_start(self) -> None:
+        """Wait for the first snapshot of the process.
+
+        Raises
+        ------
+        SceneError, SolverError : where none comes.
+        """
         with self._arrived:
-            self._arrived.wait_for(lambda: self._raw is not None or self.error is not None, self._start_timeout)
-        if self._raw is None:
+            self._arrived.wait_for(lambda: self._begun or self.error is not None, self._start_timeout)
+        if not self._begun:
             reason = self.error or f"the simulation did not start within {self._start_timeout:g} s"
             self.close()
             raise SolverError(reason)
-        self.starts += 1
 
     def restart(self) -> None:
         """Start the simulation again from its source, in a new process. Waits for its first snapshot.
@@ -112,6 +129,7 @@ class Engine:
         self._reader.join()  # at the end of its pipe
         try:
             self._start()
+            self.wait_for_start()
         except (SceneError, SolverError) as error:
             self.error = self.error or str(error)
             raise
@@ -228,7 +246,7 @@ class Engine:
                     self._description = pickle.loads(content)
                 elif kind == SNAPSHOT and self._description is not None:
                     # Unpickled only when `latest` is called.
-                    self._raw = self._description, content
+                    self._raw, self._begun = (self._description, content), True
                 self._arrived.notify_all()
         self._process.join(GRACE)
         with self._arrived:
