@@ -2,7 +2,6 @@
 
 import importlib.util
 import re
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -53,16 +52,10 @@ def test_05_a_cantilever_bends_as_beam_theory_predicts():
     assert found["limit"] == pytest.approx(found["theory"], rel=0.03)
 
 
+@pytest.mark.filterwarnings("ignore::supple.SuppleWarning")  # four substeps are few
 def test_06_random_search_improves_the_reward_of_a_controller():
     pytest.importorskip("gymnasium")
-    module = example("06")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        # The forces and their reach are bounded, what a soft arm does is not; four substeps are few.
-        warnings.filterwarnings("ignore", message=".*observation space m.*imum value is -?infinity")
-        warnings.filterwarnings("ignore", category=sp.SuppleWarning)
-        pytest.importorskip("gymnasium.utils.env_checker").check_env(module.Reach(25, 4), skip_render_check=True)
-    rewards = module.main(2, 25, 4)
+    rewards = example("06").main(2, 25, 4)
     assert rewards == sorted(rewards), "the best one is kept"
     assert rewards[0] < -0.2, "without forces, the tip hangs beside the goal"
     assert rewards[-1] > 0.7 * rewards[0], "on the average of the way, it is much nearer"
@@ -71,16 +64,19 @@ def test_06_random_search_improves_the_reward_of_a_controller():
 def test_06_copies_in_one_scene_move_as_one_alone():
     pytest.importorskip("gymnasium")
     module = example("06")
-    goals = np.stack([module.random_goal(np.random.default_rng(k)) for k in range(3)])
-    together, alone = module.Arms(3, 10, 24), module.Arms(1, 10, 24)
-    together.begin(goals)
-    alone.begin(goals[1:2])
+    together, alone = module.Reach(3, 10), module.Reach(1, 10)
+    seen, _ = together.reset(seed=[0, 1, 2])
+    one, _ = alone.reset(seed=[1])
     actions = np.random.default_rng(5).uniform(-1.0, 1.0, (10, 3, 6))
-    for action in actions:
-        many, one = together.step(action), alone.step(action[1:2])
-        assert many[0][1] == pytest.approx(one[0][0], abs=1e-6)
-        assert many[1][1] == pytest.approx(one[1][0], abs=1e-6)
-    assert np.ptp(many[0][:, 6], axis=0) > 0.01, "the others move otherwise"
+    for k, action in enumerate(actions):
+        assert seen in together.observation_space
+        assert seen[1] == pytest.approx(one[0], abs=1e-6)
+        seen, rewards, ended, cut, _ = together.step(action)
+        one, reward, *_ = alone.step(action[1:2])
+        assert rewards[1] == pytest.approx(reward[0], abs=1e-6)
+        assert not ended.any()
+        assert (cut == (k == 9)).all()
+    assert np.ptp(seen[:, 6]) > 0.01, "the others move otherwise"
 
 
 def test_07_rigid_jaws_carry_a_soft_cube_by_friction():
