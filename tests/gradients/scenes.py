@@ -82,6 +82,56 @@ def on_ball(p):
     return sp.Scene([body], obstacles=[sp.obstacles.Sphere((0, -0.1 * p[3], 0), 0.1 * p[3], name="ball")])
 
 
+def quadratic(p):
+    mesh = sp.shapes.box((0.4, 0.1, 0.1), (2, 1, 1), order=2)
+    rubber = sp.StableNeoHookean(youngs=1e5 * p[0], density=1000 * p[1], poisson=0.48, damping=0.02 * p[2])
+    body = sp.Body("bar", mesh, rubber)
+    return sp.Scene([body], pins=[sp.Pin("bar", end(body, -1))])
+
+
+def pressed(p):
+    """By a pressure on an open surface, and by springs that move."""
+    body = bar(p[0], p[1])
+    top = [k for k, corners in enumerate(body.mesh.vertices[body.triangles]) if (corners[:, 1] > 0.049).all()]
+    grip = sp.SoftTarget("bar", end(body, -1), stiffness=50 * p[2], motion=lambda t: (0, 0.1 * p[2] * ramp(t), 0))
+    return sp.Scene([body], soft_targets=[grip], loads=[sp.Pressure("bar", lambda t: 800 * p[3] * ramp(t), region=top)])
+
+
+def in_field(p):
+    """Of forces that depend on the place; a spring, and growth."""
+    body = bar(p[0], p[1])
+    field = sp.BodyForce(lambda x, t: -200 * p[2] * x + np.sin(5 * x))
+    spring = sp.Spring(("bar", 19), ("bar", 0), stiffness=100 * p[3])
+    growth = sp.Growth("bar", lambda t: 1 + 0.2 * p[2] * ramp(t))
+    return sp.Scene([body], loads=[field, spring, growth], gravity=(0, 0, 0))
+
+
+def twisted(p):
+    """By a script that turns, whose steps are divided."""
+    body = bar(p[0], p[1], damping=0.01)
+    turn = sp.Keyframes([0, 0.05], angles=[0, 2.5 * p[2]], axis=(1, 0, 0))
+    return sp.Scene([body], pins=[sp.Pin("bar", end(body, -1)), sp.Pin("bar", end(body, 1), motion=turn)])
+
+
+def on_moving_floor(p):
+    body = bar(p[0], p[1], position=(0, 0.0502, 0))
+    floor = sp.HalfSpace(name="floor", friction=0.5 * p[3], motion=lambda t: (0.5 * p[2] * t, 0.2 * t, 0))
+    return sp.Scene([body], obstacles=[floor])
+
+
+def chain(p):
+    """A ball joint, and a hinge at its limit."""
+    shape = sp.shapes.box((0.2, 0.06, 0.06), (2, 1, 1))
+    base = sp.RigidBody("base", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), density=1000.0, position=(-0.3, 0, 0))
+    one = sp.RigidBody("bar", shape, density=500 * p[0], angular_velocity=(0, p[1], 0))
+    other = sp.RigidBody("other", shape, density=500.0, position=(0.25, 0, 0))
+    joints = [
+        sp.BallJoint("bar", "base", point=(-0.12, 0, 0), name="shoulder"),
+        sp.HingeJoint("other", "bar", point=(0.125, 0, 0), axis=(0, 0, 1), name="elbow", limits=(-0.05 * p[2], 2.0)),
+    ]
+    return sp.Scene([base, one, other], pins=[sp.Pin("base")], joints=joints)
+
+
 def tail():
     rubber = sp.StableNeoHookean(youngs=5e4, density=800, poisson=0.3)
     return sp.Body("tail", sp.shapes.box((0.2, 0.1, 0.1), (2, 1, 1)), rubber, position=(0.305, 0, 0))

@@ -27,6 +27,12 @@ SMOOTH = [
     (scenes.damped, 3),
     (scenes.pulled, 3),
     (scenes.flight, 4),
+    (scenes.quadratic, 3),
+    (scenes.pressed, 4),
+    (scenes.in_field, 4),
+    (scenes.twisted, 3),
+    (scenes.on_moving_floor, 4),
+    (scenes.chain, 3),
     (scenes.stitched, 4),
     (scenes.sewn, 4),
     (scenes.held_by_rigid, 4),
@@ -67,6 +73,22 @@ def test_equilibria(scene_of, q):
 def test_contact_with_obstacles(scene_of, integrator):
     check = sensitivity(scene_of, 4, implicit(integrator), 8).check(np.ones(4), 1, step=1e-5)
     assert check.relative <= 1e-5, str(check)
+
+
+def test_areas_of_contacts_that_change_are_told():
+    """A block lands on another one: the gradient is that of constant areas."""
+
+    def landing(p):
+        low = scenes.bar(p[0], size=(0.2, 0.1, 0.1), cells=(2, 1, 1))
+        rubber = sp.StableNeoHookean(youngs=5e4 * p[1], density=800, poisson=0.3)
+        mesh = sp.shapes.box((0.1, 0.08, 0.08), (1, 1, 1))
+        top = sp.Body("top", mesh, rubber, position=(0.013, 0.0905, 0.004), velocity=(0.1, -0.2, 0))
+        return sp.Scene([low, top], pins=[sp.Pin("bar", np.flatnonzero(low.mesh.vertices[:, 1] < -0.049))])
+
+    one = sensitivity(landing, 2, implicit(), 8)
+    with pytest.warns(sp.SuppleWarning, match="areas of contacts change"):
+        check = one.check(np.ones(2), 1, step=1e-6)
+    assert check.relative <= 0.05, str(check)
 
 
 def test_friction_with_the_normal_forces_of_the_end():

@@ -167,28 +167,29 @@ class _Runs:
         return known[known[:, 0].argmin(), 1:] if len(known) else p
 
     def residuals(self, p: Floats) -> Floats:
-        try:
-            found = self.of.residuals(p)
-        except SuppleError as error:
-            if self.first is None:
-                raise
-            self._note(p, np.inf, str(error))
-            return _FAILED * self.first
-        self.first = found if self.first is None else self.first
-        self._note(p, float(found @ found))
-        return found
+        found = self._tried(p, lambda: self.of.residuals(p), lambda r: float(r @ r))
+        if self.first is None:
+            self.first = found
+        return _FAILED * np.asarray(self.first) if found is None else found
 
     def gradient(self, p: Floats, scales: Floats) -> tuple[float, Floats]:
+        found = self._tried(p, lambda: self.of.value_and_gradient(p), lambda both: both[0])
+        if found is None:
+            return _FAILED * self.worst, np.zeros_like(p)
+        self.worst = max(self.worst, abs(found[0]))
+        return found[0], found[1] * scales
+
+    def _tried(self, p: Floats, run: Callable[[], Any], loss_of: Callable[[Any], float]) -> Any:
+        """What a run gives; None where it fails, but for the first one."""
         try:
-            value, by = self.of.value_and_gradient(p)
+            found = run()
         except SuppleError as error:
             if not self.count:
                 raise
             self._note(p, np.inf, str(error))
-            return _FAILED * self.worst, np.zeros_like(p)
-        self.worst = max(self.worst, abs(value))
-        self._note(p, value)
-        return value, by * scales
+            return None
+        self._note(p, loss_of(found))
+        return found
 
     def _note(self, p: Floats, loss: float, why: str = "") -> None:
         self.count += 1
@@ -209,15 +210,12 @@ class _Runs:
 
 def _at_end(of: Sensitivity, p: Floats, scales: Floats, jacobian: Floats | None) -> Any:
     """Standard errors (q,), and what was measured and simulated, by label."""
-    errors = np.full(len(p), np.nan)
-    measured, simulated = of.readings(p)
-    if jacobian is None:
-        return errors, measured, simulated
-    residuals = of.residuals(p)
-    seen = sum(len(values) for values in measured.values())
-    freedom = seen - len(p)
-    R = np.linalg.qr(jacobian, mode="r")
-    if freedom > 0 and np.linalg.cond(R) < _SINGULAR:
-        spread = float(residuals @ residuals) / freedom
-        errors = scales * np.sqrt(spread * (np.linalg.inv(R) ** 2).sum(axis=1))
+    errors, residuals = np.full(len(p), np.nan), of.residuals(p)
+    measured, simulated = of.loss.readings(residuals, of.steps)
+    freedom = sum(len(values) for values in measured.values()) - len(p)
+    if jacobian is not None and freedom > 0:
+        R = np.linalg.qr(jacobian, mode="r")
+        if np.linalg.cond(R) < _SINGULAR:
+            spread = float(residuals @ residuals) / freedom
+            errors = scales * np.sqrt(spread * (np.linalg.inv(R) ** 2).sum(axis=1))
     return errors, measured, simulated

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.gradients.lagged import LaggedFriction
 from supple.model.loads.actuators.laws import Held
 from supple.model.state import State
 from supple.numerics.inner_product import norm
 from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
+from supple.solvers.implicit.contact.lagged import LaggedFriction
 from supple.solvers.implicit.energies.joints import JointPotential
 from supple.solvers.implicit.energies.loads.actuators import ActuatorPotential
 from supple.solvers.implicit.newton.objective import Objective

@@ -174,16 +174,30 @@ class Loss:
         misfits = tuple(part for part in parts if isinstance(part, Misfit))
         return cls(misfits, tuple(part for part in parts if not isinstance(part, Misfit)))
 
-    def rows(self, frame: Frame, steps: int) -> list[tuple[Misfit, int]]:
-        """The misfits that a frame is part of, and the rows of their targets."""
+    def rows(self, index: int, steps: int) -> list[tuple[Misfit, int]]:
+        """The misfits that frame `index` is part of, and the rows of their targets."""
         numbers = [(misfit, misfit.frames(steps)) for misfit in self.misfits]
-        return [(misfit, k) for misfit, given in numbers for k, number in enumerate(given) if number == frame.index]
+        return [(misfit, k) for misfit, given in numbers for k, number in enumerate(given) if number == index]
+
+    def readings(self, residuals: Floats, steps: int) -> tuple[dict[str, Floats], dict[str, Floats]]:
+        """What was measured, and what a run with these residuals (r,) read, (k,) by label of the misfit."""
+        seen: dict[str, Floats] = {}
+        read: dict[str, Floats] = {}
+        begin = 0
+        for number in range(1, steps + 1):
+            for misfit, row in self.rows(number, steps):
+                target = misfit.target[row].ravel()
+                own = residuals[begin : (begin := begin + len(target))] / np.sqrt(misfit.weight)
+                known = np.isfinite(target)
+                for values, more in ((seen, target), (read, target + own)):
+                    values[misfit.label] = np.append(values.get(misfit.label, np.zeros(0)), more[known])
+        return seen, read
 
     def at(self, frame: Frame, steps: int) -> tuple[float, Seeds]:
         """The share of a frame, and its derivatives."""
         system = frame.system
         seeds, total = Seeds.zeros(len(system.rest_positions)), 0.0
-        for misfit, row in self.rows(frame, steps):
+        for misfit, row in self.rows(frame.index, steps):
             residuals = misfit.residuals(frame, row)
             total += float((residuals**2).sum())
             misfit.add_seeds(system, 2.0 * residuals, seeds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -132,15 +133,13 @@ class Sensitivity:
 
     def value(self, p: ArrayLike) -> float:
         """The loss at parameters (q,)."""
-        first, workspace = self._begun(_vector(p))
-        return sum(self.loss.at(frame, self.steps)[0] for frame in self._frames(first, workspace))
+        return sum(self.loss.at(frame, self.steps)[0] for frame in self._frames(*self._begun(_vector(p))))
 
     def residuals(self, p: ArrayLike) -> Floats:
         """(r,) of all misfits, frame by frame; the loss is the sum of their squares."""
-        first, workspace = self._begun(_vector(p))
         found = [np.zeros(0)]
-        for frame in self._frames(first, workspace):
-            found += [misfit.residuals(frame, row).ravel() for misfit, row in self.loss.rows(frame, self.steps)]
+        for frame in self._frames(*self._begun(_vector(p))):
+            found += [misfit.residuals(frame, row).ravel() for misfit, row in self.loss.rows(frame.index, self.steps)]
         return np.concatenate(found)
 
     def residuals_and_jacobian(self, p: ArrayLike) -> tuple[Floats, Floats]:
@@ -151,16 +150,10 @@ class Sensitivity:
         p = _vector(p)
         first, workspace = self._begun(p)
         workspace.tape = tape = []
-        steps = _STEP * self.sizes(p)
         sides = []
         for k in range(len(p)):
-            ends = []
-            for sign in (1.0, -1.0):
-                there = p.copy()
-                there[k] += sign * steps[k]
-                ends.append(self._begun(there))
-                _same_shape(first.system, ends[-1][0].system, k)
-            sides.append(Side(float(steps[k]), *(workspace for _, workspace in ends), *(f.state for f, _ in ends)))
+            (one, above), (other, below) = self._both(p, k, first.system)
+            sides.append(Side(_STEP * float(self.sizes(p)[k]), above, below, one.state, other.state))
         at = [StateTangent.start(side, first.state) for side in sides]
         residuals, columns = [np.zeros(0)], [np.zeros((0, len(p)))]
         for frame in self._frames(first, workspace):
@@ -171,25 +164,11 @@ class Sensitivity:
             tape.clear()
             system = frame.system
             at = [one.with_vertices(len(first.state.positions)) for one in at]
-            for misfit, row in self.loss.rows(frame, self.steps):
+            for misfit, row in self.loss.rows(frame.index, self.steps):
                 residuals.append(misfit.residuals(frame, row).ravel())
                 changes = [misfit.tangents(system, row, one.x, one.v, one.forces).ravel() for one in at]
                 columns.append(np.stack(changes, axis=1))
         return np.concatenate(residuals), np.concatenate(columns)
-
-    def readings(self, p: ArrayLike) -> tuple[dict[str, Floats], dict[str, Floats]]:
-        """What was measured, and what the run at parameters (q,) gives, (k,) by label of the misfit."""
-        first, workspace = self._begun(_vector(p))
-        seen: dict[str, list[Floats]] = {misfit.label: [] for misfit in self.loss.misfits}
-        run: dict[str, list[Floats]] = {label: [] for label in seen}
-        for frame in self._frames(first, workspace):
-            for misfit, row in self.loss.rows(frame, self.steps):
-                target = misfit.target[row]
-                known = np.isfinite(target)
-                seen[misfit.label].append(target[known])
-                run[misfit.label].append((target + misfit.residuals(frame, row) / np.sqrt(misfit.weight))[known])
-        of_seen, of_run = ({label: np.concatenate(parts) for label, parts in one.items()} for one in (seen, run))
-        return of_seen, of_run
 
     def value_and_gradient(self, p: ArrayLike) -> tuple[float, Floats]:
         """The loss at parameters (q,), and its derivatives (q,)."""
@@ -219,12 +198,7 @@ class Sensitivity:
             tape.clear()
         workspace.tape = None
         adjoints, begin = _backwards(kept, seeds, workspace, first.state)
-        steps = [
-            (one, adjoint)
-            for some, own in zip(kept, adjoints, strict=True)
-            for one, adjoint in zip(some, own, strict=True)
-        ]
-        system = first.system
+        steps, system = list(zip(chain.from_iterable(kept), adjoints, strict=True)), first.system
         starts = by_anchors(system, steps, begin.x)
         by_moduli, by_rest = fields_of(workspace, steps, self.solver, moduli=moduli, rest=rest)
         chosen = range(len(p)) if parameters is None else parameters
@@ -276,21 +250,30 @@ class Sensitivity:
         self, p: Floats, k: int, steps: list[tuple[Kept, StepAdjoint]], begin: StateAdjoint, system: System
     ) -> float:
         """By parameter k, at fixed states: no step is taken."""
-        e = _STEP * float(self.sizes(p)[k])
         sides = []
+        for first, workspace in self._both(p, k, system):
+            values = [adjoint.value(Replay.of(one, workspace)) for one, adjoint in steps]
+            start = first.state
+            values += [float(np.einsum("ij,ij->", begin.x[: len(start.positions)], start.positions))]
+            values += [float(np.einsum("ij,ij->", begin.v[: len(start.positions)], start.velocities))]
+            sides.append(np.array(values))
+        return float((sides[0] - sides[1]).sum() / (2.0 * _STEP * self.sizes(p)[k]))
+
+    def _both(self, p: Floats, k: int, system: System) -> list[tuple[Frame, Workspace]]:
+        """The scenes on both sides of parameter k."""
+        found = []
         for sign in (1.0, -1.0):
             there = p.copy()
-            there[k] += sign * e
-            first, workspace = self._begun(there)
-            _same_shape(system, first.system, k)
-            values = [adjoint.value(Replay.of(one, workspace)) for one, adjoint in steps]
-            sides.append(np.array([*values, _start_value(begin, first.state)]))
-        return float((sides[0] - sides[1]).sum() / (2.0 * e))
+            there[k] += sign * _STEP * self.sizes(p)[k]
+            found.append(self._begun(there))
+            if not np.array_equal(system.tets, found[-1][0].system.tets):
+                raise SceneError(f"Sensitivity: parameter {k} changes the meshes; keep their vertices and tets")
+        return found
 
 
 def _backwards(
     kept: list[list[Kept]], seeds: list[Seeds], workspace: Workspace, start: State
-) -> tuple[list[list[StepAdjoint]], StateAdjoint]:
+) -> tuple[list[StepAdjoint], StateAdjoint]:
     """The adjoints of all substeps, and of the state at the start."""
     n = len(start.positions)
     at, found = StateAdjoint.zeros(n, len(kept[0][0].before.internal) if kept else 0), []
@@ -299,12 +282,12 @@ def _backwards(
         at.x += given.x
         at.v += given.v
         whole = len(some[-1].x)
-        at, own, pins = at.with_vertices(whole), [], np.zeros((whole, 3))
+        at, pins = at.with_vertices(whole), np.zeros((whole, 3))
         pins[:n] = given.pins
         for one in reversed(some):
             replay = Replay.of(one, workspace)
             adjoint, at = step_adjoint(replay, at, pins)
-            own.append(adjoint)
+            found.append(adjoint)
             changes.append(replay.area_change())
             pins = np.zeros_like(pins)
         for values in (at.x, at.v):
@@ -314,7 +297,6 @@ def _backwards(
         past = at.past_x, at.past_v
         at = at.with_vertices(n)
         at.past_x, at.past_v = past
-        found.append(own[::-1])
     if max(changes, default=0.0) > _AREAS:
         warnings.warn(
             f"gradient: the areas of contacts change by up to {100.0 * max(changes):.2g} % in a step; that they depend "
@@ -323,18 +305,6 @@ def _backwards(
             stacklevel=4,
         )
     return found[::-1], at
-
-
-def _start_value(begin: StateAdjoint, start: State) -> float:
-    n = len(start.positions)
-    return float(
-        np.einsum("ij,ij->", begin.x[:n], start.positions) + np.einsum("ij,ij->", begin.v[:n], start.velocities)
-    )
-
-
-def _same_shape(system: System, other: System, k: int) -> None:
-    if not np.array_equal(system.tets, other.tets):
-        raise SceneError(f"Sensitivity: parameter {k} changes the meshes of the scene; keep their vertices and tets")
 
 
 def _vector(p: ArrayLike) -> Floats:
