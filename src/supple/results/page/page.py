@@ -60,7 +60,8 @@ def page_of_frames(frames: Sequence[tuple[float, RenderFrame]]) -> str:
 
 def _page(frames: Sequence[tuple[float, RenderFrame]], plots: Any = lambda packer: []) -> str:
     packer, model = Packer(), frames[0][1].model
-    title = ", ".join(body.name for body in model.bodies)[:80]
+    names = [body.name for body in model.bodies]
+    title = ", ".join(names if len(names) <= 4 else [*names[:3], f"{len(names) - 3} more"])[:80]
     described = {"title": title, **described_scene(model, packer), **described_motion(frames, packer)}
     data = zlib.compress(packer.block({**described, "plots": plots(packer)}), 9)
     return client(title).replace(_DATA, base64.b64encode(data).decode("ascii"), 1)
