@@ -24,7 +24,7 @@ from supple.model.system import System, initial_state
 from supple.results.frame import Frame
 from supple.scene.rotation import rotation_matrix
 from supple.scene.scene import Scene
-from supple.simulate import check_timing, frames_from, prepared
+from supple.simulate import check_timing, first_frame, frames_from, prepared
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.implicit.stepping.workspace import Workspace
 
@@ -152,7 +152,7 @@ class Sensitivity:
         workspace.tape = tape = []
         sides = []
         for k in range(len(p)):
-            (one, above), (other, below) = self._both(p, k, first.system)
+            (one, above), (other, below) = self._both(p, k, workspace)
             sides.append(Side(_STEP * float(self.sizes(p)[k]), above, below, one.state, other.state))
         at = [StateTangent.start(side, first.state) for side in sides]
         residuals, columns = [np.zeros(0)], [np.zeros((0, len(p)))]
@@ -202,7 +202,7 @@ class Sensitivity:
         starts = by_anchors(system, steps, begin.x)
         by_moduli, by_rest = fields_of(workspace, steps, self.solver, moduli=moduli, rest=rest)
         chosen = range(len(p)) if parameters is None else parameters
-        by_parameters = np.array([self._derivative(p, k, steps, begin, system) for k in chosen])
+        by_parameters = np.array([self._derivative(p, k, steps, begin, workspace) for k in chosen])
         of_moduli = {part.name: by_moduli[part.tets] for part in system.bodies} if moduli else {}
         shapes = {}
         for part in system.bodies if rest else ():
@@ -233,12 +233,16 @@ class Sensitivity:
         return np.where(p == 0.0, 1.0, np.abs(p)) if self.scales is None else np.broadcast_to(self.scales, p.shape)
 
     def _begun(self, p: Floats) -> tuple[Frame, Workspace]:
-        scene = self.scene_of(p)
-        if not isinstance(scene, Scene):
-            raise SceneError(f"Sensitivity: scene_of gives a {type(scene).__name__}; give a Scene")
+        scene = self._scene(p)
         first, workspace = prepared(scene, initial_state(scene), self.solver)
         refuse(first.system, self.solver)
         return first, workspace
+
+    def _scene(self, p: Floats) -> Scene:
+        scene = self.scene_of(p)
+        if not isinstance(scene, Scene):
+            raise SceneError(f"Sensitivity: scene_of gives a {type(scene).__name__}; give a Scene")
+        return scene
 
     def _frames(self, first: Frame, workspace: Workspace) -> Any:
         for frame in frames_from(first, self.dt, self.steps, workspace, None, [], True):
@@ -247,11 +251,11 @@ class Sensitivity:
             yield frame
 
     def _derivative(
-        self, p: Floats, k: int, steps: list[tuple[Kept, StepAdjoint]], begin: StateAdjoint, system: System
+        self, p: Floats, k: int, steps: list[tuple[Kept, StepAdjoint]], begin: StateAdjoint, at: Workspace
     ) -> float:
         """By parameter k, at fixed states: no step is taken."""
         sides = []
-        for first, workspace in self._both(p, k, system):
+        for first, workspace in self._both(p, k, at):
             values = [adjoint.value(Replay.of(one, workspace)) for one, adjoint in steps]
             start = first.state
             values += [float(np.einsum("ij,ij->", begin.x[: len(start.positions)], start.positions))]
@@ -259,16 +263,30 @@ class Sensitivity:
             sides.append(np.array(values))
         return float((sides[0] - sides[1]).sum() / (2.0 * _STEP * self.sizes(p)[k]))
 
-    def _both(self, p: Floats, k: int, system: System) -> list[tuple[Frame, Workspace]]:
+    def _both(self, p: Floats, k: int, at: Workspace) -> list[tuple[Frame, Workspace]]:
         """The scenes on both sides of parameter k."""
         found = []
         for sign in (1.0, -1.0):
             there = p.copy()
             there[k] += sign * _STEP * self.sizes(p)[k]
-            found.append(self._begun(there))
-            if not np.array_equal(system.tets, found[-1][0].system.tets):
-                raise SceneError(f"Sensitivity: parameter {k} changes the meshes; keep their vertices and tets")
+            scene = self._scene(there)
+            first = first_frame(scene, initial_state(scene), self.solver)
+            workspace = self.solver.prepare(first.system, at.tools) if _are_alike(first.system, at.system) else None
+            if workspace is None or not _are_alike(workspace.system, at.system, whole=True):
+                raise SceneError(
+                    f"Sensitivity: parameter {k} changes which tets, pins or welds the scene has; keep them"
+                )
+            found.append((first, workspace))
         return found
+
+
+def _are_alike(one: System, other: System, *, whole: bool = False) -> bool:
+    """Whether two systems have the same vertices to solve for, and the same elements."""
+    pairs = [(one.tets, other.tets)]
+    if whole:
+        pairs += [(one.elements, other.elements), (one.pinned_vertices, other.pinned_vertices)]
+        pairs += [(one.welding.vertices, other.welding.vertices)]
+    return all(np.array_equal(a, b) for a, b in pairs)
 
 
 def _backwards(

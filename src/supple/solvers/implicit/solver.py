@@ -134,8 +134,12 @@ class Implicit(Solver):
             raise SolverError(refusal)
         refuse_materials(system)
 
-    def prepare(self, system: System) -> Workspace:
+    def prepare(self, system: System, tools: Tools | None = None) -> Workspace:
         """Compute the patterns, groups and memory for a system.
+
+        Parameters
+        ----------
+        tools : of a system with the same tets, pins and welds; None: they are made
 
         Raises
         ------
@@ -156,21 +160,18 @@ class Implicit(Solver):
                 f"{system.obstacles[0].label}: with contact=None obstacles have no effect; give contact=IPCContact(), "
                 "or remove them"
             )
-        free_motion = FreeMotion.of(system)
+        free_motion = FreeMotion.of(system) if tools is None else tools.free_motion
         if isinstance(method, Static) and len(free_motion.totals):
             body = next(part for part in system.bodies if free_motion.piece[part.vertices].max() >= 0)
             raise SolverError(
                 f"body {body.name!r}: nothing holds it, so that it has no static equilibrium; pin some of its "
                 "vertices, or use another integrator"
             )
-        with threads_for(len(system.tets), _SHARED_FROM):
-            linear_solver = LinearSolver.of(system, self.linear_solver)
-        tools = Tools(
-            linear_solver,
-            HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching)),
-            system.pinned_vertices,
-            free_motion,
-        )
+        if tools is None:
+            with threads_for(len(system.tets), _SHARED_FROM):
+                linear_solver = LinearSolver.of(system, self.linear_solver)
+            hessian = HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching))
+            tools = Tools(linear_solver, hessian, system.pinned_vertices, free_motion)
         stitches = StitchEnergy.of(system.stitching, 0.0) if len(system.stitching) else None
         dampers = viscosity_of(elasticity), quadratic_viscosity_of(elasticity), StitchViscosity.of(system.stitching)
         return Workspace(
