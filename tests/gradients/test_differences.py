@@ -89,6 +89,8 @@ def test_areas_of_contacts_that_change_are_told():
     with pytest.warns(sp.SuppleWarning, match="areas of contacts change"):
         check = one.check(np.ones(2), 1, step=1e-6)
     assert check.relative <= 0.05, str(check)
+    with pytest.warns(sp.SuppleWarning, match="areas of contacts change"):
+        one.residuals_and_jacobian(np.ones(2))
 
 
 def test_friction_with_the_normal_forces_of_the_end():

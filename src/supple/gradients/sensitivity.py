@@ -155,11 +155,11 @@ class Sensitivity:
             (one, above), (other, below) = self._both(p, k, workspace)
             sides.append(Side(_STEP * float(self.sizes(p)[k]), above, below, one.state, other.state))
         at = [StateTangent.start(side, first.state) for side in sides]
-        residuals, columns = [np.zeros(0)], [np.zeros((0, len(p)))]
+        residuals, columns, change = [np.zeros(0)], [np.zeros((0, len(p)))], 0.0
         for frame in self._frames(first, workspace):
             for number, taken in enumerate(tape):
                 replay = Replay.of(Kept.of(taken, number == 0), workspace)
-                equations = Equations.of(replay)
+                change, equations = max(change, replay.area_change()), Equations.of(replay)
                 at = [step_tangent(replay, equations, side, one) for side, one in zip(sides, at, strict=True)]
             tape.clear()
             system = frame.system
@@ -168,6 +168,7 @@ class Sensitivity:
                 residuals.append(misfit.residuals(frame, row).ravel())
                 changes = [misfit.tangents(system, row, one.x, one.v, one.forces).ravel() for one in at]
                 columns.append(np.stack(changes, axis=1))
+        _warn_of_areas(change)
         return np.concatenate(residuals), np.concatenate(columns)
 
     def value_and_gradient(self, p: ArrayLike) -> tuple[float, Floats]:
@@ -315,14 +316,19 @@ def _backwards(
         past = at.past_x, at.past_v
         at = at.with_vertices(n)
         at.past_x, at.past_v = past
-    if max(changes, default=0.0) > _AREAS:
+    _warn_of_areas(max(changes))
+    return found[::-1], at
+
+
+def _warn_of_areas(change: float) -> None:
+    """Warn where contact's forces change so much by the areas of contacts, which are constants in the derivatives."""
+    if change > _AREAS:
         warnings.warn(
-            f"gradient: the areas of contacts change by up to {100.0 * max(changes):.2g} % in a step; that they depend "
+            f"gradient: the areas of contacts change by up to {100.0 * change:.2g} % in a step; that they depend "
             "on the parameters is left out, see docs/theory/gradients.md",
             SuppleWarning,
-            stacklevel=4,
+            stacklevel=3,
         )
-    return found[::-1], at
 
 
 def _vector(p: ArrayLike) -> Floats:
