@@ -47,6 +47,7 @@ def test_sharp_edges_and_corners_stay():
 
 
 def test_a_tetrahedron_with_two_turned_triangles_is_turned_first(caplog):
+    caplog.set_level("INFO")
     mesh, report = tetrahedralize_reported(turned_tetrahedron(), tets=500)
     assert report.mesher == "mmg"
     assert mesh.volume == pytest.approx(0.05**3 / 6, rel=1e-6)

@@ -104,7 +104,7 @@ def test_a_robot_reads_nothing_outside_its_folder(place):
 def test_commands_are_confined(place, command, monkeypatch, capsys):
     """`run` and `info` where they are asked to, `view` where it is not asked not to."""
     shown = []
-    monkeypatch.setattr("supple.app.cli.commands.view.serve_page", lambda source, *_: shown.append(source))
+    monkeypatch.setattr("supple.app.cli.commands.view.serve_page", lambda read, *_, **__: shown.append(read()))
     path = place / "scene.yaml"
     path.write_text(SCENE.format(source="mesh: {file: ../outside.msh}"))
     more = ["-o", str(place / "out"), "--steps", "0", "-q", "--no-page", "--no-plot"] if command == "run" else []

@@ -85,7 +85,7 @@ def test_a_robot_becomes_rigid_bodies_and_joints(robot_file, caplog):
 
 def test_a_robot_is_shown_live(robot_file, monkeypatch):
     shown = []
-    monkeypatch.setattr("supple.app.cli.commands.view.serve_page", lambda source, *_: shown.append(source))
+    monkeypatch.setattr("supple.app.cli.commands.view.serve_page", lambda read, *_, **__: shown.append(read()))
     main(["view", str(robot_file), "--no-open"])
     (source,) = shown
     assert len(source.scene.joints) == 4

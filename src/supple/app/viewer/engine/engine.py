@@ -6,9 +6,10 @@ import contextlib
 import logging
 import multiprocessing
 import pickle
+import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from supple.app.viewer.engine.simulation_process import run_simulation
@@ -23,6 +24,28 @@ from supple.errors import CommandError, SceneError, SolverError
 _UNGUARDED = 117
 # A process that does not end by itself within this time [s] is terminated.
 GRACE = 2.0
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits for the end of this block. A process that starts in it never hears of Ctrl-C, so also not before it
+    can ignore that."""
+    heard: list[bool] = []
+    handler = signal.getsignal(signal.SIGINT)
+    is_heard = callable(handler) and threading.current_thread() is threading.main_thread()
+    if is_heard:
+        signal.signal(signal.SIGINT, lambda *_: heard.append(True))
+    can_block = hasattr(signal, "pthread_sigmask")  # not in Windows
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else set()
+    try:
+        yield
+    finally:
+        if can_block:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if is_heard:
+            signal.signal(signal.SIGINT, handler)
+    if heard:
+        raise KeyboardInterrupt
 
 
 class Engine:
@@ -91,7 +114,8 @@ class Engine:
             daemon=True,
         )
         try:
-            self._process.start()
+            with _interrupts_held():
+                self._process.start()
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             raise SceneError(
                 f"the scene cannot be sent to another process ({error}); use Keyframes instead of functions of time "
