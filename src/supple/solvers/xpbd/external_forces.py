@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.model.loads.applied import DeadLoad, DragLoad
+from supple.model.loads.applied import AppliedLoad, DeadLoad, DragLoad
 from supple.model.loads.growth import GrownTets
 from supple.model.loads.springs import PointSpring
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.assessment.acting import Acting
 from supple.solvers.xpbd.moment import Substep
+
+Rows, Forces = NDArray[np.int64], NDArray[np.float64]
 
 
 class ExternalForces:
@@ -34,40 +36,41 @@ class ExternalForces:
         acting = [*applied, *pulling]
         self.acting = Acting([name for name, _ in acting], [vertices for _, vertices in acting])
         parts = iter(self.acting.parts)  # in the order of the names
-        self._pushes = [(load, *next(parts)) for load in pushes]
+        pushed = [(load, *next(parts)) for load in pushes]
+        self._steady = [one for one in pushed if one[0].is_steady]
+        self._changing = [one for one in pushed if not one[0].is_steady]
         self._drags = [(load, *next(parts)) for load in drags]
         self._targets = [(target, *next(parts)) for target in system.soft_targets]
         self._springs = [(spring, *next(parts)) for spring in springs]
         self._internal = np.array([load.is_internal for load in pushes], dtype=np.bool_)
-        self._need_places = not all(load.is_steady or isinstance(load, DeadLoad) for load in pushes)
+        self._need_places = not all(isinstance(load, DeadLoad) for load, *_ in self._changing)
         self.push, self.pull = bool(applied), bool(springs or system.soft_targets)
         self._total = np.zeros((len(system.masses), 3))
 
     def begin_frame(self, at: Substep) -> None:
         """Begin a frame, of which this is the first substep."""
         self.acting.works[:], self.acting.forces[:] = 0.0, 0.0
-        self._find(at.points[:, :3], at.time, True)
+        self._find(self._steady, at.points[:, :3], at.time)
 
     def add_forces(self, at: Substep) -> None:
         """Add the loads to a prediction: v += h w f, x += h^2 w f.
 
         Internal ones change positions alone: like constraints, they change velocities where momenta are restored.
         """
-        self._find(at.world() if self._need_places else at.points[:, :3], at.time, False)
+        self._find(self._changing, at.world() if self._need_places else at.points[:, :3], at.time)
         acting = self.acting
         _push(at.points, at.velocities, acting.rows, acting.start, acting.forces, self._internal, at.h)
         for drag in self._drags:
             self._drag(*drag, at)
 
-    def _find(self, x: NDArray[np.float64], time: float, steady: bool) -> None:
-        """Set the forces of the loads that are steady, or those of the others."""
-        for load, rows, part in self._pushes:
-            if load.is_steady == steady:
-                self._total[rows] = 0.0
-                load.add_forces(x, time, self._total)
-                part[:] = self._total[rows]
+    def _find(self, loads: list[tuple[AppliedLoad, Rows, Forces]], x: NDArray[np.float64], time: float) -> None:
+        """Set the forces of these loads, on their rows."""
+        for load, rows, part in loads:
+            self._total[rows] = 0.0
+            load.add_forces(x, time, self._total)
+            part[:] = self._total[rows]
 
-    def _drag(self, load: DragLoad, rows: NDArray[np.int64], part: NDArray[np.float64], at: Substep) -> None:
+    def _drag(self, load: DragLoad, rows: Rows, part: Forces, at: Substep) -> None:
         """The forces c (w - v') with the velocity v' after them: v' = (v + h c w / m) / (1 + h c / m)."""
         v = at.velocities
         c, w = load.coefficients(at.begun + at.origins, v, at.time)[rows, None], at.points[rows, 3:]
