@@ -219,13 +219,6 @@ def largest_step(
     return limit
 
 
-def largest_step_in_pieces(
-    finder: CandidateFinder, points: NDArray[np.float64], way: NDArray[np.float64], floor: float = 0.0
-) -> Limit:
-    """As `largest_step`, with candidates from `finder`; a step of zero where the way is not finite."""
-    return Along(finder, points, way, floor).largest_step(way)
-
-
 class Along:
     """How far points may go on ways that are shorter than those given, each on its own; one search serves them all.
 

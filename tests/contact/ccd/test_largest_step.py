@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.contact.candidates import CandidateFinder
-from supple.contact.ccd import largest_step, largest_step_in_pieces
+from supple.contact.ccd import Along, largest_step
 from supple.contact.features.pair_geometry import VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import intersects, mesh_of_triangles
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -36,7 +36,7 @@ def test_a_box_that_falls_on_another_keeps_a_tenth_of_the_distance_or_dhat(lengt
     mesh, x = boxes(0.25)
     way = np.zeros_like(x)
     way[mesh.owner == 1, 1] = -length
-    limit = largest_step_in_pieces(CandidateFinder(mesh, dhat), x, way)
+    limit = Along(CandidateFinder(mesh, dhat), x, way).largest_step(way)
     left = 0.25 - length * limit.step
     if length < 1.0:  # in one piece; a later piece keeps a tenth of what the earlier ones leave
         assert left == pytest.approx(min(0.025, dhat), rel=0.06)
@@ -49,9 +49,9 @@ def test_a_way_that_leads_away_is_taken_completely():
     mesh, x = boxes(1e-6)
     way = np.zeros_like(x)
     way[mesh.owner == 1, 1] = 7.3
-    limit = largest_step_in_pieces(CandidateFinder(mesh, 1e-3), x, way)
+    limit = Along(CandidateFinder(mesh, 1e-3), x, way).largest_step(way)
     assert (limit.step, limit.points) == (1.0, ())
-    assert largest_step_in_pieces(CandidateFinder(mesh, 1e-3), x, np.zeros_like(x)).step == 1.0
+    assert Along(CandidateFinder(mesh, 1e-3), x, np.zeros_like(x)).largest_step(np.zeros_like(x)).step == 1.0
 
 
 @pytest.mark.parametrize("value", [np.inf, np.nan])
@@ -59,7 +59,7 @@ def test_a_way_that_is_not_finite_is_not_taken(value):
     mesh, x = boxes(0.1)
     way = np.zeros_like(x)
     way[3, 1] = value
-    assert largest_step_in_pieces(CandidateFinder(mesh, 1e-3), x, way).step == 0.0
+    assert Along(CandidateFinder(mesh, 1e-3), x, way).largest_step(way).step == 0.0
 
 
 def distance_of(mesh, limit, x):
@@ -76,7 +76,7 @@ def test_random_ways_never_lead_to_intersections_and_end_at_a_tenth_of_a_distanc
     limited = 0
     for _ in range(60):
         way = rng.normal(size=x.shape) * 10.0 ** rng.uniform(-2.5, 1)
-        limit = largest_step_in_pieces(finder, x, way)
+        limit = Along(finder, x, way).largest_step(way)
         for share in (0.3, 0.7, 1.0):
             assert not intersects(mesh, x + share * limit.step * way)
         if limit.points and np.linalg.norm(way, axis=1).max() < mesh.edge_lengths.mean():  # in one piece
