@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError, SolverError, SuppleWarning
 from supple.gradients.adjoint import StateAdjoint, StepAdjoint, step_adjoint
+from supple.gradients.check import Check, check
 from supple.gradients.equations import Equations
 from supple.gradients.fields import by_anchors, fields_of
 from supple.gradients.kept import Kept, Replay
@@ -35,8 +36,6 @@ Floats = NDArray[np.float64]
 _STEP = 1e-5
 # Of contact's forces: a larger change by the areas of contacts is warned of.
 _AREAS = 1e-3
-# Of a loss: the share that round-off of a whole run may change.
-_ROUNDED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,37 +57,6 @@ class Gradient:
     start_velocities: dict[str, Floats]
     moduli: dict[str, Floats]
     rest_positions: dict[str, Floats]
-
-
-@dataclass(frozen=True, eq=False)
-class Check:
-    """Derivatives along directions: of the gradient, and of central differences of whole runs.
-
-    Attributes
-    ----------
-    directions : (d, q); gradient, differences : (d,); noise : what round-off in the loss makes of differences
-    relative : their largest difference, over the largest of them; ok : whether that is at most 1e-4
-    """
-
-    directions: Floats
-    gradient: Floats
-    differences: Floats
-    noise: float
-
-    @property
-    def relative(self) -> float:
-        largest = max(float(np.abs(self.differences).max(initial=0.0)), self.noise)
-        return float(np.abs(self.gradient - self.differences).max(initial=0.0)) / largest if largest else 0.0
-
-    @property
-    def ok(self) -> bool:
-        return self.relative <= 1e-4
-
-    def __str__(self) -> str:
-        rows = zip(self.gradient, self.differences, strict=True)
-        lines = [f"direction {k + 1}: gradient {a:.9g}, differences {b:.9g}" for k, (a, b) in enumerate(rows)]
-        verdict = "agree" if self.ok else "do not agree"
-        return "\n".join([*lines, f"they {verdict}: relative difference {self.relative:.2g}"])
 
 
 class Sensitivity:
@@ -133,7 +101,17 @@ class Sensitivity:
 
     def value(self, p: ArrayLike) -> float:
         """The loss at parameters (q,)."""
-        return sum(self.loss.at(frame, self.steps)[0] for frame in self._frames(*self._begun(_vector(p))))
+        return self.value_and_structure(p)[0]
+
+    def value_and_structure(self, p: ArrayLike) -> tuple[float, list[dict[str, float]]]:
+        """The loss, and what does not change smoothly with parameters: numbers of each frame by what they are of."""
+        total, found = 0.0, []
+        for frame in self._frames(*self._begun(_vector(p))):
+            total += self.loss.at(frame, self.steps)[0]
+            of = frame.report.details
+            stiffness = of.contact_stiffness or 0.0
+            found.append({"substeps": of.substeps, "contacts": of.contacts, "Pa of contact's stiffness": stiffness})
+        return total, found
 
     def residuals(self, p: ArrayLike) -> Floats:
         """(r,) of all misfits, frame by frame; the loss is the sum of their squares."""
@@ -216,18 +194,15 @@ class Sensitivity:
     def check(self, p: ArrayLike, directions: int = 2, *, step: float = 1e-4, seed: int = 0) -> Check:
         """Compare with central differences of whole runs along random directions.
 
+        Where they do not agree, further runs with smaller steps and a sharper `tolerance` say why: `Check.verdict`.
+
         Parameters
         ----------
-        step : of the differences, as a share of the parameters or their `scales`. The solver's `tolerance` has to be
-            far below what it changes.
+        step : of the differences, as a share of the parameters or their `scales`.
         """
         p = _vector(p)
-        value, gradient = self.value_and_gradient(p)
         ways = np.random.default_rng(seed).standard_normal((directions, len(p))) * self.sizes(p)
-        if directions == 1 and len(p) == 1:
-            ways = self.sizes(p)[None]
-        differences = [(self.value(p + step * way) - self.value(p - step * way)) / (2.0 * step) for way in ways]
-        return Check(ways, ways @ gradient, np.array(differences), _ROUNDED * abs(value) / step)
+        return check(self, p, self.sizes(p)[None] if directions == len(p) == 1 else ways, step)
 
     def sizes(self, p: Floats) -> Floats:
         """(q,) the scales of parameters, in the unit of each."""
