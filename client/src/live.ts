@@ -40,6 +40,8 @@ export interface FrameMessage {
 
 export interface Status {
   error: string | null;
+  /** whether the server ends, because of this error */
+  ended: boolean;
   busy: string;
   command: string;
   recording: boolean;

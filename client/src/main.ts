@@ -160,7 +160,7 @@ class LivePage {
   private page: Page | null = null;
   private controls: Controls | null = null;
   private scene: SceneMessage | null = null;
-  private status: Status = { error: null, busy: "", command: "supple view", recording: false };
+  private status: Status = { error: null, ended: false, busy: "", command: "supple view", recording: false };
   private connected = true;
   private notices = 0;
   private readonly live: Live;
@@ -213,14 +213,15 @@ class LivePage {
 
   /** One line where something is wrong, or lasts. */
   private banner(): void {
-    const { error, busy } = this.status, element = find("#banner");
-    const gone = `The server has ended. Start it again in a terminal: ${this.status.command}`;
-    const text = !this.connected ? gone : error ? `The simulation has ended: ${error}` : busy || this.live.latest?.slow;
+    const { error, busy, ended, command } = this.status, element = find("#banner");
+    const gone = ended || !this.connected;
+    const why = ended ? `Not shown: ${error}.` : gone ? "The server has ended." : error && `The simulation has ended: ${error}`;
+    const text = gone ? `${why} Start it again in a terminal: ${command}` : why || busy || this.live.latest?.slow;
     element.hidden = !text;
     if (!text) return;
     element.querySelector("span")!.textContent = text;
     const again = element.querySelector("button")!;
-    again.hidden = !this.connected || !error;
+    again.hidden = gone || !error;
     again.onclick = () => this.live.send("restart");
   }
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from supple.errors import OutputError
+from supple.results.page import client as client_module
 from supple.results.page import page as page_module
 from supple.results.page.packed import Packer, differences, quantized
 from supple.results.page.page import write_page
@@ -116,7 +117,7 @@ def test_names_are_no_markup(tmp_path, recorded):
 
 
 def test_a_page_that_was_not_built_says_how_to_build_it(tmp_path, recorded, monkeypatch):
-    monkeypatch.setattr(page_module, "files", lambda package: tmp_path)
+    monkeypatch.setattr(client_module, "files", lambda package: tmp_path)
     with pytest.raises(OutputError, match=r"python client/build\.py"):
         write_page(recorded[0], tmp_path / "index.html")
     assert list(tmp_path.iterdir()) == []

@@ -43,6 +43,10 @@ class KernelCount:
         now = len(ready) + self.compiling
         return now, max(now, len(ready.union(self._expected(ready))))
 
+    def current(self) -> tuple[int, int] | None:
+        """`numbers`, where a kernel is compiled now."""
+        return self.numbers() if self.compiling else None
+
     def compile_rest(self) -> None:
         """Compile, or load, what the program will probably need."""
         from supple.runtime.kernel_list import compile_kernel

@@ -12,16 +12,19 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
-from supple.app.viewer.engine.engine import Engine
 from supple.app.viewer.gate import Gate, new_token
 from supple.app.viewer.live_page import LivePage
-from supple.app.viewer.protocol.live_source import LiveSource
 from supple.app.viewer.server import require_free_port, served
-from supple.results.page.page import client
+from supple.errors import SuppleError
+from supple.results.page.client import client
+
+if TYPE_CHECKING:
+    from supple.app.viewer.protocol.live_source import LiveSource
 
 DEFAULT_PORT = 8080
-_SOON = 1.0  # [s] after which the address is told, though the scene is not there yet
+_ARRIVES = 10.0  # until a browser that was opened is there [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +49,8 @@ class OpenPage:
         ------
         SceneError, SolverError : where the source cannot be simulated.
         """
+        from supple.app.viewer.engine.engine import Engine
+
         with Engine(source, again, wait=False) as engine:
             self.content.attach(engine)
             engine.wait_for_start()
@@ -82,7 +87,7 @@ def serve(
 ) -> None:
     """Serve a live scene until interrupted.
 
-    Where the scene takes long to read or to mesh, its address is printed, and opened, before it is there.
+    Its address is printed, and opened, before the scene is there; the page tells what it waits for, and errors.
 
     Parameters
     ----------
@@ -94,23 +99,17 @@ def serve(
     SceneError, SolverError, OutputError : where the scene cannot be read or simulated, or the port is not free.
     """
     with opened_page(title, port) as page, ExitStack() as ends, suppress(KeyboardInterrupt):
-        once = threading.Lock()
-
-        def announce() -> None:
-            if once.acquire(blocking=False):
-                print(f"{page.url}  (press Ctrl+C to end)", flush=True)
-                if open_browser:
-                    ends.enter_context(browser_at(page.url))
-
-        timer = threading.Timer(_SOON, announce)
-        timer.start()
+        print(f"{page.url}  (press Ctrl+C to end)", flush=True)
+        if open_browser:
+            ends.enter_context(browser_at(page.url))
         try:
-            source = read()
-        finally:
-            timer.cancel()
-        announce()
-        with page.simulating(source, read if reload else None):
-            threading.Event().wait()
+            with page.content.reading():
+                source = read()
+            with page.simulating(source, read if reload else None):
+                threading.Event().wait()
+        except SuppleError as error:
+            page.content.fail(str(error), _ARRIVES if open_browser else 0.0)
+            raise
 
 
 @contextmanager

@@ -7,23 +7,23 @@ import json
 import logging
 import threading
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from supple.app.viewer.from_snapshot import RenderFrameBuilder
-from supple.app.viewer.messages import Messages, waiting_text
 from supple.app.viewer.protocol.commands import Command, SetView, Watch
-from supple.app.viewer.protocol.snapshots import Progress, Snapshot
 from supple.app.viewer.visitor import Visitor
 from supple.errors import CommandError, SuppleError
 from supple.results.page.packed import Packer
-from supple.results.page.page import page_of_frames
-from supple.results.view.model import RenderFrame
+from supple.runtime.kernel_count import KernelCount
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # what a scene needs is imported with it: the page is there before
     from supple.app.viewer.engine.engine import Engine
+    from supple.app.viewer.from_snapshot import RenderFrameBuilder
+    from supple.app.viewer.protocol.snapshots import Snapshot
     from supple.app.viewer.server import PageServer
+    from supple.results.view.model import RenderFrame
 
 logger = logging.getLogger(__name__)
 
@@ -33,6 +33,7 @@ _SILENT_AFTER = 2.0
 _UNWATCHED_AFTER = 2.0
 _IDLE = 0.05  # between two looks at what browsers have drawn, while nothing changes [s]
 _STATUS_EVERY = 0.25  # [s]
+_TOLD_WITHIN = 0.5  # of an error, before the server ends [s]
 # Of a page that is recorded.
 _MOST_SECONDS, _MOST_BYTES = 120.0, 300_000_000
 
@@ -57,13 +58,35 @@ class LivePage:
         self._snapshot: Snapshot | None = None
         self._about = about
         self._visitors: set[Visitor] = set()
+        self._came = False  # whether there was a browser
         self._number, self._starts, self._view = 0, 0, SetView()
         self._notice, self._status, self._told_at = 0, "", 0.0
         self._watched, self._seen_at = True, time.monotonic()
         self._recorded: tuple[float, list[tuple[float, RenderFrame]]] | None = None
         self._restarts = threading.Lock()
         self._end = threading.Event()
-        self._builder = RenderFrameBuilder()
+        self._builder: RenderFrameBuilder | None = None
+        self._began, self._error, self._line = time.monotonic(), "", LastLine()
+        self._kernels = KernelCount()
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """A block in which the scene is read: the page tells what the log says."""
+        log = logging.getLogger("supple")
+        log.addHandler(self._line)
+        try:
+            yield
+        finally:
+            log.removeHandler(self._line)
+
+    def fail(self, error: str, patience: float) -> None:
+        """Tell browsers why the page ends; one that was opened, and is not there yet, gets `patience` [s]."""
+        self._error = error
+        end = time.monotonic() + patience
+        while not self._came and time.monotonic() < end and not self._end.wait(_IDLE):
+            pass
+        if self._came:
+            self._end.wait(_STATUS_EVERY + _TOLD_WITHIN)
 
     def attach(self, simulation: Engine) -> None:
         """Show a simulation; see `Engine`."""
@@ -107,6 +130,7 @@ class LivePage:
         visitor = Visitor(self, connection)
         sender = asyncio.create_task(visitor.send_all())
         self._visitors.add(visitor)
+        self._came = True
         self._status = ""  # is sent again
         try:
             with suppress(ConnectionClosed):
@@ -132,6 +156,8 @@ class LivePage:
             threading.Thread(target=self._send_page, args=(visitor, frames), name="page", daemon=True).start()
 
     def _send_page(self, visitor: Visitor, frames: list[tuple[float, RenderFrame]]) -> None:
+        from supple.results.page.page import page_of_frames
+
         packer = Packer()
         page = packer.add(bytearray(page_of_frames(frames).encode()), "u1")
         self._server.soon(visitor.put, "file", packer.block({"kind": "file", "name": "supple.html", "bytes": page}))
@@ -181,7 +207,7 @@ class LivePage:
     def _send_newest(self, simulation: Engine) -> None:
         snapshot = simulation.latest()
         if simulation.starts != self._starts:
-            self._starts, self._notice, self._builder = simulation.starts, 0, RenderFrameBuilder()
+            self._starts, self._notice, self._builder = simulation.starts, 0, None
             simulation.send(self._view)  # the new process does not know it
         if snapshot is None:
             return
@@ -200,6 +226,10 @@ class LivePage:
             self._server.soon(visitor.put, "frame", self._message)
 
     def _show(self, snapshot: Snapshot) -> None:
+        from supple.app.viewer.from_snapshot import RenderFrameBuilder
+        from supple.app.viewer.messages import Messages
+
+        self._builder = self._builder or RenderFrameBuilder()
         frame, self._snapshot = self._builder.frame(snapshot), snapshot
         if self.frame is None or frame.model is not self.frame.model:
             self._number += 1
@@ -220,17 +250,33 @@ class LivePage:
         now = time.monotonic()
         if now - self._told_at < _STATUS_EVERY:
             return
-        told = {"kind": "status", "error": None, "recording": self._recorded is not None, **self._about}
-        if simulation is None:
-            told["busy"] = "Reading and meshing"
-        else:
-            silent = max(0.0, now - simulation.heard_at)
-            late = silent > _SILENT_AFTER or self._snapshot is None
-            progress = simulation.progress or (Progress(silent) if late else None)
-            solver = "xpbd" if self._snapshot is None else self._snapshot.description.solver
-            told |= {"error": simulation.error, "busy": "" if progress is None else waiting_text(progress, solver)}
+        error = self._error or (simulation.error if simulation is not None else None)
+        told = {"kind": "status", "error": error, "recording": self._recorded is not None, **self._about}
+        told |= {"ended": bool(self._error), "busy": "" if error else self._waiting(simulation, now)}
         status = json.dumps(told)
         if status != self._status:
             self._status, self._told_at = status, now
             for visitor in self._visitors.copy():
                 self._server.soon(visitor.put, "status", status)
+
+    def _waiting(self, simulation: Engine | None, now: float) -> str:
+        """What the page waits for, or ""."""
+        from supple.app.viewer.protocol.snapshots import Progress
+
+        if simulation is None:
+            reading = f"reading and meshing{': ' * bool(self._line.text)}{self._line.text}"
+            return Progress(now - self._began, 0, self._kernels.current(), reading).text()
+        silent = max(0.0, now - simulation.heard_at)
+        if self._snapshot is None:
+            return (simulation.progress or Progress(silent, what="starting the simulation")).text()
+        progress = simulation.progress or (Progress(silent) if silent > _SILENT_AFTER else None)
+        return "" if progress is None else progress.text(self._snapshot.description.solver)
+
+
+class LastLine(logging.Handler):
+    """Keeps what the log said last."""
+
+    text = ""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.text = " ".join(record.getMessage().split())[:200]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.parameters import PARAMETERS
 from supple.app.viewer.protocol.quantities import pretty_unit, written
-from supple.app.viewer.protocol.snapshots import Progress, Snapshot
+from supple.app.viewer.protocol.snapshots import Snapshot
 from supple.results.page.described import described_motion, described_scene, points_of
 from supple.results.page.packed import Packer
 from supple.results.readings.frame_readings import JointReading
@@ -19,7 +19,6 @@ from supple.results.view.joints import lines_of_joints
 from supple.results.view.model import RenderFrame
 from supple.results.view.surfaces import obstacle_surfaces
 
-_ROUNDS = {"xpbd": "substep", "implicit": "Newton iteration"}
 _MOST_JOINTS = 12  # in the text
 _ARROW = 0.5  # length of the arrow of the largest force of contact, as a share of the radius of the scene
 
@@ -122,15 +121,6 @@ def _joint_text(name: str, joint: JointReading) -> str:
     at = "" if joint.coordinate is None else f" at {joint.coordinate:.3g},"
     motor = "" if joint.motor_force is None else f" motor {joint.motor_force:.3g},"
     return f"{name}:{at}{motor} force {np.linalg.norm(joint.force):.3g} N"
-
-
-def waiting_text(progress: Progress, solver: str) -> str:
-    """What the simulation does while it sends no frames."""
-    what = "a long step"
-    if progress.kernels is not None:
-        what = "compiling kernel {} of {}, once on this machine".format(*progress.kernels)
-    rounds = f", {_ROUNDS[solver]} {progress.rounds}" if progress.rounds else ""
-    return f"Busy for {progress.seconds:.0f} s: {what}{rounds}"
 
 
 def slowness(snapshot: Snapshot) -> str:

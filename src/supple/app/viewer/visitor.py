@@ -6,7 +6,7 @@ import asyncio
 import itertools
 import json
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from supple.app.viewer.protocol.commands import (
     Command,
@@ -26,8 +26,10 @@ from supple.app.viewer.protocol.commands import (
 )
 from supple.app.viewer.protocol.values import checked_point, displayed
 from supple.errors import CommandError, SuppleError
-from supple.results.view.model import RenderFrame
-from supple.results.view.picking import SurfacePoint
+
+if TYPE_CHECKING:  # the page is there before the scene
+    from supple.results.view.model import RenderFrame
+    from supple.results.view.picking import SurfacePoint
 
 # What a browser may ask for by name, with the fields of the command.
 _COMMANDS = {kind.__name__: kind for kind in (Play, Pause, Step, Reset, SetSpeed, SetSolver, SetParameter, Unpin)}

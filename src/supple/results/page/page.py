@@ -6,16 +6,14 @@ The player is the client of the live page, which the wheel contains as `page.htm
 from __future__ import annotations
 
 import base64
-import html
 import zlib
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from supple.errors import OutputError
+from supple.results.page.client import DATA, client
 from supple.results.page.described import described_motion, described_scene
 from supple.results.page.packed import Packer
 from supple.results.recording.frame import RecordedFrame
@@ -27,7 +25,6 @@ from supple.runtime.replacing import whole_file
 # Bytes of moving points and fields before compression, which divides them by three; longer pages have fewer frames.
 _MOST_BYTES = 36_000_000
 _BYTES_OF_A_VERTEX = 9  # three coordinates in 16 bits, three fields in 8
-_TITLE, _DATA = "<title>Supple</title>", "<!--data-->"  # marks in the client
 
 
 def write_page(
@@ -64,16 +61,7 @@ def _page(frames: Sequence[tuple[float, RenderFrame]], plots: Any = lambda packe
     title = ", ".join(names if len(names) <= 4 else [*names[:3], f"{len(names) - 3} more"])[:80]
     described = {"title": title, **described_scene(model, packer), **described_motion(frames, packer)}
     data = zlib.compress(packer.block({**described, "plots": plots(packer)}), 9)
-    return client(title).replace(_DATA, base64.b64encode(data).decode("ascii"), 1)
-
-
-def client(title: str) -> str:
-    """The page without frames, which asks the server that sent it for them."""
-    try:
-        page = files("supple.results.page").joinpath("page.html").read_text(encoding="utf-8")
-        return page.replace(_TITLE, f"<title>{html.escape(title)} · Supple</title>", 1)
-    except OSError:
-        raise OutputError("page: the client is not built; run `python client/build.py` in the checkout") from None
+    return client(title).replace(DATA, base64.b64encode(data).decode("ascii"), 1)
 
 
 def _most_frames(model: Model) -> int:

@@ -193,7 +193,7 @@ def served_page(simulation, port: int = 0):
     from supple.app.viewer.gate import Gate
     from supple.app.viewer.live_page import LivePage
     from supple.app.viewer.server import served
-    from supple.results.page.page import client
+    from supple.results.page.client import client
 
     page = LivePage({"title": "boxes", "command": "supple view boxes.yaml"})
     if simulation is not None:
@@ -219,7 +219,7 @@ def visitor(live, until):
 class Screen:
     """A browser with a page, and the actions of a person there; `tab` is Playwright's page."""
 
-    def __init__(self, browser, pixels, url: str) -> None:
+    def __init__(self, browser, pixels, url: str, shown: str = "globalThis.supplePage?.pictures > 0") -> None:
         self._pixels = pixels
         self.errors: list[str] = []
         self.tab = browser.new_page(viewport={"width": 720, "height": 420})
@@ -227,7 +227,7 @@ class Screen:
         self.tab.on("pageerror", lambda error: self.errors.append(str(error)))
         self.tab.on("console", lambda said: self.errors.append(said.text) if said.type == "error" else None)
         self.tab.goto(url)
-        self.holds("globalThis.supplePage?.pictures > 0")
+        self.holds(shown)
 
     def wait(self, holds, what: str, seconds: float = 90.0):
         """Wait until a condition holds, while the browser runs."""
@@ -261,8 +261,8 @@ def look(browser, pixels):
     """Opens pages in the browser: `look(url)`."""
     opened = []
 
-    def open_page(url: str) -> Screen:
-        opened.append(Screen(browser, pixels, url))
+    def open_page(url: str, *shown: str) -> Screen:
+        opened.append(Screen(browser, pixels, url, *shown))
         return opened[-1]
 
     yield open_page

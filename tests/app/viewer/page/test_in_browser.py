@@ -1,5 +1,7 @@
 """The live page in a browser with a real simulation: both state and picture are checked."""
 
+import logging
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 from tests.app.viewer.page.conftest import TOKEN, served_page
 
 import supple as sp
-from supple.app.viewer.app import opened_page
+from supple.app.viewer.app import opened_page, serve
 from supple.app.viewer.protocol.live_source import LiveSource
 
 RADIUS, START = 0.3, 0.5
@@ -193,3 +195,35 @@ def test_the_page_says_that_its_server_has_ended_and_reconnects(fake, look, spot
         screen.wait(lambda: not banner.is_visible(), "no word of an end")
         screen.tab.close()
     assert [error for error in screen.errors if "WebSocket" not in error] == []
+
+
+def test_the_page_tells_what_it_waits_for_and_errors_of_the_input(look, capsys):
+    end, raised = threading.Event(), []
+
+    def read():
+        logging.getLogger("supple.mesh").warning("filling 12 triangles")
+        end.wait(60.0)
+        raise sp.SceneError("scene.yaml:3: youngs is <b>-1</b>")
+
+    def run():
+        try:
+            serve(read, "scene", 0, open_browser=False, reload=True)
+        except sp.SceneError as error:
+            raised.append(str(error))
+
+    shell = threading.Thread(target=run)
+    shell.start()
+    out = ""
+    while "http" not in out:
+        out += capsys.readouterr().out
+        shell.join(0.02)
+    screen = look(out.split()[0], "!document.querySelector('#banner').hidden")
+    said = screen.tab.locator("#banner span").inner_text
+    screen.wait(lambda: said().endswith("s: reading and meshing: filling 12 triangles"), "what is waited for")
+    end.set()
+    screen.wait(lambda: said().startswith("Not shown: scene.yaml:3: youngs is <b>-1</b>. Start it again"), "the error")
+    shell.join()
+    assert raised == ["scene.yaml:3: youngs is <b>-1</b>"]
+    screen.tab.wait_for_timeout(1500)  # attempts to connect again
+    assert said().startswith("Not shown: scene.yaml:3")
+    screen.tab.close()

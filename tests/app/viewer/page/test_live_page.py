@@ -1,6 +1,7 @@
 """What the page of a live simulation sends to browsers, and what their messages do; with a fake simulation."""
 
 import json
+import logging
 import random
 import threading
 import time
@@ -262,7 +263,10 @@ def test_the_progress_of_a_long_step(visitor, fake, until, monkeypatch):
 def test_the_page_is_there_before_the_simulation(fake, until):
     with served_page(None) as page:
         visitor = Visitor(page.port)
-        until(lambda: visitor.statuses and visitor.statuses[-1]["busy"] == "Reading and meshing")
+        until(lambda: visitor.statuses and visitor.statuses[-1]["busy"].endswith("s: reading and meshing"))
+        with page.reading():
+            logging.getLogger("supple.mesh.meshing").warning("filling %d triangles", 12)
+        until(lambda: visitor.statuses[-1]["busy"].endswith("reading and meshing: filling 12 triangles"))
         assert visitor.statuses[-1]["command"] == "supple view boxes.yaml"
         for act, values in (
             ("Play", {}),

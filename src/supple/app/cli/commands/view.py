@@ -69,13 +69,13 @@ def view(
         show_recording(recordings[0], [name for name, value in given.items() if value], open_)
         return
 
-    from supple.app.scene_file.several_meshes import load_run_of
-    from supple.app.viewer.protocol.live_source import LiveSource
-    from supple.solvers.registry import solver_of_kind
-
     title = ", ".join(path.stem for path in paths)
 
-    def read() -> LiveSource:
+    def read() -> LiveSource:  # imports most of the library: the page is there before
+        from supple.app.scene_file.several_meshes import load_run_of
+        from supple.app.viewer.protocol.live_source import LiveSource
+        from supple.solvers.registry import solver_of_kind
+
         with reading(yes):
             run = load_run_of(paths, confine=confine)
         if solver is not None:
@@ -112,15 +112,21 @@ def find_source(path: Path) -> Path:
     ------
     OutputError : where the file does not exist.
     """
-    from supple.app.scene_file.entries.mesh_sources import MESH_FILES
     from supple.errors import OutputError
 
     path = recording_at(path)
     if not path.exists():
         raise OutputError(f"{path}: the file does not exist")
-    if path.suffix.lower() not in (*SCENE_FILES, *MESH_FILES, *RECORDINGS):
+    suffix = path.suffix.lower()
+    if suffix not in (*SCENE_FILES, *RECORDINGS) and suffix not in _mesh_files():
         raise OutputError(f"{path} is neither a scene file (.yaml), nor a mesh, nor a recording (.vtkhdf)")
     return path
+
+
+def _mesh_files() -> tuple[str, ...]:
+    from supple.app.scene_file.entries.mesh_sources import MESH_FILES  # takes long
+
+    return MESH_FILES
 
 
 def serve_page(

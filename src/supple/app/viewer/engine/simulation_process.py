@@ -7,13 +7,15 @@ import logging
 import os
 import signal
 import threading
+import time
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
-from supple.app.viewer.engine.step_watch import StepWatch
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
 from supple.app.viewer.protocol.outbox import Outbox
+from supple.app.viewer.protocol.snapshots import Progress
 from supple.errors import SuppleError
 
 if TYPE_CHECKING:
@@ -45,32 +47,38 @@ def run_simulation(
 
 
 def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection, applied: int) -> None:
-    from supple.app.viewer.engine.scene.live_scene import LiveScene
-    from supple.app.viewer.engine.simulation_loop import SimulationLoop
-    from supple.app.viewer.protocol.outbox import ERROR, Outbox, packed
     from supple.results.progress import CompileBar
 
-    try:
-        live = LiveScene(source)
-        with CompileBar() as kernels:
+    outbox, began = Outbox(snapshots), time.monotonic()
+    with CompileBar() as kernels:
+        pulse = Pulse(outbox, lambda: Progress(time.monotonic() - began, 0, kernels.current(), pulse.stage))
+        try:
+            from supple.app.viewer.engine.scene.live_scene import LiveScene
+
+            pulse.stage = "preparing the scene"
+            live = LiveScene(source)
+            pulse.stage = "measuring a step"
             live.warm_up()
-            live, chosen = _in_time(live)
+            live, chosen = _in_time(live, pulse)
+            pulse.stage = "loading kernels"
             kernels.compile_rest()  # the first contact, too, does not wait for it
-        # Otherwise a collection looks at the objects of all loaded libraries, for a tenth of a second or more.
-        gc.freeze()
-    except (SuppleError, MemoryError) as error:
-        snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
-        return
-    loop = SimulationLoop(live, inbox, Outbox(snapshots))
+        except (SuppleError, MemoryError) as error:
+            outbox.put_error(" ".join(str(error).split()) or type(error).__name__)
+            return
+    # Otherwise a collection looks at the objects of all loaded libraries, for a tenth of a second or more.
+    gc.freeze()
+    from supple.app.viewer.engine.simulation_loop import SimulationLoop
+
+    loop = SimulationLoop(live, inbox, outbox)
     loop.applied = applied
     if chosen:
         logging.getLogger(__name__).info("%s", chosen)
         loop.notify("info", chosen)
-    report_long_steps(loop.watch, loop.outbox)
+    pulse.progress = lambda: loop.watch.progress
     loop.run()
 
 
-def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
+def _in_time(live: LiveScene, pulse: Pulse) -> tuple[LiveScene, str]:
     """The live scene, or where it is slower than real time, by counts, one that is faster; and what was chosen."""
     from supple.app.viewer.engine.scene.lightening import coarsened, linearized
     from supple.app.viewer.engine.scene.live_scene import LiveScene
@@ -82,6 +90,7 @@ def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
         found = choice(live)
         if found is None:
             continue
+        pulse.stage = "measuring a step that is faster"
         try:
             other = LiveScene(found[0])
             other.warm_up()
@@ -107,18 +116,24 @@ def _read(commands: Connection, inbox: CommandQueue) -> None:
     os._exit(0)
 
 
-# A step that takes longer is reported [s], as often.
-LONG = 0.5
+LONG = 0.5  # what takes longer is reported [s], as often
 
 
-def report_long_steps(watch: StepWatch, outbox: Outbox) -> None:
-    """Send the progress of steps that take long, from another thread: the loop is within the step."""
-    tick = threading.Event()
+class Pulse:
+    """Sends the progress of what takes long, from another thread: the simulation is within it.
 
-    def run() -> None:
+    Attributes
+    ----------
+    progress : of what is done now, or None; stage : of the start
+    """
+
+    def __init__(self, outbox: Outbox, progress: Callable[[], Progress | None], stage: str = "") -> None:
+        self.progress, self.stage, self._outbox = progress, stage, outbox
+        threading.Thread(target=self._run, name="pulse", daemon=True).start()
+
+    def _run(self) -> None:
+        tick = threading.Event()
         while not tick.wait(LONG):
-            progress = watch.progress
+            progress = self.progress()
             if progress is not None and progress.seconds > LONG:
-                outbox.put_progress(progress)
-
-    threading.Thread(target=run, name="pulse", daemon=True).start()
+                self._outbox.put_progress(progress)

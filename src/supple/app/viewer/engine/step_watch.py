@@ -90,8 +90,7 @@ class StepWatch:
     def progress(self) -> Progress | None:
         """Of the current computation; None where none exists. Another thread may ask."""
         running = self._began is not None
-        kernels = self._kernels.numbers() if self._kernels.compiling else None
-        return Progress(self.seconds, self._rounds, kernels) if running else None
+        return Progress(self.seconds, self._rounds, self._kernels.current()) if running else None
 
     @property
     def seconds(self) -> float:

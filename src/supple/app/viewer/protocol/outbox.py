@@ -9,6 +9,7 @@ from typing import Any
 
 # The first byte of a message is its kind; the rest is pickled.
 DESCRIPTION, SNAPSHOT, ERROR, PROGRESS = b"d", b"s", b"e", b"p"
+_ORDER = (DESCRIPTION, SNAPSHOT, PROGRESS, ERROR)
 
 
 def packed(kind: bytes, content: Any) -> bytes:
@@ -24,45 +25,47 @@ class Outbox:
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
-        self._description: bytes | None = None
-        self._snapshot: bytes | None = None
-        self._progress: bytes | None = None
+        self._waiting: dict[bytes, bytes] = {}  # by kind
+        self._sending = False
         self._changed = threading.Condition()
         threading.Thread(target=self._send_all, name="outbox", daemon=True).start()
 
     def put_description(self, description: Any) -> None:
         """Send a description before any snapshot that is put after it."""
-        data = packed(DESCRIPTION, description)
-        with self._changed:
-            self._description, self._snapshot, self._progress = data, None, None
-            self._changed.notify()
+        self._put(DESCRIPTION, description, (SNAPSHOT, PROGRESS))
 
     def put_snapshot(self, snapshot: Any) -> None:
         """Send a snapshot, unless a newer one replaces it."""
-        data = packed(SNAPSHOT, snapshot)
-        with self._changed:
-            self._snapshot, self._progress = data, None
-            self._changed.notify()
+        self._put(SNAPSHOT, snapshot, (PROGRESS,))
 
     def put_progress(self, progress: Any) -> None:
         """Send the progress of a long step, or None: a heartbeat."""
-        data = packed(PROGRESS, progress)
+        self._put(PROGRESS, progress)
+
+    def put_error(self, text: str) -> None:
+        """Send why the simulation ends, and wait until that is sent."""
+        self._put(ERROR, text, (PROGRESS,))
         with self._changed:
-            self._progress = data
-            self._changed.notify()
+            self._changed.wait_for(lambda: not self._waiting and not self._sending)
+
+    def _put(self, kind: bytes, content: Any, replaced: tuple[bytes, ...] = ()) -> None:
+        data = packed(kind, content)
+        with self._changed:
+            for older in replaced:
+                self._waiting.pop(older, None)
+            self._waiting[kind] = data
+            self._changed.notify_all()
 
     def _send_all(self) -> None:
         while True:
             with self._changed:
-                while self._description is None and self._snapshot is None and self._progress is None:
-                    self._changed.wait()
-                if self._description is not None:
-                    data, self._description = self._description, None
-                elif self._snapshot is not None:
-                    data, self._snapshot = self._snapshot, None
-                else:
-                    data, self._progress = self._progress, None
+                self._sending = False
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: self._waiting)
+                self._sending = True
+                kind = min(self._waiting, key=_ORDER.index)
+                data = self._waiting.pop(kind)
             try:
-                self._pipe.send_bytes(data or b"")
+                self._pipe.send_bytes(data)
             except OSError:  # the page is gone; the reader of commands ends this process
                 return

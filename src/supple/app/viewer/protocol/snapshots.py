@@ -137,17 +137,27 @@ class Timing:
 
 @dataclass(frozen=True)
 class Progress:
-    """A step that takes long.
+    """What takes long: a step, or a stage of the start.
 
     Attributes
     ----------
     seconds : since it began; rounds : substeps or Newton iterations so far
     kernels : where kernels are compiled now, the number of the current one, and how many there will be
+    what : it is
     """
 
     seconds: float
     rounds: int = 0
     kernels: tuple[int, int] | None = None
+    what: str = "a long step"
+
+    def text(self, solver: str = "xpbd") -> str:
+        """What the simulation does while it sends no frames."""
+        what = self.what
+        if self.kernels is not None:
+            what = "compiling kernel {} of {}, once on this machine".format(*self.kernels)
+        name = {"xpbd": "substep", "implicit": "Newton iteration"}[solver]
+        return f"Busy for {self.seconds:.0f} s: {what}" + (f", {name} {self.rounds}" if self.rounds else "")
 
 
 @dataclass(frozen=True)
