@@ -20,6 +20,7 @@ supply(
     player="supple.results.page.player:player_of",
     plot="supple.results.plots:plot",
     progress="supple.results.progress:ProgressBar",
+    save_scene="supple.app.scene_file.writer:save_scene",
 )
 
 

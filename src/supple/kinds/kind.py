@@ -160,12 +160,13 @@ class Kind(metaclass=Described):
         parts = []
         for key, one in declared(type(self)).items():
             value = getattr(self, key)
-            if not isinstance(one.validator, Name) and not _same(value, one.default):
+            if not isinstance(one.validator, Name) and not same(value, one.default):
                 parts.append(f"{key.replace('_', ' ')} {_short(value)}")
         return ", ".join(parts)
 
 
-def _same(value: Any, default: Any) -> bool:
+def same(value: Any, default: Any) -> bool:
+    """Whether a value is the default."""
     try:
         return value is default or bool(np.array_equal(value, default))
     except (TypeError, ValueError):

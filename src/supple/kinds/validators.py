@@ -90,7 +90,7 @@ SHARE = Number(above=0.0, below=1.0)
 
 @dataclass(frozen=True)
 class NumberPerTet(Validator):
-    """A number within bounds, or one for each tet of a body; it is stored as it is given."""
+    """A number within bounds, which is stored as it is given, or an array with one for each tet of a body."""
 
     bounds: Number
 
@@ -107,7 +107,7 @@ class NumberPerTet(Validator):
                 if not self.bounds.allows(entry):
                     where = f" (tet {tet})" if values.ndim else ""
                     raise SceneError(f"{what} is {entry:g}{where}; it must be {self.bounds.needed(entry)}")
-        return value
+        return values if values.ndim else value
 
 
 @dataclass(frozen=True)

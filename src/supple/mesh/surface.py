@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, vertex_array
 from supple.mesh.io.mesh_files import read_contents, surface_of, write_surface
+from supple.mesh.origin import with_origin
 from supple.mesh.topology import Components, connected_components, is_used, unique_edges, without_unused
 from supple.runtime.displayed import Showable, extent
 
@@ -58,7 +59,7 @@ class SurfaceMesh(Showable):
         }
 
     @classmethod
-    def load(cls, path: str | Path, *, keep_axes: bool = False) -> SurfaceMesh:
+    def load(cls, path: str | Path, *, keep_axes: bool = False, merge: bool = True) -> SurfaceMesh:
         """Read a surface from an STL, OBJ, PLY, OFF, GLB, glTF, DAE, 3MF, VTP, VTK, VTU, MSH, INP, MESH or USD file, by
         its extension, or by what it holds where that differs.
 
@@ -71,13 +72,15 @@ class SurfaceMesh(Showable):
         ----------
         keep_axes : whether the coordinates stay those of a file that says that x or z points up (DAE, USD), which
             otherwise becomes y
+        merge : False: vertices and triangles are those of the file; none is merged or dropped
 
         Raises
         ------
         MeshError : where the file is missing, malformed, of another kind, or has no surface; the text starts with
             the path.
         """
-        return cls(*surface_of(read_contents(path, keep_axes=keep_axes)))
+        contents = read_contents(path, keep_axes=keep_axes)
+        return with_origin(cls(*surface_of(contents, merge=merge)), path)
 
     def save(self, path: str | Path) -> None:
         """Write the surface as STL (binary), OBJ, PLY, OFF, VTP, VTK or VTU, by the extension of `path`.

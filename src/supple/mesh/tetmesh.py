@@ -15,6 +15,7 @@ from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, place, vertex_array
 from supple.mesh.io.mesh_files import TetFile, read_contents, tet_file_of, write_tets
 from supple.mesh.io.tetgen_family import is_tetgen_path, write_tetgen_family
+from supple.mesh.origin import with_origin
 from supple.mesh.quadratic import (
     check_middle_nodes,
     check_positive,
@@ -164,7 +165,7 @@ class TetMesh(Showable):
         MeshError : where the file is missing, malformed, of another kind, or has no usable tets; the text starts
             with the path.
         """
-        return cls.of_file(tet_file_of(read_contents(path, keep_axes=keep_axes)))
+        return with_origin(cls.of_file(tet_file_of(read_contents(path, keep_axes=keep_axes))), path)
 
     @classmethod
     def of_file(cls, file: TetFile) -> TetMesh:

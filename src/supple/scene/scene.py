@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from supple.kinds.described import Described
 from supple.kinds.kind import declared
 from supple.kinds.suggestion import suggestion
 from supple.kinds.validators import BodyName
-from supple.runtime.displayed import Showable, short_list
+from supple.runtime.displayed import Showable, short_list, supplied
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
@@ -138,6 +139,25 @@ class Scene(Showable, metaclass=Described):
         self._check_skins()
         pull = sum(load.pull_at_start(self.bodies) for load in self.loads if isinstance(load, Spring))
         object.__setattr__(self, "bodies", with_stiffness(self.bodies, np.asarray(self.gravity), pull))
+
+    def save(self, path: str | Path) -> None:
+        """Write a scene file that `load_scene` reads as the same scene, to the last bit of all its arrays.
+
+        Meshes and long arrays go to a folder beside it: that of `scene.yaml` is `scene_files`. A mesh that was loaded
+        from a file in the scene file's folder, or below, stays in that file. The scene file replaces an earlier one in
+        one moment. It holds neither solver nor timing: add `solver`, `dt` and `steps` to it, or give these to
+        `supple run`.
+
+        Parameters
+        ----------
+        path : of the scene file, which ends with .yaml.
+
+        Raises
+        ------
+        SceneError : where a scene file cannot hold a part of it, such as a motion that is a Python function.
+        OutputError : where the system refuses to write.
+        """
+        supplied("save_scene")(self, path)
 
     def _facts(self) -> dict[str, str]:
         facts = {"bodies": short_list(body.name for body in self.bodies)}

@@ -105,7 +105,7 @@ class NamedNumbers(Validator):
                 good = False
             if not good:
                 raise SceneError(f"EnergyMaterial: the parameter {name!r} is {given!r}; give finite numbers")
-        return value
+        return {name: np.asarray(given) if np.ndim(given) else given for name, given in value.items()}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

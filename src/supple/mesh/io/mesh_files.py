@@ -142,7 +142,7 @@ def read_contents(path: str | Path, *, keep_axes: bool = False) -> Contents:
     return Contents(soup, path, file.node_sets, file.cell_sets)
 
 
-def surface_of(contents: Contents) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def surface_of(contents: Contents, *, merge: bool = True) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices (n, 3) and triangles (m, 3) of the surface in a file; see `SurfaceMesh.load`."""
     path = contents.source
     if contents.has_solids:
@@ -158,6 +158,8 @@ def surface_of(contents: Contents) -> tuple[NDArray[np.float64], NDArray[np.int6
         raise located(path, error) from None
     if len(triangles) == 0:
         raise MeshError(f"{path}: it has no triangles or polygons")
+    if not merge:
+        return points, triangles
     low, high = points.min(axis=0), points.max(axis=0)
     keep, index = merge_map(points, MERGE_TOLERANCE * float(np.linalg.norm(high - low)))
     triangles = index[triangles]

@@ -24,9 +24,9 @@ from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
 
 # What both kinds of bodies have, and what each has of its own beside the mesh or shape.
-_SHARED = declared(PlacedBody)
-_SOFT = {key: one for key, one in declared(Body).items() if key not in (*_SHARED, "mesh", "material")}
-_RIGID = {key: one for key, one in declared(RigidBody).items() if key not in (*_SHARED, "shape")}
+SHARED = declared(PlacedBody)
+SOFT = {key: one for key, one in declared(Body).items() if key not in (*SHARED, "mesh", "material")}
+RIGID = {key: one for key, one in declared(RigidBody).items() if key not in (*SHARED, "shape")}
 
 
 class InitialModel(Model):
@@ -70,7 +70,7 @@ class BodyEntry(Model):
         if this.surfaces is not None and this.rigid is None:
             raise ValueError("`surfaces` are of rigid bodies; give a soft one a `mesh` or a `shape`")
         if this.rigid is not None:
-            for key in (*self.others, *_SOFT):
+            for key in (*self.others, *SOFT):
                 if getattr(self, key) is not None:
                     raise ValueError(f"a rigid body has no `{key}`; remove it")
         return self
@@ -78,7 +78,7 @@ class BodyEntry(Model):
     def build(self, meshes: MeshStore) -> list[BuiltBody]:
         """The body, or all its copies."""
         this: Any = self
-        shared = values_of(self, _SHARED, meshes)
+        shared = values_of(self, SHARED, meshes)
         alone = self._soft(shared, meshes) if this.rigid is None else self._rigid(shared, meshes)
         copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
         digits = max(2, len(str(len(copies))))
@@ -97,7 +97,7 @@ class BodyEntry(Model):
         this: Any = self
         shape = self._shape(meshes.solid, meshes.solid_shape, meshes.joined)
         with at("rigid"):
-            return RigidBody(shape=shape, **shared, **values_of(this.rigid, _RIGID, meshes))
+            return RigidBody(shape=shape, **shared, **values_of(this.rigid, RIGID, meshes))
 
     def _soft(self, shared: dict[str, Any], meshes: MeshStore) -> Body:
         """Without copies."""
@@ -106,7 +106,7 @@ class BodyEntry(Model):
         with at("order"):
             mesh = mesh if self.order is None else mesh.to_order(self.order)
         fine = None if this.mesh is None else meshes.fine(this.mesh)
-        given = {key: value for key, value in values_of(self, _SOFT, meshes).items() if value is not None}
+        given = {key: value for key, value in values_of(self, SOFT, meshes).items() if value is not None}
         with at("material"):
             material = built(this.material, meshes)
         if self.regions is not None:
@@ -129,7 +129,7 @@ def body_model() -> type[BodyEntry]:
     """The keys of a body: those of `BodyEntry`, and the declared fields of `Body` and `RigidBody`."""
     elastic = entry_of([kind for kind in MATERIALS if issubclass(kind, Hyperelastic)])
     region: Any = create_model("RegionModel", __base__=Region, __doc__=Region.__doc__, material=(elastic, ...))
-    own: dict[str, Any] = typed_keys(RigidBody, _RIGID)
+    own: dict[str, Any] = typed_keys(RigidBody, RIGID)
     rigid: Any = create_model(
         "RigidModel",
         __base__=_Rigid,
@@ -137,7 +137,7 @@ def body_model() -> type[BodyEntry]:
         **own,
     )
     text = "parts of the body with other materials; where two overlap, the later one counts"
-    keys: dict[str, Any] = typed_keys(RigidBody, (*_SHARED, "shape")) | typed_keys(Body, _SOFT, null=True)
+    keys: dict[str, Any] = typed_keys(RigidBody, (*SHARED, "shape")) | typed_keys(Body, SOFT, null=True)
     keys["material"] = entry_of(MATERIALS) | None, Field(default=None, description="of a soft body")
     keys["rigid"] = rigid | None, Field(default=None, description="instead of `material`: the body is rigid")
     keys["regions"] = (

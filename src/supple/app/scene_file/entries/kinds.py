@@ -136,5 +136,7 @@ def built(value: Any, meshes: Any) -> Any:
             with at(i):
                 found.append(built(item, meshes))
         return found
+    if isinstance(value, dict):
+        return {key: built(item, meshes) for key, item in value.items()}
     build = getattr(value, "build", None)
     return value if build is None else build(meshes)

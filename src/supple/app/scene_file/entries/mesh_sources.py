@@ -87,6 +87,7 @@ class SurfaceModel(Model):
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
     hull: bool = Field(default=False, description="true: the convex hull of the surface instead")
     keep_axes: bool = Field(default=False, description=KEEP_AXES)
+    merge: bool = Field(default=True, description="false: vertices at one place stay apart, and nothing is dropped")
 
     def build(self, meshes: MeshStore) -> SurfaceMesh:
         return meshes.surface(self)
@@ -175,8 +176,25 @@ class MeshStore:
         triangles = [one.triangles + begin for one, begin in zip(surfaces, begins[:-1], strict=True)]
         return SurfaceMesh(np.concatenate([one.vertices for one in surfaces]), np.concatenate(triangles))
 
+    def array(self, file: str) -> NDArray[Any]:
+        """The numbers in a file of NumPy.
+
+        Raises
+        ------
+        SceneError : where it cannot be read, or holds anything else.
+        """
+        with at("file"):
+            try:
+                numbers = np.load(self.located(file), allow_pickle=False)
+            except (OSError, ValueError, EOFError) as error:
+                reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not such a file"
+                raise SceneError(f"{printable(file)}: no numbers of NumPy (.npy) can be read: {reason}") from None
+            if not isinstance(numbers, np.ndarray) or numbers.dtype.kind not in "iuf":
+                raise SceneError(f"{printable(file)}: it holds something other than one array of numbers")
+        return numbers
+
     def located(self, file: str) -> Path:
-        """The path of a mesh file that a scene names.
+        """The path of a file that a scene names.
 
         Raises
         ------
@@ -217,8 +235,8 @@ class MeshStore:
             with at("file"):
                 surface = self._once(
                     MeshFileModel(file=file, keep_axes=source.keep_axes),
-                    lambda: SurfaceMesh.load(self.located(file), keep_axes=source.keep_axes),
-                    "surface in ",
+                    lambda: SurfaceMesh.load(self.located(file), keep_axes=source.keep_axes, merge=source.merge),
+                    f"surface {source.merge} in ",
                 )
         else:
             assert source.shape is not None

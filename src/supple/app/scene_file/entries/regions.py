@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from supple.app.scene_file.entries.kinds import KindModel, model_of
+from supple.app.scene_file.entries import schema_types as schema_types  # registers how values are written
+from supple.app.scene_file.entries.arrays import array_type
+from supple.app.scene_file.entries.kinds import KindModel, built, model_of
 from supple.app.scene_file.entries.mesh_sources import MeshFileModel, MeshStore
 from supple.app.scene_file.model import Index, Model, Name
 from supple.errors import SceneError
@@ -14,7 +18,7 @@ from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Hyperelastic, Material
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.located import at
-from supple.scene.selection import InBox
+from supple.scene.selection import InBox, distinct_numbers
 
 
 class Region(Model):
@@ -28,8 +32,8 @@ class Region(Model):
         description="all tets whose center is inside, in the coordinates of the mesh: before `position`, `rotation` "
         "and `copies`",
     )
-    tets: list[Index] | None = Field(
-        default=None, min_length=1, description="instead of `box`: tet numbers of the mesh, from 0"
+    tets: array_type(row=Annotated[list[Index], Field(min_length=1)]) | None = Field(  # pyright: ignore[reportInvalidTypeForm]
+        default=None, description="instead of `box`: tet numbers of the mesh, from 0"
     )
     set: Name | None = Field(default=None, description="instead of `box`: a set of the mesh file (.inp or .msh)")
 
@@ -48,7 +52,8 @@ class Region(Model):
                         f"no tet has its center inside; in the mesh's coordinates, centers are from {low} to {high}"
                     )
                 return inside
-        chosen = np.array(self.tets)
+        with at("tets"):
+            chosen = distinct_numbers(built(self.tets, meshes), "it", "tet", "tets", "a box or a set")
         if chosen.max() >= len(mesh.tets):
             with at("tets"):
                 raise SceneError(f"names tet {chosen.max()}; the mesh has tets 0 to {len(mesh.tets) - 1}")

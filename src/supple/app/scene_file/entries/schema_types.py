@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from supple.app.scene_file.entries.arrays import array_type
 from supple.app.scene_file.entries.kinds import entry_of, keys_of, model_of, schema_type
 from supple.app.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, surface_model
-from supple.app.scene_file.model import Count, Extents, Index, Model, Name, NonNegative, Number, Positive, Vector
+from supple.app.scene_file.model import (
+    Count,
+    Extents,
+    Index,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Vector,
+)
 from supple.kinds import validators
 from supple.materials.own.energy_material import FormulaText, NamedNumbers
 from supple.mesh.primitives.shape import SHAPES
@@ -90,18 +101,19 @@ _plain(validators.Name, Name)
 _plain(validators.Vector, Vector)
 _plain(validators.Direction, Vector)
 _plain(validators.Extents, Extents)
-_plain(validators.Limits, Annotated[list[Number], Field(min_length=2, max_length=2)])
-_plain(Directions, Vector)
-_plain(ForceValidator, Vector)
+_plain(validators.Limits, Annotated[list[float], Field(min_length=2, max_length=2)])
+_plain(Directions, array_type(row=Vector, rows=list[Vector]))
+_plain(ForceValidator, array_type(row=Vector, rows=list[Vector]))
 _plain(AlongAxes, Positive | Annotated[list[NonNegative], Field(min_length=3, max_length=3)])
 _plain(ForceLength, ForceLengthModel)
 _plain(NameList, Names)
 _plain(PointValidator, PointModel)
 _plain(PointList, Annotated[list[PointModel], Field(min_length=2)])
-_plain(PairList, Annotated[list[Annotated[list[Index], Field(min_length=2, max_length=2)]], Field(min_length=1)])
+_PAIR = Annotated[list[Index], Field(min_length=2, max_length=2)]
+_plain(PairList, array_type(rows=Annotated[list[_PAIR], Field(min_length=1)]))
 _plain(Inertia, Annotated[list[Vector], Field(min_length=3, max_length=3)])
 _plain(FormulaText, Annotated[str, Field(max_length=4000)])
-_plain(NamedNumbers, dict[Name, Number])
+_plain(NamedNumbers, dict[Name, array_type(Number, list[Number])])
 
 
 @schema_type.register
@@ -130,8 +142,13 @@ def _(validator: validators.Counts) -> Any:
 def _(validator: validators.ListOf) -> Any:
     kinds = {"numbers": Number, "vectors": Vector}
     kinds["pairs"] = Annotated[list[Positive], Field(min_length=2, max_length=2)]
-    lists = tuple(list[kinds[thing]] for thing in validator.things)
-    return Annotated[Union[lists], Field(min_length=1, max_length=validator.most)]  # noqa: UP007
+    lists = {
+        "row" if thing == "numbers" else "rows": Annotated[
+            list[kinds[thing]], Field(min_length=1, max_length=validator.most)
+        ]
+        for thing in validator.things
+    }
+    return array_type(**lists)
 
 
 @schema_type.register
@@ -157,13 +174,14 @@ def _(validator: MotionValidator) -> Any:
 
 @schema_type.register
 def _(validator: validators.NumberPerTet) -> Any:
-    return schema_type(validator.bounds)
+    number = schema_type(validator.bounds)
+    return array_type(number, list[number])
 
 
 @schema_type.register
 def _(validator: PerPair) -> Any:
     number = schema_type(validator.bounds)
-    return number | Annotated[list[number], Field(min_length=1)]
+    return array_type(number, Annotated[list[number], Field(min_length=1)])
 
 
 @keys_of.register
@@ -180,7 +198,7 @@ def _(validator: validators.Instance, name: str) -> dict[str, tuple[Any, str]]:
     return keys
 
 
-_ROWS = Annotated[list[Index], Field(min_length=1)]
+_ROWS = array_type(row=Annotated[list[Index], Field(min_length=1)])
 
 
 @keys_of.register
