@@ -287,5 +287,5 @@ def _(validator: FormulaText, value: Any, of: Field) -> dict[str, Any]:
 
 
 def _equal(first: SurfaceMesh | TetMesh, second: SurfaceMesh | TetMesh) -> bool:
-    cells = [one.nodes if isinstance(one, TetMesh) else one.triangles for one in (first, second)]
-    return type(first) is type(second) and np.array_equal(first.vertices, second.vertices) and np.array_equal(*cells)
+    a, b = (one.nodes if isinstance(one, TetMesh) else one.triangles for one in (first, second))
+    return type(first) is type(second) and np.array_equal(first.vertices, second.vertices) and np.array_equal(a, b)
