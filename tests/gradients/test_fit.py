@@ -94,7 +94,10 @@ def test_jacobians_and_gradients_agree(name):
 
 
 def test_what_does_not_exist_is_named():
-    for quantity, of, text in (("reaction", "grip", "pin 'grip' does not exist"), ("positions", "baar", "'baar'")):
+    for quantity, of, text in (
+        ("reaction", "grip", "pin or obstacle 'grip' does not exist"),
+        ("positions", "baar", "'baar'"),
+    ):
         target = [0.0, 0.0, 0.0] if quantity == "reaction" else np.zeros((1, 3))
         one = sp.Sensitivity(
             lambda p: scenes.damped([p[0], 1, 1]), sp.Misfit(quantity, of, target), implicit(), 0.01, 1

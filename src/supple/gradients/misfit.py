@@ -10,28 +10,30 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.gradients.quantities import QUANTITIES, driver_of, force_of, sum_of
 from supple.kinds.suggestion import suggestion
-from supple.model.pin_reactions import pin_labels
-from supple.model.system import PinRange, System
+from supple.model.state import State
+from supple.model.system import System
 from supple.results.frame import Frame
 
 Floats = NDArray[np.float64]
 OwnLoss = Callable[[Frame], "tuple[float, Mapping[str, ArrayLike]] | None"]
-
-_QUANTITIES = ("positions", "velocities", "center", "reaction")
+OfScene = Callable[[System], float]
 
 
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """Derivatives (n, 3) of a loss by what one frame has: positions, velocities, and forces of pins on vertices."""
+    """Derivatives of a loss by what one frame has: positions x and velocities v (n, 3), and forces of pins and
+    obstacles (N, 3) on vertices; of_scene : by the scene, at fixed positions and velocities, as functions of that."""
 
     x: Floats
     v: Floats
     pins: Floats
+    of_scene: list[OfScene]
 
     @classmethod
-    def zeros(cls, n: int) -> Seeds:
-        return cls(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
+    def zeros(cls, n: int, whole: int) -> Seeds:
+        return cls(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((whole, 3)), [])
 
 
 class Misfit:
@@ -39,13 +41,16 @@ class Misfit:
 
     Parameters
     ----------
-    quantity : "positions" [m] or "velocities" [m/s] of a body's vertices, the "center" of these, which is the mean of
-        their positions [m], or the "reaction" of a pin on what it holds [N].
-    of : name of the body, or name or label of the pin, see `frame.report.details.reaction_forces`.
-    target : what was measured, in the unit of the quantity: (k, 3), or (f, k, 3) of every frame; of a center
-        or reaction (3,) or (f, 3). What is NaN was not measured.
+    quantity : what frames read: "positions" [m] or "velocities" [m/s] of a body's vertices; the "center" of these,
+        which is the mean of their positions [m]; the "reaction" of a pin or obstacle, its force on bodies [N]; the
+        angle or distance of a "sensor" [rad], [m]; the coordinate of a "joint" [rad], [m]; the "volume" or "pressure"
+        of a cavity [m^3], [Pa], the latter of given pressures or gases; the "length" of a cable [m].
+    of : name of the body, obstacle, sensor, joint, cavity or cable, or name or label of the pin, see
+        `frame.report.details.reaction_forces`.
+    target : what was measured, in the unit of the quantity: a number, or (f,) of every frame; of a center or reaction
+        (3,) or (f, 3); of vertices (k, 3) or (f, k, 3). What is NaN was not measured.
     vertices : (k,) rows of `frame.positions[body]`; None: all.
-    frames : (f,) numbers of frames, from 1; None: the last one, or with (f, k, 3) the last f.
+    frames : (f,) numbers of frames, from 1; None: the last one, or of a target for f frames the last f.
     weight : factor of a square.
 
     Raises
@@ -63,14 +68,15 @@ class Misfit:
         frames: Sequence[int] | None = None,
         weight: float = 1.0,
     ) -> None:
-        if quantity not in _QUANTITIES:
-            raise SceneError(f"Misfit: quantity {quantity!r} does not exist; {suggestion(quantity, _QUANTITIES)}")
+        if quantity not in QUANTITIES:
+            raise SceneError(f"Misfit: quantity {quantity!r} does not exist; {suggestion(quantity, list(QUANTITIES))}")
         self.quantity, self.of, self.weight = quantity, of, float(weight)
         self.vertices = None if vertices is None else np.asarray(vertices, dtype=np.int64)
         values = np.asarray(target, dtype=np.float64)
-        one = 1 if quantity in ("center", "reaction") else 2
-        if values.ndim not in (one, one + 1) or values.shape[-1] != 3:
-            raise SceneError(f"{self.label}: target has shape {values.shape}; give rows of x, y and z")
+        one = QUANTITIES[quantity].axes
+        if values.ndim not in (one, one + 1) or (one and values.shape[-1] != 3):
+            what = "rows of x, y and z" if one else "a number, or one for each frame"
+            raise SceneError(f"{self.label}: target has shape {values.shape}; give {what}")
         if values.ndim == one:
             values = np.repeat(values[None], 1 if frames is None else len(frames), axis=0)
         if frames is not None and len(frames) != len(values):
@@ -94,67 +100,58 @@ class Misfit:
 
     def residuals(self, frame: Frame, row: int) -> Floats:
         """The roots of the weighted squares, with signs, of the target's frame `row`; zero where that is NaN."""
-        reading = self._reading(frame)
+        read = QUANTITIES[self.quantity].read
+        reading = force_of(self, frame) if read is None else read(self, frame.system, frame.state).values
         if reading.shape != self.target[row].shape:
             raise SceneError(f"{self.label}: the run has {len(reading)} rows, the target {len(self.target[row])}")
         return np.nan_to_num(np.sqrt(self.weight) * (reading - self.target[row]))
 
-    def add_seeds(self, system: System, by_residual: Floats, seeds: Seeds) -> None:
-        """Add the derivatives of a loss with these derivatives by `residuals`."""
-        values = np.sqrt(self.weight) * by_residual
-        if self.quantity == "reaction":
-            seeds.pins[self._pin(system)[1].vertices] += values
-            return
-        if self.quantity == "center":
-            count = len(system.split(seeds.x)[self.of]) if self.vertices is None else len(self.vertices)
-            values = np.tile(values / count, (count, 1))
-        add_of_body(system, self.of, values, self.vertices, seeds.v if self.quantity == "velocities" else seeds.x)
+    def matrix(self, frame: Frame, row: int, whole: System) -> Any:
+        """(r, 3 n) derivatives of `residuals` by what the quantity is a function of.
 
-    def tangents(self, system: System, row: int, x: Floats, v: Floats, forces: Floats) -> Floats:
-        """The change of `residuals` with changes (n, 3) of positions, velocities, and forces of pins."""
-        if self.quantity == "reaction":
-            change = forces[self._pin(system)[1].vertices].sum(axis=0)
+        whole : the system with obstacles' vertices
+        """
+        quantity = QUANTITIES[self.quantity]
+        if quantity.read is None:
+            found = sum_of(whole.pins[driver_of(self, frame.system)].vertices, len(whole.rest_positions))
         else:
-            change = system.split(v if self.quantity == "velocities" else x)[self.of]
-            change = self._of_rows(change)
-        return np.where(np.isnan(self.target[row]), 0.0, np.sqrt(self.weight) * change)
+            found = quantity.read(self, frame.system, frame.state).matrix
+        known = np.isfinite(np.atleast_1d(self.target[row])).ravel()
+        return (np.sqrt(self.weight) * known)[:, None] * found
 
-    def _pin(self, system: System) -> tuple[str, PinRange]:
-        """The label of the pin that this is about, and its vertices."""
-        labels = pin_labels(system)
-        for label, pin in zip(labels, system.pins, strict=True):
-            if self.of in (label, pin.pin.name):
-                return label, pin
-        raise SceneError(f"{self.label}: pin {self.of!r} does not exist; {suggestion(self.of, labels)}")
+    def add_seeds(self, frame: Frame, row: int, by_residual: Floats, whole: System, seeds: Seeds) -> None:
+        """Add the derivatives of a loss with these derivatives by `residuals`."""
+        out = getattr(seeds, QUANTITIES[self.quantity].by)
+        out += (self.matrix(frame, row, whole).T @ by_residual.ravel()).reshape(-1, 3)
+        if self.is_of_scene(frame.system):
+            weights, state = np.sqrt(self.weight) * by_residual, frame.state
+            seeds.of_scene.append(lambda system: float((weights * self.read(system, state)).sum()))
 
-    def _reading(self, frame: Frame) -> Floats:
-        if self.quantity == "reaction":
-            return frame.report.details.reaction_forces[self._pin(frame.system)[0]]
-        state = frame.state
-        known = frame.system.split(state.velocities if self.quantity == "velocities" else state.positions)
-        return self._of_rows(known[self.of])  # says what exists
+    def tangents(self, frame: Frame, row: int, whole: System, changes: Mapping[str, Floats], sides: Any) -> Floats:
+        """(r,) the change of `residuals` with changes of what quantities are functions of, and with the scene.
 
-    def _of_rows(self, values: Floats) -> Floats:
-        """The reading, from the values of all points of the body."""
-        if self.vertices is not None:
-            if len(self.vertices) and not 0 <= self.vertices.min() <= self.vertices.max() < len(values):
-                raise SceneError(f"{self.label}: the body has vertices 0 to {len(values) - 1}")
-            values = values[self.vertices]
-        return values.mean(axis=0) if self.quantity == "center" else values
+        sides : the systems on both sides of a parameter, and the change from one to the other
+        """
+        matrix = self.matrix(frame, row, whole)
+        change = matrix @ changes[QUANTITIES[self.quantity].by].ravel()[: matrix.shape[1]]
+        if self.is_of_scene(frame.system):
+            above, below, step = sides
+            scene = (self.read(above, frame.state) - self.read(below, frame.state)) / step
+            change += np.nan_to_num(np.sqrt(self.weight) * (scene + 0.0 * self.target[row])).ravel()
+        return change
 
+    def is_of_scene(self, system: System) -> bool:
+        """Whether the reading depends on the scene where positions are given, as it does on where points are in rigid
+        bodies, on sensors, joints and gases."""
+        if self.quantity in ("positions", "velocities", "center"):
+            return any(part.rigid for part in system.bodies if part.name == self.of)
+        return QUANTITIES[self.quantity].read is not None
 
-def add_of_body(system: System, name: str, values: Floats, rows: NDArray[np.int64] | None, out: Floats) -> None:
-    """Add derivatives by the points of a body, all or some `rows`, to those by the vertices `out` (n, 3)."""
-    part = next(part for part in system.bodies if part.name == name)
-    own = part.points if part.rigid else part.vertices
-    all_points = np.arange(own.start, own.stop)
-    chosen = all_points if rows is None else all_points[rows]
-    if not part.rigid:
-        np.add.at(out, chosen, values)
-        return
-    on_points = np.zeros((len(system.points), 3))
-    np.add.at(on_points, chosen, values)
-    system.points.add_forces(on_points, out)
+    def read(self, system: System, state: State) -> Floats:
+        """What is read of a state; not of forces."""
+        read = QUANTITIES[self.quantity].read
+        assert read is not None
+        return read(self, system, state).values
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,14 +190,14 @@ class Loss:
                     values[misfit.label] = np.append(values.get(misfit.label, np.zeros(0)), more[known])
         return seen, read
 
-    def at(self, frame: Frame, steps: int) -> tuple[float, Seeds]:
-        """The share of a frame, and its derivatives."""
+    def at(self, frame: Frame, steps: int, whole: System) -> tuple[float, Seeds]:
+        """The share of a frame, and its derivatives; whole : the system with obstacles' vertices"""
         system = frame.system
-        seeds, total = Seeds.zeros(len(system.rest_positions)), 0.0
+        seeds, total = Seeds.zeros(len(system.rest_positions), len(whole.rest_positions)), 0.0
         for misfit, row in self.rows(frame.index, steps):
             residuals = misfit.residuals(frame, row)
             total += float((residuals**2).sum())
-            misfit.add_seeds(system, 2.0 * residuals, seeds)
+            misfit.add_seeds(frame, row, 2.0 * residuals, whole, seeds)
         for loss in self.own:
             given = loss(frame)
             if given is None:
@@ -213,5 +210,6 @@ class Loss:
                 if name not in known or array.shape != known[name].shape:
                     shape = known[name].shape if name in known else "a name of a body"
                     raise SceneError(f"loss: its derivative by {name!r} has shape {array.shape}; give {shape}")
-                add_of_body(system, name, array, None, seeds.x)
+                # The same as of a misfit of positions with this derivative by its residuals.
+                Misfit("positions", name, np.zeros_like(array)).add_seeds(frame, 0, array, whole, seeds)
         return total, seeds

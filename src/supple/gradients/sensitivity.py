@@ -17,7 +17,7 @@ from supple.gradients.check import Check, check
 from supple.gradients.equations import Equations
 from supple.gradients.fields import by_anchors, fields_of
 from supple.gradients.kept import Kept, Replay
-from supple.gradients.misfit import Loss, Misfit, OwnLoss, Seeds
+from supple.gradients.misfit import Loss, Misfit, OfScene, OwnLoss, Seeds
 from supple.gradients.refusals import refuse
 from supple.gradients.tangent import Side, StateTangent, step_tangent
 from supple.model.state import State
@@ -106,8 +106,9 @@ class Sensitivity:
     def value_and_structure(self, p: ArrayLike) -> tuple[float, list[dict[str, float]]]:
         """The loss, and what does not change smoothly with parameters: numbers of each frame by what they are of."""
         total, found = 0.0, []
-        for frame in self._frames(*self._begun(_vector(p))):
-            total += self.loss.at(frame, self.steps)[0]
+        first, workspace = self._begun(_vector(p))
+        for frame in self._frames(first, workspace):
+            total += self.loss.at(frame, self.steps, workspace.system)[0]
             of = frame.report.details
             stiffness = of.contact_stiffness or 0.0
             found.append({"substeps": of.substeps, "contacts": of.contacts, "Pa of contact's stiffness": stiffness})
@@ -128,10 +129,11 @@ class Sensitivity:
         p = _vector(p)
         first, workspace = self._begun(p)
         workspace.tape = tape = []
-        sides = []
+        sides, scenes = [], []
         for k in range(len(p)):
             (one, above), (other, below) = self._both(p, k, workspace)
-            sides.append(Side(_STEP * float(self.sizes(p)[k]), above, below, one.state, other.state))
+            sides.append(side := Side(_STEP * float(self.sizes(p)[k]), above, below, one.state, other.state))
+            scenes.append((one.system, other.system, 2.0 * side.step))
         at = [StateTangent.start(side, first.state) for side in sides]
         residuals, columns, change = [np.zeros(0)], [np.zeros((0, len(p)))], 0.0
         for frame in self._frames(first, workspace):
@@ -140,12 +142,13 @@ class Sensitivity:
                 change, equations = max(change, replay.area_change()), Equations.of(replay)
                 at = [step_tangent(replay, equations, side, one) for side, one in zip(sides, at, strict=True)]
             tape.clear()
-            system = frame.system
+            changes = [{"x": one.x, "v": one.v, "pins": one.forces} for one in at]
             at = [one.with_vertices(len(first.state.positions)) for one in at]
             for misfit, row in self.loss.rows(frame.index, self.steps):
                 residuals.append(misfit.residuals(frame, row).ravel())
-                changes = [misfit.tangents(system, row, one.x, one.v, one.forces).ravel() for one in at]
-                columns.append(np.stack(changes, axis=1))
+                pairs = zip(changes, scenes, strict=True)
+                found = [misfit.tangents(frame, row, workspace.system, *pair) for pair in pairs]
+                columns.append(np.stack(found, axis=1))
         _warn_of_areas(change)
         return np.concatenate(residuals), np.concatenate(columns)
 
@@ -170,7 +173,7 @@ class Sensitivity:
         workspace.tape = tape = []
         total, kept, seeds = 0.0, [], []
         for frame in self._frames(first, workspace):
-            value, at_frame = self.loss.at(frame, self.steps)
+            value, at_frame = self.loss.at(frame, self.steps, workspace.system)
             total += value
             kept.append([Kept.of(taken, k == 0) for k, taken in enumerate(tape)])
             seeds.append(at_frame)
@@ -181,7 +184,8 @@ class Sensitivity:
         starts = by_anchors(system, steps, begin.x)
         by_moduli, by_rest = fields_of(workspace, steps, self.solver, moduli=moduli, rest=rest)
         chosen = range(len(p)) if parameters is None else parameters
-        by_parameters = np.array([self._derivative(p, k, steps, begin, workspace) for k in chosen])
+        of_scene = [one for at_frame in seeds for one in at_frame.of_scene]
+        by_parameters = np.array([self._derivative(p, k, steps, begin, of_scene, workspace) for k in chosen])
         of_moduli = {part.name: by_moduli[part.tets] for part in system.bodies} if moduli else {}
         shapes = {}
         for part in system.bodies if rest else ():
@@ -227,12 +231,19 @@ class Sensitivity:
             yield frame
 
     def _derivative(
-        self, p: Floats, k: int, steps: list[tuple[Kept, StepAdjoint]], begin: StateAdjoint, at: Workspace
+        self,
+        p: Floats,
+        k: int,
+        steps: list[tuple[Kept, StepAdjoint]],
+        begin: StateAdjoint,
+        of_scene: list[OfScene],
+        at: Workspace,
     ) -> float:
         """By parameter k, at fixed states: no step is taken."""
         sides = []
         for first, workspace in self._both(p, k, at):
             values = [adjoint.value(Replay.of(one, workspace)) for one, adjoint in steps]
+            values += [one(first.system) for one in of_scene]
             start = first.state
             values += [float(np.einsum("ij,ij->", begin.x[: len(start.positions)], start.positions))]
             values += [float(np.einsum("ij,ij->", begin.v[: len(start.positions)], start.velocities))]
@@ -276,8 +287,7 @@ def _backwards(
         at.x += given.x
         at.v += given.v
         whole = len(some[-1].x)
-        at, pins = at.with_vertices(whole), np.zeros((whole, 3))
-        pins[:n] = given.pins
+        at, pins = at.with_vertices(whole), given.pins
         for one in reversed(some):
             replay = Replay.of(one, workspace)
             adjoint, at = step_adjoint(replay, at, pins)
