@@ -12,16 +12,14 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
+from supple.solvers.implicit.solver import Implicit
 from supple.solvers.implicit.stepping.integrators import Static, integrator_of
-
-if TYPE_CHECKING:
-    from supple.gradients.sensitivity import Sensitivity
 
 Floats = NDArray[np.float64]
 Verdict = Literal["agree", "wrong", "noisy", "kink"]
@@ -37,6 +35,15 @@ _RATIO, _SIZES = 4.0, 3
 _SETTLED = 0.25
 # A jump of the slope stays in steps 16 times as small, where that of a smooth loss falls by 16 and that of noise grows.
 _STAYS = (0.15, 2.0)
+
+
+class Runs(Protocol):
+    """What is checked: a `Sensitivity`."""
+
+    solver: Implicit
+
+    def value_and_gradient(self, p: Floats) -> tuple[float, Floats]: ...
+    def value_and_structure(self, p: Floats) -> tuple[float, list[dict[str, float]]]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +89,7 @@ class _Pair:
     differ: str
 
     @classmethod
-    def of(cls, one: Sensitivity, p: Floats, way: Floats, h: float, middle: float) -> _Pair:
+    def of(cls, one: Runs, p: Floats, way: Floats, h: float, middle: float) -> _Pair:
         (above, over), (below, under) = (one.value_and_structure(p + sign * h * way) for sign in (1.0, -1.0))
         differ = [
             f"frame {k + 1} has {a[name]:.6g} {name} in one of the two runs, and {b[name]:.6g} in the other"
@@ -93,7 +100,7 @@ class _Pair:
         return cls((above - below) / (2.0 * h), (above - 2.0 * middle + below) / h, next(iter(differ), ""))
 
 
-def check(one: Sensitivity, p: Floats, ways: Floats, h: float) -> Check:
+def check(one: Runs, p: Floats, ways: Floats, h: float) -> Check:
     """Compare the gradient at p (q,) with differences along `ways` (d, q) by steps of h."""
     value, gradient = one.value_and_gradient(p)
     rough = [_Pair.of(one, p, way, h, value) for way in ways]
@@ -138,7 +145,7 @@ def check(one: Sensitivity, p: Floats, ways: Floats, h: float) -> Check:
     return replace(found, verdict="wrong", reason="the gradient is wrong, as differences settle on other values")
 
 
-def _sharpened(one: Sensitivity, p: Floats) -> tuple[Sensitivity, float, Floats]:
+def _sharpened(one: Runs, p: Floats) -> tuple[Runs, float, Floats]:
     """With a sharper tolerance as far as runs converge; its loss and gradient (q,)."""
     solver = one.solver
     given = solver.tolerance or (1e-9 if isinstance(integrator_of(solver.integrator), Static) else 1e-3)
