@@ -1,55 +1,23 @@
 // A simulation at the other end of a websocket: its scene, its frames, and what a person asks of it.
 
-import { Block, type Description, type Field, type Numbers, type Ref, type Source } from "./decode.ts";
-
-export interface Parameter {
-  name: string;
-  label: string;
-  factor: number;
-  whole: boolean;
-}
+import { Block, type Field, type Marks, type Numbers, type Ref, type Source } from "./data.ts";
 
 export type Values = Record<string, number | boolean>;
 
-export interface SceneMessage extends Description {
-  kind: "scene";
-  parameters: Parameter[];
-  reload: boolean;
-}
-
-export interface FrameMessage {
-  kind: "frame";
-  time: number;
-  frame: number;
-  paused: boolean;
-  speed: number;
-  points: Ref;
-  poses: Ref;
-  pins: Ref;
-  grabs: Ref;
-  contacts: Ref;
-  touching: Ref;
+export interface Frame extends Record<Marks, Ref> {
+  time: number; frame: number; paused: boolean; speed: number; points: Ref; poses: Ref;
   field: { key: string; ends: [number, number]; values: Ref } | null;
-  solver: string;
-  values: Values;
-  bodies: Values[];
-  rate: string;
-  slow: string;
-  measures: string[];
+  solver: string; values: Values; bodies: Values[]; rate: string; slow: string; measures: string[];
+  /** by title and name, as `Description.plots` has them */
+  numbers: number[][];
 }
 
-export interface Status {
-  error: string | null;
-  /** whether the server ends, because of this error */
-  ended: boolean;
-  busy: string;
-  command: string;
-  recording: boolean;
-}
+/** `ended`: whether the server ends, because of this error. */
+export interface Status { error: string | null; ended: boolean; busy: string; command: string; recording: boolean }
 
 export interface Listener {
   scene(block: Block): void;
-  frame(frame: FrameMessage): void;
+  frame(frame: Frame): void;
   status(status: Status): void;
   notice(level: string, text: string): void;
   /** The connection has ended, or is there again. */
@@ -60,7 +28,7 @@ const AGAIN = 1000; // [ms] until the next attempt to connect
 
 export class Live implements Source {
   readonly count = 1;
-  latest: FrameMessage | null = null;
+  latest: Frame | null = null;
   private block: Block | null = null;
   private socket: WebSocket | null = null;
   private readonly listener: Listener;
@@ -76,38 +44,22 @@ export class Live implements Source {
   }
 
   positions(_place: number, out: Float32Array): void {
-    if (this.latest) out.set(this.array(this.latest.points));
+    if (this.latest) out.set(this.block!.array(this.latest.points));
   }
 
   field(field: Field): Uint8Array | null {
     const told = this.latest?.field;
     if (!told || told.key !== field.key) return null;
     field.ends = told.ends;
-    return this.array(told.values) as Uint8Array;
+    return this.block!.array(told.values) as Uint8Array;
   }
 
   pose(obstacle: number): Numbers {
-    return this.array(this.latest!.poses).subarray(12 * obstacle, 12 * obstacle + 12);
+    return this.block!.array(this.latest!.poses).subarray(12 * obstacle, 12 * obstacle + 12);
   }
 
-  pins(): Numbers {
-    return this.array(this.latest!.pins);
-  }
-
-  grabs(): Numbers {
-    return this.array(this.latest!.grabs);
-  }
-
-  contacts(): Numbers {
-    return this.array(this.latest!.contacts);
-  }
-
-  touching(): Numbers {
-    return this.array(this.latest!.touching);
-  }
-
-  private array(ref: Ref): Numbers {
-    return this.block!.array(ref);
+  marks(kind: Marks): Numbers {
+    return this.block!.array(this.latest![kind]);
   }
 
   private connect(): void {
@@ -128,16 +80,14 @@ export class Live implements Source {
       else this.listener.notice(told.level, told.text);
       return;
     }
-    const block = new Block(data);
-    const told = block.description as unknown as FrameMessage | SceneMessage | { kind: "file"; name: string; bytes: Ref };
+    const block = new Block(data), told = block.description as unknown as { kind: string; name: string; bytes: Ref };
     if (told.kind === "file") download(told.name, new Blob([block.array(told.bytes) as Uint8Array<ArrayBuffer>]));
     else if (told.kind === "scene") {
       this.latest = null;
       this.listener.scene(block);
     } else {
-      this.block = block;
-      this.latest = told;
-      this.listener.frame(told);
+      [this.block, this.latest] = [block, told as unknown as Frame];
+      this.listener.frame(this.latest);
     }
   }
 }

@@ -1,14 +1,10 @@
 // How fast pictures follow each other, and what is left out where that is too slow.
 
-export interface Quality {
-  /** pixels of the picture for each one of the page */
-  sharp: number;
-  coarse: boolean;
-  shadows: boolean;
-  taps: number;
-}
+/** `sharp`: pixels of the picture for each one of the page; `taps`: how soft the edges of shadows are. */
+export interface Quality { sharp: number; coarse: boolean; shadows: boolean; taps: number }
 
 const SLOW = 160; // [ms] between two pictures; a person sees single pictures from about there
+const NOTES = ["", "", "slow renderer: lighter skins", "slow renderer: lighter skins, no shadows"];
 
 /** Measures how long a picture takes, and goes to lighter ones where that is long. */
 export class Pace {
@@ -16,7 +12,6 @@ export class Pace {
   private costs: number[] = [];
   private drawn: number[] = [];
   private readonly levels: Quality[];
-  private readonly notes = ["", "", "slow renderer: lighter skins", "slow renderer: lighter skins, no shadows"];
 
   constructor(ratio: number) {
     const plain = Math.min(ratio, 1);
@@ -38,7 +33,7 @@ export class Pace {
   }
 
   get note(): string {
-    return this.notes[this.level];
+    return NOTES[this.level];
   }
 
   /** Pictures in a second, of those of the last two; 0 where there are none. */
@@ -47,16 +42,15 @@ export class Pace {
     return this.drawn.length > 1 ? (1000 * (this.drawn.length - 1)) / (this.drawn.at(-1)! - this.drawn[0]) : 0;
   }
 
-  /** A picture was asked of the browser at a time, and it was ready for the next one after `cost` [ms]. True where the
-   * quality has changed. */
+  /** A picture was asked of the browser at a time, and ready for the next one after `cost` [ms]. True where the quality
+   * has changed. */
   picture(now: number, cost: number): boolean {
     this.drawn.push(now);
-    this.costs.push(cost);
-    if (this.costs.length > 8) this.costs.shift();
+    this.costs = [...this.costs, cost].slice(-8);
     const known = this.costs.slice(1).sort((a, b) => a - b); // the first one has programs to compile
-    const middle = known[known.length >> 1];
-    if (known.length < (middle > 3 * SLOW ? 2 : 4) || middle < SLOW || this.level === this.levels.length - 1) return false;
-    this.level = Math.min(this.level + (middle > 3 * SLOW ? 2 : 1), this.levels.length - 1);
+    const middle = known[known.length >> 1], last = this.levels.length - 1;
+    if (known.length < (middle > 3 * SLOW ? 2 : 4) || middle < SLOW || this.level === last) return false;
+    this.level = Math.min(this.level + (middle > 3 * SLOW ? 2 : 1), last);
     this.costs = [];
     return true;
   }

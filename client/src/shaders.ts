@@ -28,27 +28,23 @@ const SHADOW = /* glsl */ `
 #ifdef SHADOWS
 uniform highp sampler2D shadowMap;
 uniform mat4 shadowMatrix;
-uniform float shadowDepth;
-const float shadowTexel = 1. / CELLS;
-vec2 shadow(vec3 p, float bias) {
+vec2 shadow(vec3 p) {
   vec4 s = shadowMatrix * vec4(p, 1.);
   if (any(greaterThan(abs(s.xyz - .5), vec3(.499)))) return vec2(1., 0.);
-  vec2 cell = s.xy / shadowTexel - .5, f = fract(cell);
-  vec2 base = (floor(cell) + .5) * shadowTexel;
+  vec2 cell = s.xy * CELLS - .5, f = fract(cell), base = floor(cell) + .5;
   float lit = 0., sum = 0., thick = 0.;
   for (int i = -TAPS; i <= TAPS + 1; i++)
     for (int j = -TAPS; j <= TAPS + 1; j++) {
-      float wx = i == -TAPS ? 1. - f.x : i == TAPS + 1 ? f.x : 1.;
-      float wy = j == -TAPS ? 1. - f.y : j == TAPS + 1 ? f.y : 1.;
-      float through = s.z - texture(shadowMap, base + vec2(i, j) * shadowTexel).r;
-      lit += wx * wy * step(through, bias);
-      thick += wx * wy * max(through, 0.);
-      sum += wx * wy;
+      float w = (i == -TAPS ? 1. - f.x : i == TAPS + 1 ? f.x : 1.) * (j == -TAPS ? 1. - f.y : j == TAPS + 1 ? f.y : 1.);
+      float through = s.z - texture(shadowMap, (base + vec2(i, j)) / CELLS).r;
+      lit += w * step(through, .0015);
+      thick += w * max(through, 0.);
+      sum += w;
     }
-  return vec2(lit, thick * shadowDepth) / sum;
+  return vec2(lit, thick * 2. * reach) / sum;
 }
 #else
-vec2 shadow(vec3 p, float bias) { return vec2(1., .3 * reach); }
+vec2 shadow(vec3 p) { return vec2(1., .3 * reach); }
 #endif
 `;
 
@@ -57,41 +53,35 @@ const SKY = /* glsl */ `
 #ifdef SHADOWS
 uniform sampler2D heightMap;
 uniform mat4 heightMatrix;
-uniform float heightDepth;
 const vec2 AROUND[8] = vec2[](vec2(.96, .3), vec2(.47, .88), vec2(-.3, .96), vec2(-.88, .47), vec2(-.96, -.3),
   vec2(-.47, -.88), vec2(.3, -.96), vec2(.88, -.47));
-float openSky(vec3 p, float reach) {
+float openSky(vec3 p) {
   vec4 s = heightMatrix * vec4(p, 1.);
   float free = 0.;
   for (int i = 0; i < 8; i++) {
-    float far = (i & 1) == 0 ? .03 : .09, d = far * 2. * reach;
-    float h = max(textureLod(heightMap, s.xy + far * AROUND[i], LOD + float(i & 1)).r - s.z, 0.) * heightDepth;
+    float d = (i & 1) == 0 ? .03 : .09, h = max(textureLod(heightMap, s.xy + d * AROUND[i], LOD + float(i & 1)).r - s.z, 0.);
     free += d * d / (h * h + d * d);
   }
   return free / 8.;
 }
 #else
-float openSky(vec3 p, float reach) { return .8; }
+float openSky(vec3 p) { return .8; }
 #endif
 `;
 
 export const VERTEX = /* glsl */ `
 ${SKY}
-uniform float reach;
 in float value;
 in vec3 rest;
-out vec3 at, facing, own;
+out vec3 at, facing, own, corner;
 out float amount, sky;
-#ifdef FACETS
-out vec3 corner;
-#endif
 void main() {
   vec4 p = modelMatrix * vec4(position, 1.);
   at = p.xyz;
   own = rest;
   amount = value;
   facing = mat3(modelMatrix) * normal;
-  sky = mix(.3, 1., openSky(at, reach));
+  sky = mix(.3, 1., openSky(at));
 #ifdef FACETS
   int k = gl_VertexID % 3;
   corner = vec3(k == 0, k == 1, k == 2);
@@ -104,21 +94,17 @@ void main() {
 export const SURFACE = /* glsl */ `
 ${LIGHT}
 ${SHADOW}
-in vec3 at, facing, own;
+in vec3 at, facing, own, corner;
 in float amount, sky;
 uniform vec3 color;
 uniform float size, opacity;
 uniform sampler2D scale;
-#ifdef FACETS
-in vec3 corner;
-#endif
 out vec4 result;
 
 float grain(vec3 p) { // pores of foam: random points of a skew lattice
   p += .37 * p.yzx + .41;
   vec3 i = floor(p), f = fract(p) - .5;
-  float h = fract(sin(dot(i, vec3(12.9898, 78.233, 37.719))) * 43758.5453);
-  return smoothstep(.1, .5, length(f) + .25 * h);
+  return smoothstep(.1, .5, length(f) + .25 * fract(sin(dot(i, vec3(12.9898, 78.233, 37.719))) * 43758.5453));
 }
 
 void main() {
@@ -133,41 +119,38 @@ void main() {
   base = texture(scale, vec2(amount / 255., .5)).rgb;
   base *= base;
 #endif
-  float nv = max(dot(n, v), 0.), nl = dot(n, sun), edge = (1. - nv) * (1. - nv);
+  float nv = max(dot(n, v), 0.), nl = dot(n, sun), edge = (1. - nv) * (1. - nv), alpha = opacity;
   edge *= edge;
 #if LOOK == 5
   vec2 s = vec2(1., 0.);
 #else
-  vec2 s = shadow(at + .004 * reach * n, .0015);
+  vec2 s = shadow(at + .004 * reach * n);
 #endif
-  vec3 r = reflect(-v, n), c;
-  float lit = max(nl, 0.) * s.x, alpha = opacity;
-  vec3 ambient = around(n) * sky;
+  vec3 r = reflect(-v, n), ambient = around(n) * sky, key = sunColor * max(nl, 0.) * s.x, c;
 #if defined(FIELD)
-  c = base * (.75 * ambient + .75 * sunColor * lit) + .02 * environment(r, .5);
+  c = base * (.75 * ambient + .75 * key) + .02 * environment(r, .5);
 #elif LOOK == 1
   // Light passes: what comes through from the light, and what is seen through, where the body is thin.
   vec3 absorb = (1.06 - base) * (3.6 / size);
   vec3 through = exp(-absorb * s.y * 1.3) * (.35 + .65 * smoothstep(-1., .6, nl));
   vec3 t = refract(-v, n, .72);
-  float path = max(-dot(t, n), .15) * .55 * size;
-  vec3 seen = environment(t, .7) * exp(-absorb * path) * (base + .12);
-  c = base * (.3 * ambient + .3 * sunColor * lit) + .6 * sunColor * base * through + .5 * seen * mix(.6, 1., sky);
+  vec3 seen = environment(t, .7) * exp(-absorb * max(-dot(t, n), .15) * .55 * size) * (base + .12);
+  c = base * (.3 * ambient + .3 * key) + .6 * sunColor * base * through + .5 * seen * mix(.6, 1., sky);
   c += environment(r, .08) * (.035 + .5 * edge) * mix(.25, 1., sky) * mix(.45, 1., s.x);
 #elif LOOK == 2
   float pore = grain(own * (15. / size)) * mix(.6, 1., grain(own * (7. / size) + 3.1));
-  c = base * mix(.5, 1., pore) * (.85 * ambient + .65 * sunColor * (.85 * lit + .1 * max(nl + .5, 0.)));
+  c = base * mix(.5, 1., pore) * (.85 * ambient + .55 * key + .065 * sunColor * max(nl + .5, 0.));
 #elif LOOK == 3
-  c = base * (environment(r, .12) * mix(.3, 1., sky) * mix(.6, 1., s.x) * 1.05 + .1 * ambient + .18 * sunColor * lit);
+  c = base * (environment(r, .12) * mix(.3, 1., sky) * mix(.6, 1., s.x) * 1.05 + .1 * ambient + .18 * key);
   c += edge * .35 * environment(r, .2);
 #elif LOOK == 4
-  c = base * (.8 * ambient + .6 * sunColor * lit);
+  c = base * (.8 * ambient + .6 * key);
 #elif LOOK == 5
   vec3 mirrored = min(environment(r, .2), vec3(1.1)) * (.015 + .7 * edge);
   alpha = clamp(.5 * opacity + .25 * edge + .5 * mirrored.g, .01, 1.);
   c = mix(.7 * base * ambient, mirrored, clamp(mirrored.g / alpha, 0., 1.)) + mirrored;
 #else
-  c = base * (.75 * ambient + .8 * sunColor * lit) + environment(r, .45) * (.03 + .22 * edge) * sky;
+  c = base * (.75 * ambient + .8 * key) + environment(r, .45) * (.03 + .22 * edge) * sky;
 #endif
 #ifdef FACETS
   vec3 w = corner / max(fwidth(corner), vec3(1e-6));
@@ -177,18 +160,7 @@ void main() {
 }
 `;
 
-/** The light that reaches the ground: of the key in red, of the sky in green. Bodies that move change this map alone. */
-export const GROUND_MAP = /* glsl */ `
-${SHADOW}
-${SKY}
-in vec3 at;
-uniform vec3 up;
-uniform float reach;
-out vec4 result;
-void main() { result = vec4(shadow(at + .004 * reach * up, .0015).x, openSky(at, reach), 0., 1.); }
-`;
-
-/** A disc with lines, which fades into the background. */
+/** A disc, or the map of the light on it: of the key in red, of the sky in green. Bodies that move change this map. */
 export const GROUND_VERTEX = /* glsl */ `
 uniform float reach;
 in vec3 rest;
@@ -205,6 +177,16 @@ void main() {
 #endif
 }
 `;
+export const GROUND_MAP = /* glsl */ `
+${LIGHT}
+${SHADOW}
+${SKY}
+in vec3 at;
+out vec4 result;
+void main() { result = vec4(shadow(at + .004 * reach * up).x, openSky(at), 0., 1.); }
+`;
+
+/** The disc has lines, and fades into the background. */
 export const GROUND = /* glsl */ `
 ${LIGHT}
 in vec3 own;
@@ -214,33 +196,15 @@ uniform float cell;
 uniform sampler2D groundMap;
 out vec4 result;
 void main() {
-  vec2 place = own.xy / cell, width = max(fwidth(place), vec2(1e-5));
+  vec2 place = own.xy / cell, width = max(fwidth(place), vec2(1e-5)), light = vec2(1.);
   vec2 off = abs(fract(place - .5) - .5) / width;
   float line = (1. - smoothstep(.4, 1.4, min(off.x, off.y))) * .09 * min(1., .25 / max(width.x, width.y));
 #ifdef SHADOWS
-  vec2 light = texture(groundMap, spot).rg;
-#else
-  vec2 light = vec2(1.);
+  light = texture(groundMap, spot).rg;
 #endif
   vec3 c = color * (1. - line) * (.72 * mix(.1, 1., light.g) * skyColor + .42 * sunColor * light.r);
-  float away = length(own.xy) / reach;
-  result = vec4(shown(c), 1. - smoothstep(1.6, 4.6, away));
+  result = vec4(shown(c), 1. - smoothstep(1.6, 4.6, length(own.xy) / reach));
 }
-`;
-
-/** The background: from the horizon to the sky. */
-export const BACKGROUND_VERTEX = /* glsl */ `
-out float height;
-void main() {
-  height = position.y * .5 + .5;
-  gl_Position = vec4(position.xy, 1., 1.);
-}
-`;
-export const BACKGROUND = /* glsl */ `
-in float height;
-uniform vec3 top, bottom;
-out vec4 result;
-void main() { result = vec4(mix(bottom, top, height), 1.); }
 `;
 
 /** Depth alone, for the map of shadows; and the height, for that of the sky. */

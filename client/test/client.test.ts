@@ -1,12 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Vector3 } from "three";
-import { framed } from "../src/camera.ts";
-import { colorAt } from "../src/colors.ts";
-import { Block, inflated, summed16, summed8 } from "../src/decode.ts";
+import { Block, inflated, summed } from "../src/data.ts";
 import { Pace } from "../src/pace.ts";
-import { follow, lighter, normals, type Skin } from "../src/skin.ts";
-import { placeTets } from "../src/tets.ts";
+import { follow, keepOut, lighter, normals, placeTets, type Skin } from "../src/shape.ts";
+import { framed } from "../src/view.ts";
 
 /** A sphere of triangles, each vertex of which follows a point of its own and, with weight 1/4, the first one. */
 function sphere(rings: number): Skin {
@@ -23,7 +21,7 @@ function sphere(rings: number): Skin {
   return {
     corners: Uint32Array.from({ length: 2 * count }, (_, k) => (k % 2 ? k >> 1 : 0)),
     weights: new Int16Array(count).fill(8192), step: 0.25 / 8192, order: 2, first: 0,
-    triangles: Uint32Array.from(triangles), rest: Float32Array.from(rest),
+    triangles: Uint32Array.from(triangles), rest: Float32Array.from(rest), outside: new Uint8Array(count).fill(1),
   };
 }
 
@@ -47,10 +45,9 @@ test("differences are summed over frames", () => {
   // 5, 70000 mod 2^16, then -3 and +2 against the frame before: folded as 5 -> 10, -3 -> 5, +2 -> 4
   const folded = [10, 2 * 300, 5, 4];
   const bytes = Uint8Array.from([...folded.map((x) => x >> 8), ...folded.map((x) => x & 255)]);
-  assert.deepEqual([...summed16(bytes, 2, 2)], [5, 300, 2, 302]);
-  assert.deepEqual([...summed8(Uint8Array.from([10, 5, 4]), 3, 1)], [5, 2, 4]);
-  assert.throws(() => summed16(bytes, 3, 2), /incomplete/);
-  assert.throws(() => summed8(bytes, 3, 2), /incomplete/);
+  assert.deepEqual([...summed(bytes, 2, 2, 2)], [5, 300, 2, 302]);
+  assert.deepEqual([...summed(Uint8Array.from([10, 5, 4]), 3, 1, 1)], [5, 2, 4]);
+  for (const width of [1, 2] as const) assert.throws(() => summed(bytes, 3, 2, width), /incomplete/);
 });
 
 test("a block gives its arrays, and damaged ones are refused", async () => {
@@ -98,6 +95,7 @@ test("a lighter skin is closed, has about as many vertices as asked, and follows
   assert.ok(count <= 400 && count > 150, `${count}`);
   assert.equal(light.corners.length, 2 * count);
   assert.equal(light.weights.length, count);
+  assert.equal(light.outside.length, count);
   const edges = new Map<string, number>();
   for (let t = 0; t < light.triangles.length; t++) {
     const [a, b] = [light.triangles[t], light.triangles[t % 3 === 2 ? t - 2 : t + 1]];
@@ -114,16 +112,32 @@ test("a lighter skin is closed, has about as many vertices as asked, and follows
 
 test("tets are apart from the middle, and end at a cut", () => {
   const x = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 9, 9, 9]);
-  const tets = { corners: Uint32Array.from([0, 1, 2, 3, 1, 2, 3, 4]), count: 2 };
+  const tets = Uint32Array.from([0, 1, 2, 3, 1, 2, 3, 4]);
   const position = { array: new Float32Array(72) }, value = { array: new Float32Array(24), needsUpdate: false };
   const place = (explode: number, cut: number, axis = 0) =>
-    placeTets(tets, x, x, Uint8Array.from([1, 2, 3, 4, 5]), { explode, axis }, cut, position as never, value as never);
+    placeTets(tets, x, x, Uint8Array.from([1, 2, 3, 4, 5]), { explode, axis, cut }, position as never, value as never);
   assert.equal(place(0, 10), 24);
   assert.deepEqual([...position.array.slice(0, 9)], [0, 0, 0, 0, 1, 0, 1, 0, 0]);
   assert.deepEqual([...value.array.slice(0, 3)], [1, 3, 2]);
   assert.equal(place(0, 1), 12);
   place(1, 10);
   assert.ok(position.array[0] < -0.5 && position.array[36] > 1);
+});
+
+test("points of a skin beyond its tets stay out of solids that move", () => {
+  const n = 24, low = [-1.2, -1.2, -1.2], step = [2.4 / (n - 1), 2.4 / (n - 1), 2.4 / (n - 1)];
+  const ball = Float32Array.from({ length: n ** 3 }, (_, k) =>
+    Math.hypot(...[Math.floor(k / n ** 2), Math.floor(k / n) % n, k % n].map((i, axis) => low[axis] + i * step[axis])) - 1);
+  const solid = { low, step, n, unit: 1, values: {} } as unknown as Parameters<typeof keepOut>[5];
+  const pose = [0, -1, 0, 5, 1, 0, 0, 6, 0, 0, 1, 7]; // a quarter turn about z, and a move
+  const ends = [[5.9, 6, 7], [5, 6, 7.95], [4.6, 6.6, 7.5], [5.9, 6.1, 7], [5, 6.5, 7], [8, 6, 7]];
+  const x = Float32Array.from(ends.flat());
+  keepOut(x, Uint8Array.from([1, 1, 1, 0, 1, 1]), 0.3, 0.02, pose as never, solid, ball);
+  for (let k = 0; k < 6; k++) {
+    const away = Math.hypot(x[3 * k] - 5, x[3 * k + 1] - 6, x[3 * k + 2] - 7);
+    if (k < 3) assert.ok(Math.abs(away - 1.02) < 0.01, `${away}`);
+    else assert.deepEqual([...x.slice(3 * k, 3 * k + 3)], [...Float32Array.from(ends[k])]); // not beyond, too deep, far
+  }
 });
 
 test("slow pictures lower the quality, once they are known to be slow", () => {
@@ -140,10 +154,4 @@ test("slow pictures lower the quality, once they are known to be slow", () => {
   assert.match(run(300, 40).note, /lighter skins, no shadows/);
   assert.equal(run(300, 40).best.shadows, true);
   assert.ok(run(600, 5).quality.coarse);
-});
-
-test("scales begin and end with their colors", () => {
-  assert.deepEqual(colorAt("viridis", 0), [0x44, 0x01, 0x54]);
-  assert.deepEqual(colorAt("RdBu", 0.5), [0xf7, 0xf7, 0xf7]);
-  assert.deepEqual(colorAt("RdBu", 2), [0x05, 0x30, 0x61]);
 });

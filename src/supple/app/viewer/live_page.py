@@ -227,13 +227,13 @@ class LivePage:
 
     def _show(self, snapshot: Snapshot) -> None:
         from supple.app.viewer.from_snapshot import RenderFrameBuilder
-        from supple.app.viewer.messages import Messages
+        from supple.app.viewer.messages import Messages, plotted
 
         self._builder = self._builder or RenderFrameBuilder()
         frame, self._snapshot = self._builder.frame(snapshot), snapshot
         if self.frame is None or frame.model is not self.frame.model:
             self._number += 1
-            self._messages = Messages(frame, self._about)
+            self._messages = Messages(frame, plotted(snapshot), self._about)
         self.frame, self._message = frame, None
         for notice in snapshot.notices:
             if notice.number > self._notice:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -28,10 +29,11 @@ class Messages:
 
     Parameters
     ----------
-    frame : the first one; about : what the page tells of the scene: title, whether it can be read again, ...
+    frame : the first one; numbers : see `plotted`
+    about : what the page tells of the scene: title, whether it can be read again, ...
     """
 
-    def __init__(self, frame: RenderFrame, about: dict[str, Any]) -> None:
+    def __init__(self, frame: RenderFrame, numbers: dict[str, dict[str, float]], about: dict[str, Any]) -> None:
         model, packer = frame.model, Packer()
         self._lines, self._surfaces = lines_of_joints(model), obstacle_surfaces(model)
         self._limits = {field.key: Limits(field, Range()) for field in FIELDS.values()}
@@ -49,7 +51,8 @@ class Messages:
             }
             for one in PARAMETERS.values()
         ]
-        more = {"kind": "scene", "fields": fields, "plots": [], "parameters": parameters, **about}
+        plots = [{"title": title, "series": [{"name": name} for name in series]} for title, series in numbers.items()]
+        more = {"kind": "scene", "fields": fields, "plots": plots, "parameters": parameters, **about}
         self.scene = packer.block({**described, **more})
 
     def of(self, snapshot: Snapshot, frame: RenderFrame) -> bytes:
@@ -77,6 +80,7 @@ class Messages:
             "rate": f"{timing.frames_per_second:.0f} steps/s, {timing.real_time_ratio:.2f} of real time",
             "slow": slowness(snapshot),
             "measures": measured(snapshot),
+            "numbers": [[finite(one) for one in series.values()] for series in plotted(snapshot).values()],
         }
         return packer.block(told)
 
@@ -98,6 +102,32 @@ class Messages:
         largest = max(float(np.linalg.norm(forces, axis=1).max()), 1e-300)
         reach = _ARROW * frame.model.view.radius / largest
         return np.nan_to_num(np.stack([points, points + reach * forces], axis=1))
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON has it."""
+    return value if isfinite(value) else None
+
+
+def plotted(snapshot: Snapshot) -> dict[str, dict[str, float]]:
+    """The numbers of a frame that plots show over time, by title and name."""
+    measures = snapshot.measures
+    found: dict[str, dict[str, float]] = {
+        "energy [J]": {
+            "kinetic": measures.kinetic_energy,
+            "elastic": measures.elastic_energy,
+            "potential": measures.potential_energy,
+        },
+        "smallest J": {"J": measures.min_det_F},
+        "time of a step [ms]": {"step": snapshot.timing.step_ms},
+    }
+    for reading in snapshot.readings:
+        title = f"{_READ.get(reading.unit, 'reading')} [{pretty_unit(reading.unit)}]" if reading.unit else "reading"
+        found.setdefault(title, {})[reading.name] = reading.value
+    return found
+
+
+_READ = {"N": "force", "Pa": "pressure", "m": "distance", "rad": "angle"}
 
 
 def measured(snapshot: Snapshot) -> list[str]:

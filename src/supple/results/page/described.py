@@ -14,8 +14,19 @@ from supple.results.view.fields import FIELDS, Field, Limits, Range, color_map, 
 from supple.results.view.joints import Sides, joint_segments, lines_of_joints
 from supple.results.view.look import drawn_as
 from supple.results.view.model import Model, RenderFrame
-from supple.results.view.surfaces import RigidSurface, SoftSurface, Surface, boundary_surface, obstacle_surfaces
+from supple.results.view.skin_contact import distance_grid
+from supple.results.view.surfaces import (
+    SKIN_GAP,
+    STRETCH,
+    RigidSurface,
+    SoftSurface,
+    Surface,
+    boundary_surface,
+    obstacle_surfaces,
+)
 from supple.scene.rows import BodyRows
+
+_VIEWS = {"fit": "corner", "front": "front", "side": "side", "top": "top"}
 
 
 def described_scene(model: Model, packer: Packer) -> dict[str, Any]:
@@ -29,7 +40,8 @@ def described_scene(model: Model, packer: Packer) -> dict[str, Any]:
         "center": view.center.tolist(),
         "radius": view.radius,
         "outline": packer.add(view.outline, "f4"),
-        "away": direction_of("corner", view).tolist(),
+        "views": {name: direction_of(preset, view).tolist() for name, preset in _VIEWS.items()},
+        "gap": SKIN_GAP * view.radius,
         "floor": max(floors, default=None),
         "bodies": [_body(model, body, packer) for body in model.bodies],
         "tets": packer.add(model.tets, "u4"),
@@ -45,6 +57,8 @@ def _body(model: Model, body: BodyRows, packer: Packer) -> dict[str, Any]:
         rows = np.arange(len(body.skin.corners))
         surface = SoftSurface(body.name, body.skin.triangles, *drawn_as(body), body, True, rows).creased(model)
         corners, weights = body.skin.corners[surface.rows], body.skin.weights[surface.rows]
+    beyond = model.beyond_tets.get(body.name)
+    outside, reach = (np.zeros(0), 0.0) if beyond is None else (beyond[0][surface.rows], beyond[1])
     # The last weight is what the others lack to one, so that rounded ones still move with the body.
     kept = np.ascontiguousarray(weights[:, :-1])
     step = max(float(np.abs(kept).max(initial=0.0)), 1e-30) / 32767.0
@@ -60,6 +74,8 @@ def _body(model: Model, body: BodyRows, packer: Packer) -> dict[str, Any]:
         "step": step,
         "rest": packer.add(surface.at_rest(model), "f4"),
         "closed": surface.hides_its_backs(model),
+        "outside": packer.add(outside, "u1"),
+        "reach": STRETCH * reach,
     }
 
 
@@ -115,7 +131,23 @@ def _obstacle(frames: Sequence[tuple[float, RenderFrame]], surface: RigidSurface
         "container": surface.container,
         "casts": surface.casts_shadow,
         "isFloor": surface.is_floor and not moves,
+        "solid": _solid(model, surface, moves, packer),
     }
+
+
+def _solid(model: Model, surface: RigidSurface, moves: bool, packer: Packer) -> dict[str, Any] | None:
+    """The distance from an obstacle, for skins that reach beyond tets; see `distance_grid`."""
+    obstacle, view = surface.obstacle, model.view
+    reach = max((STRETCH * reach for _, reach in model.beyond_tets.values()), default=0.0)
+    if obstacle is None or obstacle.checked_by_triangles or reach == 0.0:
+        return None
+    low, high = surface.vertices.min(axis=0) - reach, surface.vertices.max(axis=0) + reach
+    if not moves:  # only what is seen matters
+        low, high = np.maximum(low, view.center - 2.5 * view.radius), np.minimum(high, view.center + 2.5 * view.radius)
+    step, distances = distance_grid(obstacle, low, high)
+    unit = max(float(np.abs(distances).max()), 1e-30) / 32767.0
+    values = packer.add(np.round(distances / unit), "i2")
+    return {"low": low.tolist(), "step": step.tolist(), "n": len(distances), "unit": unit, "values": values}
 
 
 def _field(frames: Sequence[tuple[float, RenderFrame]], field: Field, packer: Packer) -> dict[str, Any] | None:

@@ -17,13 +17,14 @@ from supple.results.view.look import OBSTACLE, Look, drawn_as, theme
 from supple.results.view.model import Model, RenderFrame
 from supple.results.view.skin_contact import kept_out
 from supple.runtime.kernel_cache import njit
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rows import BodyRows
 
 # A container is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
 CONTAINER_OPACITY, WALL_OPACITY = 0.13, 0.05
 # Between a skin and an obstacle, as a share of the scene's radius: a round wall is drawn as flat triangles within it.
-_SKIN_GAP = 2e-3
-_STRETCH = 2.0  # of the part of a skin that reaches beyond tets, at most
+SKIN_GAP = 2e-3
+STRETCH = 2.0  # of the part of a skin that reaches beyond tets, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +94,8 @@ class SoftSurface(Surface):
         if kept is None or not self.skin:
             return x
         outside, reach = kept
-        rows, gap = np.flatnonzero(outside[self.rows]), _SKIN_GAP * frame.model.view.radius
-        return kept_out(x, rows, _STRETCH * reach, frame.model.obstacles, frame.poses, gap)
+        rows, gap = np.flatnonzero(outside[self.rows]), SKIN_GAP * frame.model.view.radius
+        return kept_out(x, rows, STRETCH * reach, frame.model.obstacles, frame.poses, gap)
 
     def at_rest(self, model: Model) -> NDArray[np.float64]:
         return self.of(model.rest_positions)
@@ -115,6 +116,7 @@ class RigidSurface(Surface):
     container : whether it is seen from within; its triangles face outwards, and a page draws only their backs
     casts_shadow : on floors; planes and containers do not
     is_floor : whether it is a plane that bodies stand on, which pictures draw as a disc
+    obstacle : that it shows; None of a body or a rim
     """
 
     vertices: NDArray[np.float64]
@@ -123,6 +125,7 @@ class RigidSurface(Surface):
     container: bool = False
     casts_shadow: bool = True
     is_floor: bool = False
+    obstacle: Obstacle | None = None
 
     def at(self, frame: RenderFrame) -> NDArray[np.float64]:
         pose = self.pose(frame)
@@ -196,6 +199,7 @@ def obstacle_surfaces(model: Model, dark: bool = False) -> list[RigidSurface]:
                 obstacle.is_container,
                 solid,
                 obstacle.plane is not None and not is_wall,
+                obstacle,
             )
         )
         rim = rim_of(vertices, triangles, view.up, _RIM * view.radius) if obstacle.is_container else None

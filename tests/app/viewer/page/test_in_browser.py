@@ -118,7 +118,7 @@ def test_a_click_pins_a_vertex_and_another_one_unpins_it(still):
     place = still.screen.place(top - [0.0, 0.05, 0.0])
     still.tab.mouse.click(*place)
     still.screen.wait(lambda: len(still.snapshot().pinned) == 1, "the pin")
-    still.screen.wait(lambda: still.tab.evaluate("suppleLive.pins().length") == 1, "the pin on the page")
+    still.screen.wait(lambda: still.tab.evaluate("suppleLive.marks('pins').length") == 1, "the pin on the page")
     still.tab.mouse.click(*place)
     still.screen.wait(lambda: len(still.snapshot().pinned) == 0, "no pin")
 
@@ -147,12 +147,50 @@ def test_parameters_have_units_and_reach_the_simulation(still):
 
 
 def test_a_field_is_asked_for_and_has_a_legend(still):
-    still.tab.locator("[data-name='color'] select").select_option("volume ratio J")
+    still.tab.locator("[data-name='field'] select").select_option("volume ratio J")
     still.screen.wait(lambda: still.snapshot().tet_quantity == "J", "the field")
     still.screen.holds("suppleLive.latest.field")
     still.screen.wait(lambda: still.tab.locator("#legend .low").inner_text() == "0.98", "the legend")
-    still.tab.locator("[data-name='color'] select").select_option("body")
+    still.tab.locator("[data-name='field'] select").select_option("body")
     still.screen.wait(lambda: still.snapshot().tet_quantity is None, "no field")
+
+
+def test_plots_grow_with_time_and_begin_anew(still):
+    tab, times = still.tab, "supplePage.plots.times"
+    tab.locator("[data-name='plot'] select").select_option("energy [J]")
+    tab.locator("#play").click()
+    still.screen.holds(f"{times}.length > 5 && {times}.at(-1) > 0.3")
+    assert "kinetic" in tab.locator("#plot").inner_text()
+    kinetic = np.array(tab.evaluate("supplePage.plots.plot.data[1]"))
+    assert 0.5 * 9.81 * MASS * 0.2 < kinetic.max() < 9.81 * MASS * 0.25
+    tab.locator("#play").click()
+    tab.locator("#reset").click()
+    still.screen.holds(f"{times}.length === 1 && {times}[0] === 0")
+    tab.locator("[data-name='plot'] select").select_option("none")
+    assert not tab.locator("#plot").is_visible()
+
+
+def test_a_sleeping_tab_draws_nothing_and_continues_when_it_wakes(still):
+    """A browser calls no frames of a hidden tab; it has no setting for this, so that the page is asked to."""
+    tab = still.tab
+    tab.evaluate("""() => {
+      globalThis.awake = requestAnimationFrame;
+      globalThis.slept = [];
+      globalThis.requestAnimationFrame = (act) => slept.push(act);
+    }""")
+    tab.locator("#play").click()
+    still.screen.wait(lambda: still.snapshot().time > 1.5, "time that passes without the tab")
+    tab.wait_for_timeout(200)
+    before = tab.evaluate("[supplePage.pictures, suppleLive.latest.frame, supplePage.pace.level]")
+    tab.wait_for_timeout(1000)
+    assert tab.evaluate("supplePage.pictures") == before[0]
+    tab.evaluate("""() => {
+      globalThis.requestAnimationFrame = awake;
+      document.dispatchEvent(new Event("visibilitychange"));
+      slept.forEach((act) => requestAnimationFrame(act));
+    }""")
+    still.screen.holds(f"supplePage.pictures > {before[0] + 3} && suppleLive.latest.frame > {before[1] + 60}")
+    assert tab.evaluate("supplePage.pace.level") == before[2]
 
 
 def test_two_tabs_show_the_same_and_a_reload_continues(still, look):
