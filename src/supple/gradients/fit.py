@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError, SuppleError
 from supple.gradients.sensitivity import Sensitivity
 from supple.runtime.figures import paper_figure
+from supple.runtime.replacing import whole_file
 
 logger = logging.getLogger(__name__)
 
@@ -55,8 +56,12 @@ class SimulationFit:
         lines = [f"{name} = {value:.6g} +- {error:.2g}" for name, value, error in rows]
         return "\n".join([*lines, f"loss {self.loss:.6g} after {self.evaluations} runs: {self.message}"])
 
-    def plot(self, path: str | Path) -> Path:
+    def plot(self, path: str | Path, over: tuple[str, ArrayLike] | None = None) -> Path:
         """Draw what was simulated over what was measured to a PNG, PDF or SVG file.
+
+        Parameters
+        ----------
+        over : a label with its unit, and the values (k,) of each reading, over which to draw both instead.
 
         Raises
         ------
@@ -65,12 +70,17 @@ class SimulationFit:
         path = Path(path)
         with paper_figure(path, 4.5, 4.2) as figure:
             axes = figure.subplots()
-            for label, values in self.measured.items():
-                axes.plot(values, self.simulated[label], ".", markersize=4, label=label)
-            low, high = axes.get_xlim()
-            axes.plot([low, high], [low, high], "-", color="0.6", linewidth=1)
-            axes.set_xlabel("measured")
-            axes.set_ylabel("simulated")
+            for k, (label, values) in enumerate(self.measured.items()):
+                if over is None:
+                    axes.plot(values, self.simulated[label], ".", markersize=4, label=label)
+                    continue
+                axes.plot(over[1], values, "o", markersize=4, color=f"C{k}", label=f"measured: {label}")
+                axes.plot(over[1], self.simulated[label], "-", color=f"C{k}", label="simulated")
+            if over is None:
+                low, high = axes.get_xlim()
+                axes.plot([low, high], [low, high], "-", color="0.6", linewidth=1)
+            axes.set_xlabel("measured" if over is None else over[0])
+            axes.set_ylabel("simulated" if over is None else "")
             axes.legend()
         return path
 
@@ -158,13 +168,21 @@ class _Runs:
         """The parameters (q,) of the best run in the log; p where there is none."""
         if self.log is None or not self.log.exists():
             return p
-        with self.log.open(encoding="utf-8", newline="") as file:
-            header, *rows = csv.reader(file)
-        if header != ["loss", *self.names]:
+        text, columns = self.log.read_text(encoding="utf-8"), ["loss", *self.names]
+        whole = text[: text.rfind("\n") + 1]  # a killed writer may leave a part of a line
+        header, *rows = list(csv.reader(whole.splitlines())) or [columns]
+        if header != columns:
             raise SceneError(f"fit_simulation: {self.log} has the columns {', '.join(header)}; give another log")
+        if whole != text:
+            with whole_file(self.log) as fresh:
+                fresh.write_text(whole, encoding="utf-8")
         known = np.array(rows, dtype=np.float64).reshape(-1, len(header))
         known = known[np.isfinite(known[:, 0])]
-        return known[known[:, 0].argmin(), 1:] if len(known) else p
+        if not len(known):
+            return p
+        best = known[known[:, 0].argmin()]
+        self._say(f"{self.log} has {len(rows)} runs; goes on from the best one, with the loss {best[0]:.6g}")
+        return best[1:]
 
     def residuals(self, p: Floats) -> Floats:
         found = self._tried(p, lambda: self.of.residuals(p), lambda r: float(r @ r))
@@ -196,16 +214,19 @@ class _Runs:
         self.least = min(self.least, loss)
         text = ", ".join(f"{name} {value:.6g}" for name, value in zip(self.names, p, strict=True))
         line = f"run {self.count}: loss {loss:.6g}; {text}" + (f"; {why}" if why else "")
-        logger.info("%s", line)
-        if self.report is not None:
-            self.report(line)
+        self._say(line)
         if self.log is not None:
-            begins = not self.log.exists()
+            begins = not self.log.exists() or not self.log.stat().st_size
             with self.log.open("a", encoding="utf-8", newline="") as file:
                 rows = csv.writer(file)
                 if begins:
                     rows.writerow(["loss", *self.names])
                 rows.writerow([repr(loss), *(repr(float(value)) for value in p)])
+
+    def _say(self, line: str) -> None:
+        logger.info("%s", line)
+        if self.report is not None:
+            self.report(line)
 
 
 def _at_end(of: Sensitivity, p: Floats, scales: Floats, jacobian: Floats | None) -> Any:

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
 
 from supple.errors import SceneError
 from supple.gradients.quantities import QUANTITIES, driver_of, force_of, sum_of
+from supple.kinds.checks import finite_vector
 from supple.kinds.suggestion import suggestion
+from supple.mesh.checked_arrays import vertex_array
 from supple.model.state import State
 from supple.model.system import System
 from supple.results.frame import Frame
@@ -50,6 +53,8 @@ class Misfit:
     target : what was measured, in the unit of the quantity: a number, or (f,) of every frame; of a center or reaction
         (3,) or (f, 3); of vertices (k, 3) or (f, k, 3). What is NaN was not measured.
     vertices : (k,) rows of `frame.positions[body]`; None: all.
+    points : (k, 3) places in the body's own coordinates instead [m], which move with the tets that are there.
+    along : (3,) of a center or reaction: the direction whose component is read, as a number [-].
     frames : (f,) numbers of frames, from 1; None: the last one, or of a target for f frames the last f.
     weight : factor of a square.
 
@@ -65,6 +70,8 @@ class Misfit:
         target: ArrayLike,
         *,
         vertices: ArrayLike | None = None,
+        points: ArrayLike | None = None,
+        along: ArrayLike | None = None,
         frames: Sequence[int] | None = None,
         weight: float = 1.0,
     ) -> None:
@@ -72,8 +79,10 @@ class Misfit:
             raise SceneError(f"Misfit: quantity {quantity!r} does not exist; {suggestion(quantity, list(QUANTITIES))}")
         self.quantity, self.of, self.weight = quantity, of, float(weight)
         self.vertices = None if vertices is None else np.asarray(vertices, dtype=np.int64)
+        self.points = None if points is None else vertex_array(points, f"{self.label}: points")
+        self.along = None if along is None else finite_vector(along, f"{self.label}: along")
         values = np.asarray(target, dtype=np.float64)
-        one = QUANTITIES[quantity].axes
+        one = QUANTITIES[quantity].axes if along is None else 0
         if values.ndim not in (one, one + 1) or (one and values.shape[-1] != 3):
             what = "rows of x, y and z" if one else "a number, or one for each frame"
             raise SceneError(f"{self.label}: target has shape {values.shape}; give {what}")
@@ -100,8 +109,7 @@ class Misfit:
 
     def residuals(self, frame: Frame, row: int) -> Floats:
         """The roots of the weighted squares, with signs, of the target's frame `row`; zero where that is NaN."""
-        read = QUANTITIES[self.quantity].read
-        reading = force_of(self, frame) if read is None else read(self, frame.system, frame.state).values
+        reading = self.read(frame.system, frame.state, frame)
         if reading.shape != self.target[row].shape:
             raise SceneError(f"{self.label}: the run has {len(reading)} rows, the target {len(self.target[row])}")
         return np.nan_to_num(np.sqrt(self.weight) * (reading - self.target[row]))
@@ -116,8 +124,9 @@ class Misfit:
             found = sum_of(whole.pins[driver_of(self, frame.system)].vertices, len(whole.rest_positions))
         else:
             found = quantity.read(self, frame.system, frame.state).matrix
+        found = found if self.along is None else self.along[None] @ found
         known = np.isfinite(np.atleast_1d(self.target[row])).ravel()
-        return (np.sqrt(self.weight) * known)[:, None] * found
+        return csr_array((np.sqrt(self.weight) * known)[:, None] * found)
 
     def add_seeds(self, frame: Frame, row: int, by_residual: Floats, whole: System, seeds: Seeds) -> None:
         """Add the derivatives of a loss with these derivatives by `residuals`."""
@@ -143,15 +152,19 @@ class Misfit:
     def is_of_scene(self, system: System) -> bool:
         """Whether the reading depends on the scene where positions are given, as it does on where points are in rigid
         bodies, on sensors, joints and gases."""
-        if self.quantity in ("positions", "velocities", "center"):
+        if self.quantity in ("positions", "velocities", "center") and self.points is None:
             return any(part.rigid for part in system.bodies if part.name == self.of)
         return QUANTITIES[self.quantity].read is not None
 
-    def read(self, system: System, state: State) -> Floats:
-        """What is read of a state; not of forces."""
+    def read(self, system: System, state: State, frame: Frame | None = None) -> Floats:
+        """What is read of a state; of forces, of the frame."""
         read = QUANTITIES[self.quantity].read
-        assert read is not None
-        return read(self, system, state).values
+        if read is None:
+            assert frame is not None
+            values = force_of(self, frame)
+        else:
+            values = read(self, system, state).values
+        return values if self.along is None else np.asarray(values @ self.along)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ polar decomposition, coordinates of joints, cavities and cables by the Jacobians
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.sparse import csr_array, eye_array, kron
 
 from supple.errors import SceneError
 from supple.kinds.suggestion import suggestion
+from supple.mesh.skin import Embedding
 from supple.model.joints.at_state import coordinates_at, reported
 from supple.model.joints.functions import COSINE, derivatives
 from supple.model.joints.geometry import JointGeometry
@@ -22,11 +24,12 @@ from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.laws import Held
 from supple.model.pin_reactions import pin_labels
 from supple.model.state import State
-from supple.model.system import System
+from supple.model.system import BodyRange, System
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.results.frame import Frame
 from supple.scene.loads.points import point_corners
 from supple.scene.rigid.pose import rotation_of
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.sensors import AngleSensor, DistanceSensor
 from supple.solvers.implicit.details import ImplicitDetails
 from supple.solvers.implicit.energies.joints import JointPotential
@@ -39,6 +42,7 @@ class Asked(Protocol):
 
     of: str
     vertices: NDArray[np.int64] | None
+    points: Floats | None
 
     @property
     def label(self) -> str: ...
@@ -72,9 +76,27 @@ def _chosen(name: str, known: Sequence[str], label: str, what: str) -> int:
     return known.index(name)
 
 
-def points_of(system: System, name: str, rows: NDArray[np.int64] | None, label: str) -> Any:
+def _points_of(asked: Asked, system: System) -> Any:
+    """(3 k, 3 n) the matrix that takes positions of vertices to those of what is asked for."""
+    part = system.bodies[_chosen(asked.of, [part.name for part in system.bodies], asked.label, "body")]
+    if asked.points is None:
+        return points_of(system, part, asked.vertices, asked.label)
+    corners, weights = _embedded(part.body, asked.points.tobytes())
+    return _matrix(EmbeddedPoints.in_rows(corners + np.int32(part.vertices.start), weights), system)
+
+
+@lru_cache(maxsize=16)
+def _embedded(body: Any, points: bytes) -> tuple[NDArray[np.int32], Floats]:
+    """Vertices of a body and their weights (k, w), of points in its own coordinates; a run asks in every frame."""
+    places = np.frombuffer(points).reshape(-1, 3)
+    if isinstance(body, RigidBody):
+        return np.tile(np.arange(4, dtype=np.int32), (len(places), 1)), body.weights_of(places)
+    held = Embedding.of(body.mesh, places)
+    return held.corners.astype(np.int32), np.asarray(held.weights)
+
+
+def points_of(system: System, part: BodyRange, rows: NDArray[np.int64] | None, label: str) -> Any:
     """(3 k, 3 n) the matrix that takes positions of vertices to those of points of a body, all or some `rows`."""
-    part = system.bodies[_chosen(name, [part.name for part in system.bodies], label, "body")]
     own = part.points if part.rigid else part.vertices
     count = own.stop - own.start
     if rows is not None and len(rows) and not 0 <= rows.min() <= rows.max() < count:
@@ -82,22 +104,26 @@ def points_of(system: System, name: str, rows: NDArray[np.int64] | None, label: 
     chosen = np.arange(own.start, own.stop, dtype=np.int32)
     chosen = chosen if rows is None else chosen[rows]
     points = system.points.taken(chosen) if part.rigid else EmbeddedPoints.at_vertices(chosen)
+    return _matrix(points, system)
+
+
+def _matrix(points: EmbeddedPoints, system: System) -> Any:
     shape = len(points), len(system.rest_positions)
     return csr_array(kron(csr_array((points.weights, points.vertices, points.start), shape=shape), eye_array(3)))
 
 
 def _positions(asked: Asked, system: System, state: State) -> Reading:
-    matrix = points_of(system, asked.of, asked.vertices, asked.label)
+    matrix = _points_of(asked, system)
     return Reading((matrix @ state.positions.ravel()).reshape(-1, 3), matrix)
 
 
 def _velocities(asked: Asked, system: System, state: State) -> Reading:
-    matrix = points_of(system, asked.of, asked.vertices, asked.label)
+    matrix = _points_of(asked, system)
     return Reading((matrix @ state.velocities.ravel()).reshape(-1, 3), matrix)
 
 
 def _center(asked: Asked, system: System, state: State) -> Reading:
-    of_points = points_of(system, asked.of, asked.vertices, asked.label)
+    of_points = _points_of(asked, system)
     k = of_points.shape[0] // 3
     matrix = csr_array(kron(np.full((1, k), 1.0 / k), eye_array(3))) @ of_points
     return Reading(matrix @ state.positions.ravel(), matrix)
@@ -124,7 +150,7 @@ def _sensor(asked: Asked, system: System, state: State) -> Reading:
         part = next(part for part in system.bodies if part.name == sensor.body)
         start = part.body.place(part.body.points)
         rows = np.arange(len(start))[sensor.select(start)]
-        of_points = points_of(system, sensor.body, rows, sensor.label)
+        of_points = points_of(system, part, rows, sensor.label)
         angle, by = _angle(sensor, start[rows], (of_points @ x.ravel()).reshape(-1, 3))
         return Reading(np.array(angle), csr_array(by.reshape(1, -1)) @ of_points)
     raise SceneError(

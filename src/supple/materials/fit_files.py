@@ -78,6 +78,12 @@ class Table:
         names = ", ".join(_cells(kept[0][1], max("\t;,", key=kept[0][1].count))) if kept else "of no name"
         raise SceneError(f"{path}: has the columns {names}; {expected}")
 
+    def place(self, *starts: str) -> int:
+        """The number of the first column whose name begins so."""
+        found = column(self.names, starts)
+        assert found is not None
+        return found
+
     def texts(self, index: int) -> list[str]:
         """The cells of a column."""
         return [_cell(cells, index) for _, cells in self.rows]

@@ -45,6 +45,7 @@ COMMANDS = {
     "check": "supple.app.cli.commands.check:check",
     "plot": "supple.app.cli.commands.plot:plot",
     "fit": "supple.app.cli.commands.fit:fit",
+    "check-gradient": "supple.app.cli.commands.fit:check_gradient",
     "table": "supple.app.cli.commands.table:table",
     "schema": "supple.app.cli.commands.schema:schema",
     "info": "supple.app.cli.commands.info:info",

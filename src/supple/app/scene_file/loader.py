@@ -114,14 +114,15 @@ def load_run(path: str | Path, *, confine: bool = False, scale: float | None = N
     store, suffix = (ConfinedMeshStore if confine else MeshStore)(Path(path).parent), Path(path).suffix.lower()
     if suffix in URDF_FILES:
         document = read_urdf(path, store)
-        if pairs := overlaps(_run(path, document, store).scene):
+        if pairs := overlaps(run_of(path, document, store).scene):
             document = document.with_pairs(pairs)
     else:
         document = read_surface_scene(path, scale) if suffix in MESH_FILES else read_yaml(path)
-    return _run(path, document, store)
+    return run_of(path, document, store)
 
 
-def _run(path: str | Path, document: YamlDocument, store: MeshStore) -> Run:
+def run_of(path: str | Path, document: YamlDocument, store: MeshStore) -> Run:
+    """The run that a document describes, with meshes of a store, which makes equal ones once; see `load_run`."""
     model = validated(document)
     try:
         with named_for("yaml"):

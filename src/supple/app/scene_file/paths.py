@@ -34,6 +34,25 @@ def with_values(data: Any, values: Mapping[str, Any]) -> Any:
     return data
 
 
+def value_at(data: Any, path: str) -> Any:
+    """The value at a path, as `with_values` has paths; None where the data has none.
+
+    Raises
+    ------
+    SceneError : where a path leads to no place in the data; the text begins with the path.
+    """
+    place, keys = data, path.split(".")
+    for k, key in enumerate(keys):
+        above = ".".join(keys[:k])
+        if isinstance(place, list):
+            place = place[_entry(place, key, path, above)]
+        elif isinstance(place, dict):
+            place = place.get(key)
+        elif place is not None:
+            raise _no_place(path, above, place)
+    return place
+
+
 def _below(place: Any, key: str, path: str, above: str) -> Any:
     if isinstance(place, list):
         return place[_entry(place, key, path, above)]

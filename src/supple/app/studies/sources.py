@@ -62,13 +62,13 @@ def varied_file(path: str | Path) -> Source:
 
     def case(values: Mapping[str, Any]) -> Case:
         data = with_values(document.data, values)
-        digests = [digest(folder / entry["file"]) for entry in _mesh_files(data)]
+        digests = [digest(folder / entry["file"]) for entry in mesh_files(data)]
         key, refusal = digest_of(__version__, json.dumps([data, digests], sort_keys=True)), ""
         try:
             validated(replace(document, data=data))
         except SuppleError as error:
             refusal = str(error)
-        for entry in _mesh_files(data):
+        for entry in mesh_files(data):
             entry["file"] = str((folder / entry["file"]).absolute())
         return Case(key, values, partial(_run_of_text, yaml_text(data)), refusal)
 
@@ -146,9 +146,9 @@ def _digest_of_bytes(file: Path) -> str:
         return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
-def _mesh_files(data: Any) -> Iterator[dict[str, Any]]:
+def mesh_files(data: Any) -> Iterator[dict[str, Any]]:
     """Every mapping in the data that names a file."""
     if isinstance(data, dict) and isinstance(data.get("file"), str):
         yield data
     for value in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
-        yield from _mesh_files(value)
+        yield from mesh_files(value)

@@ -13,10 +13,18 @@ if TYPE_CHECKING:
 _UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "psi": 6894.757293168361, "kg/cm2": 98066.5}
 
 
+Parameters = Annotated[list[str] | None, Parameter(name=["--parameters", "-p"], consume_multiple=True, negative="")]
+Data = Annotated[list[Path] | None, Parameter(consume_multiple=True, negative="")]
+
+
 def fit(
-    kind: Literal["mooney_rivlin", "yeoh", "ogden"],
+    what: Path,
     /,
     *,
+    parameters: Parameters = None,
+    data: Data = None,
+    of: str | None = None,
+    evaluations: int = 50,
     uniaxial: list[Path] | None = None,
     equibiaxial: list[Path] | None = None,
     pure_shear: list[Path] | None = None,
@@ -27,14 +35,25 @@ def fit(
     bulk: float | None = None,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
 ) -> None:
-    """Fit the parameters of rubber to its tests; prints them with 95 % confidence, and as a line of a scene file.
+    """Fit values of a scene file to measurements, or the parameters of rubber to its tests.
+
+    Prints the values with their standard errors, and of rubber with 95 % confidence, and a line of a scene file.
 
     Parameters
     ----------
-    kind
-        Which energy.
+    what
+        A scene file (.yaml); or the energy of rubber: mooney_rivlin, yeoh or ogden.
+    parameters
+        Of a scene file: PATH=LOW:HIGH or PATH=LOW:START:HIGH, such as bodies.bear.material.youngs=1e4:1e6.
+    data
+        Of a scene file: CSV files with the columns time, vertex or marker, x, y and z; or displacement and force.
+    of
+        The body of the markers, or the pin or obstacle that has the force; without it, the only one.
+    evaluations
+        Of a scene file: the most runs.
     uniaxial
-        CSV file with columns stretch, strain or extension, and nominal stress or load; may be given several times.
+        Of rubber: CSV file with columns stretch, strain or extension, and nominal stress or load; may be given several
+        times.
     equibiaxial
         Likewise, of equibiaxial tension.
     pure_shear
@@ -50,17 +69,34 @@ def fit(
     bulk
         Bulk modulus of the result [Pa]; without it, 500 times the shear modulus.
     output
-        Picture of the tests and the fit (.png, .pdf or .svg).
+        Of a scene file: folder for fitted.yaml, fit.png and the runs, from which the same command goes on; by default
+        "fit". Of rubber: picture of the tests and the fit (.png, .pdf or .svg).
     """
-    from supple.materials.fit import fit_material
+    from supple.errors import SceneError
+    from supple.kinds.suggestion import suggestion
     from supple.materials.rubber import MooneyRivlin, Ogden, Yeoh
     from supple.runtime.replacing import refuse_to_replace
+
+    energies = {one.kind: one for one in (MooneyRivlin, Yeoh, Ogden)}
+    of_rubber = {"uniaxial": uniaxial, "equibiaxial": equibiaxial, "pure-shear": pure_shear, "unit": unit}
+    of_rubber |= {"area": area, "length": length, "bulk": bulk}
+    of_scenes = {"parameters": parameters, "data": data, "of": of}
+    for name, given in (of_scenes if str(what) in energies else of_rubber).items():
+        if given is not None:
+            kind = "a scene file" if str(what) in energies else "rubber"
+            raise SceneError(f"--{name} is for a fit of {kind}; {what} is not one")
+    if str(what) not in energies:
+        if not what.suffix:
+            raise SceneError(f"{what}: {suggestion(str(what), list(energies))}; or give a scene file")
+        _fit_scene(what, parameters or [], data or [], of, evaluations, output or Path("fit"))
+        return
+    from supple.materials.fit import fit_material
 
     if output is not None:
         for path in (*(uniaxial or ()), *(equibiaxial or ()), *(pure_shear or ())):
             refuse_to_replace(path, output)
     found = fit_material(
-        {one.kind: one for one in (MooneyRivlin, Yeoh, Ogden)}[kind],
+        energies[str(what)],
         uniaxial,
         equibiaxial=equibiaxial,
         pure_shear=pure_shear,
@@ -74,6 +110,44 @@ def fit(
     print(f"material: {_scene_file_line(found.material)}")
     if output is not None:
         print(found.plot(output))
+
+
+def check_gradient(scene: Path, /, *, parameters: Parameters = None, data: Data = None, of: str | None = None) -> int:
+    """Compare the gradient that `supple fit` uses with differences of whole runs, along random directions.
+
+    Says which is at fault where they do not agree; the exit code is then 1.
+
+    Parameters
+    ----------
+    scene
+        A scene file (.yaml).
+    parameters
+        PATH=LOW:HIGH or PATH=LOW:START:HIGH, such as bodies.bear.material.youngs=1e4:1e6.
+    data
+        CSV files with the columns time, vertex or marker, x, y and z; or displacement and force.
+    of
+        The body of the markers, or the pin or obstacle that has the force; without it, the only one.
+    """
+    from supple.app.cli.console import ExitCode
+    from supple.app.studies.scene_fit import SceneFit
+
+    one = SceneFit.of(scene, parameters or [], data or [], of)
+    found = one.sensitivity.check(one.start)
+    print(found)
+    return ExitCode.OK if found.ok else ExitCode.FAILED
+
+
+def _fit_scene(
+    scene: Path, parameters: list[str], data: list[Path], of: str | None, evaluations: int, output: Path
+) -> None:
+    from supple.app.studies.scene_fit import SceneFit
+
+    def report(line: str) -> None:
+        print(line, flush=True)
+
+    found, files = SceneFit.of(scene, parameters, data, of).run(output, evaluations, report)
+    print(found)
+    print(*files, sep="\n")
 
 
 def _scene_file_line(material: ByLaw) -> str:
