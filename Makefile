@@ -91,7 +91,7 @@ dist: kernels
 # Run after changing dependencies in pyproject.toml.
 lock: .venv/.dev
 	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
-	  --all-extras --group dev pyproject.toml -o requirements/dev.lock
+	  --all-extras --group dev --excludes requirements/excludes.in pyproject.toml -o requirements/dev.lock
 	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
 	  --extra video -c requirements/dev.lock pyproject.toml -o requirements/base.lock
 	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \

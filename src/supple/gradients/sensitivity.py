@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError, SolverError, SuppleWarning
 from supple.gradients.adjoint import StateAdjoint, StepAdjoint, step_adjoint
+from supple.gradients.bridges import jax_function, torch_function
 from supple.gradients.check import Check, check
 from supple.gradients.equations import Equations
 from supple.gradients.fields import by_anchors, fields_of
@@ -207,6 +208,28 @@ class Sensitivity:
         p = _vector(p)
         ways = np.random.default_rng(seed).standard_normal((directions, len(p))) * self.sizes(p)
         return check(self, p, self.sizes(p)[None] if directions == len(p) == 1 else ways, step)
+
+    def torch(self) -> Callable[[Any], Any]:
+        """The loss as a function of a PyTorch tensor of parameters (q,), in the unit of each, for `backward()`.
+
+        It gives a tensor of 64 bits on the device of the parameters. The simulation runs on the processor.
+
+        Raises
+        ------
+        SuppleError : where PyTorch is not installed.
+        """
+        return torch_function(self)
+
+    def jax(self) -> Callable[[Any], Any]:
+        """The loss as a function of a JAX array of parameters (q,), in the unit of each, for `jax.grad` and `jax.jit`.
+
+        Set `jax_enable_x64` for results of 64 bits.
+
+        Raises
+        ------
+        SuppleError : where JAX is not installed.
+        """
+        return jax_function(self)
 
     def sizes(self, p: Floats) -> Floats:
         """(q,) the scales of parameters, in the unit of each."""
