@@ -134,8 +134,8 @@ void main() {
   vec3 absorb = (1.06 - base) * (3.6 / size);
   vec3 through = exp(-absorb * s.y * 1.3) * (.35 + .65 * smoothstep(-1., .6, nl));
   vec3 t = refract(-v, n, .72);
-  vec3 seen = environment(t, .7) * exp(-absorb * max(-dot(t, n), .15) * .55 * size) * (base + .12);
-  c = base * (.3 * ambient + .3 * key) + .6 * sunColor * base * through + .5 * seen * mix(.6, 1., sky);
+  vec3 seen = environment(t, .7) * exp(-absorb * max(-dot(t, n), .15) * .55 * size) * (base + .06);
+  c = base * (.25 * ambient + .3 * key) + .36 * sunColor * base * through + .36 * seen * sky;
   c += environment(r, .08) * (.035 + .5 * edge) * mix(.25, 1., sky) * mix(.45, 1., s.x);
 #elif LOOK == 2
   float pore = grain(own * (15. / size)) * mix(.6, 1., grain(own * (7. / size) + 3.1));
@@ -146,9 +146,9 @@ void main() {
 #elif LOOK == 4
   c = base * (.8 * ambient + .6 * key);
 #elif LOOK == 5
-  vec3 mirrored = min(environment(r, .2), vec3(1.1)) * (.015 + .7 * edge);
+  vec3 mirrored = min(environment(r, .6), vec3(.8)) * (.015 + .55 * edge);
   alpha = clamp(.5 * opacity + .25 * edge + .5 * mirrored.g, .01, 1.);
-  c = mix(.7 * base * ambient, mirrored, clamp(mirrored.g / alpha, 0., 1.)) + mirrored;
+  c = mix(.55 * base * ambient, mirrored, clamp(mirrored.g / alpha, 0., 1.)) + mirrored;
 #else
   c = base * (.75 * ambient + .8 * key) + environment(r, .45) * (.03 + .22 * edge) * sky;
 #endif

@@ -10,6 +10,7 @@ import zlib
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.errors import OutputError
 from supple.results.page import client as client_module
 from supple.results.page import page as page_module
@@ -91,6 +92,27 @@ def test_fields_and_readings_are_those_of_the_recording(tmp_path, recorded, reco
     plots = {plot["title"]: {one["name"]: array(one["values"]) for one in plot["series"]} for plot in told["plots"]}
     np.testing.assert_allclose(plots["energy [J]"]["kinetic"], recording.series("kinetic_energy"), rtol=1e-6)
     np.testing.assert_allclose(plots["smallest J"]["J"], recording.series("min_det_F"), rtol=1e-6)
+
+
+def test_recorded_fields_can_be_chosen(tmp_path):
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+    cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), rubber, position=(0, 0.5, 0), velocity=(0, -1, 0))
+    ball = sp.RigidBody("ball", sp.shapes.sphere(0.2, edge_length=0.2).surface, density=500, position=(2, 1, 0))
+    scene = sp.Scene([cube, ball], obstacles=[sp.HalfSpace()])
+    fields = ["contact_force", "principal_stretches", "von_mises", "stress_at_vertices", "plastic_strain"]
+    sink = sp.Recorder(tmp_path / "r.vtkhdf", fields=fields)
+    list(sp.simulate(scene, sp.XPBD(substeps=8), 0.01, 8, sinks=[sink]))
+    told, array = read_page(write_page(tmp_path / "r.vtkhdf", tmp_path / "index.html"))
+    shown = {field["name"]: field for field in told["fields"]}
+    more = ["contact force", "principal stretches", "stress at vertices", "plastic strain"]
+    assert list(shown) == ["volume ratio J", "von Mises stress", "energy density", *more]
+    with read_recording(tmp_path / "r.vtkhdf") as recording:
+        force = np.linalg.norm(recording[8].contact_force["cube"], axis=1)
+    low, high = shown["contact force"]["ends"]
+    values = unfolded(array(shown["contact force"]["values"]).reshape(9, -1)) % 256
+    assert low == 0.0
+    assert force.max() > 0.0
+    np.testing.assert_allclose(values[8, : len(force)] / 255.0, np.minimum(force / high, 1.0), atol=0.003)
 
 
 def test_long_recordings_are_shown_with_fewer_frames(tmp_path, recorded, monkeypatch):

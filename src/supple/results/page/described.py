@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.page.packed import Packer, differences, quantized
+from supple.results.view.bounds import floor_height
 from supple.results.view.camera import direction_of
 from supple.results.view.fields import FIELDS, Field, Limits, Range, color_map, nodal_values
 from supple.results.view.joints import Sides, joint_segments, lines_of_joints
@@ -31,10 +32,7 @@ _VIEWS = {"fit": "corner", "front": "front", "side": "side", "top": "top"}
 
 def described_scene(model: Model, packer: Packer) -> dict[str, Any]:
     """What no frame changes: the parts of the picture, tets, camera and floor."""
-    view, planes = model.view, [obstacle.plane for obstacle in model.obstacles]
-    floors = [float(point @ view.up) for point, normal in filter(None, planes) if float(normal @ view.up) > 0.99]
-    if not floors and any(obstacle.is_container for obstacle in model.obstacles):
-        floors = [float((view.outline @ view.up).min())]  # a table under the bowl
+    view = model.view
     return {
         "up": view.up.tolist(),
         "center": view.center.tolist(),
@@ -42,7 +40,7 @@ def described_scene(model: Model, packer: Packer) -> dict[str, Any]:
         "outline": packer.add(view.outline, "f4"),
         "views": {name: direction_of(preset, view).tolist() for name, preset in _VIEWS.items()},
         "gap": SKIN_GAP * view.radius,
-        "floor": max(floors, default=None),
+        "floor": floor_height(view, model.obstacles),
         "bodies": [_body(model, body, packer) for body in model.bodies],
         "tets": packer.add(model.tets, "u4"),
     }
@@ -153,11 +151,18 @@ def _solid(model: Model, surface: RigidSurface, moves: bool, packer: Packer) -> 
 def _field(frames: Sequence[tuple[float, RenderFrame]], field: Field, packer: Packer) -> dict[str, Any] | None:
     """A field at the vertices, in 256 steps of a scale that suits all frames; None where no value is known."""
     of_tets = [field.values(frame) for _, frame in frames]
-    ends = Limits(field, Range()).follow(np.concatenate(of_tets))
+    at_vertices = [nodal_values(frame, own) for (_, frame), own in zip(frames, of_tets, strict=True)]
+    return described_values(field, np.concatenate(of_tets), at_vertices, packer)
+
+
+def described_values(
+    field: Field, known: NDArray[np.float64], at_vertices: Sequence[NDArray[np.float64]], packer: Packer
+) -> dict[str, Any] | None:
+    """The same of values (n,) of each frame, on a scale that suits `known` (k,)."""
+    ends = Limits(field, Range()).follow(known)
     if ends is None:
         return None
-    values = np.array([nodal_values(frame, own) for (_, frame), own in zip(frames, of_tets, strict=True)])
-    share = np.clip((values - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+    share = np.clip((np.array(at_vertices) - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
     return {
         "name": field.name,
         "unit": field.unit,

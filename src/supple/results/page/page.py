@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from supple.results.page.client import DATA, client
-from supple.results.page.described import described_motion, described_scene
+from supple.results.page.described import described_motion, described_scene, described_values
 from supple.results.page.packed import Packer
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording, opened
+from supple.results.view.fields import Field, nodal_values, volume_ratio
 from supple.results.view.from_recording import evenly, model_of_recording, render_frame_of
 from supple.results.view.model import Model, RenderFrame
 from supple.runtime.replacing import whole_file
@@ -44,9 +45,14 @@ def write_page(
     output = Path(output)
     with opened(recording) as source, whole_file(output) as fresh:
         model, taken = model_of_recording(source), frames or source
-        played = [taken[i] for i in evenly(len(taken), _most_frames(model))]
+        played = [taken[i] for i in evenly(len(taken), _most_frames(model, len(source.fields)))]
         drawn = [(frame.time, render_frame_of(model, frame)) for frame in played]
-        fresh.write_text(_page(drawn, lambda packer: _plots(source, played, packer)), encoding="utf-8")
+
+        def more(packer: Packer) -> dict[str, Any]:
+            recorded = _recorded_fields(source, list(zip(played, drawn, strict=True)), packer)
+            return {"plots": _plots(source, played, packer), "recorded": recorded}
+
+        fresh.write_text(_page(drawn, more), encoding="utf-8")
     return output
 
 
@@ -55,19 +61,42 @@ def page_of_frames(frames: Sequence[tuple[float, RenderFrame]]) -> str:
     return _page([frames[i] for i in evenly(len(frames), _most_frames(frames[0][1].model))])
 
 
-def _page(frames: Sequence[tuple[float, RenderFrame]], plots: Any = lambda packer: []) -> str:
+def _page(frames: Sequence[tuple[float, RenderFrame]], more: Any = lambda packer: {"plots": [], "recorded": []}) -> str:
     packer, model = Packer(), frames[0][1].model
     names = [body.name for body in model.bodies]
     title = ", ".join(names if len(names) <= 4 else [*names[:3], f"{len(names) - 3} more"])[:80]
     described = {"title": title, **described_scene(model, packer), **described_motion(frames, packer)}
-    data = zlib.compress(packer.block({**described, "plots": plots(packer)}), 9)
+    found = more(packer)
+    described["fields"] += found.pop("recorded")
+    data = zlib.compress(packer.block({**described, **found}), 9)
     return client(title).replace(DATA, base64.b64encode(data).decode("ascii"), 1)
 
 
-def _most_frames(model: Model) -> int:
-    """Number of frames for a page of at most _MOST_BYTES."""
-    size = _BYTES_OF_A_VERTEX * len(model.rest_positions) + 12 * len(model.stitches)
+def _most_frames(model: Model, fields: int = 0) -> int:
+    """Number of frames for a page of at most _MOST_BYTES, with so many recorded fields."""
+    size = (_BYTES_OF_A_VERTEX + fields) * len(model.rest_positions) + 12 * len(model.stitches)
     return max(2, _MOST_BYTES // size)
+
+
+def _recorded_fields(
+    recording: Recording, frames: list[tuple[RecordedFrame, tuple[float, RenderFrame]]], packer: Packer
+) -> list[dict[str, Any]]:
+    """What was recorded beside the fields that every page has; of vectors and tensors their sizes, of stretches the
+    largest."""
+    found = []
+    for field in recording.fields:
+        if field.name in ("von_mises", "energy_density"):
+            continue
+        known, at_vertices = [], []
+        for frame, (_, drawn) in frames:
+            values = frame.field(field.name).values_of_all.reshape(-1, max(1, int(np.prod(field.shape))))
+            one = values.max(axis=1) if "stretches" in field.name else np.linalg.norm(values, axis=1)
+            one = one if field.shape else values[:, 0]
+            known.append(one)
+            at_vertices.append(nodal_values(drawn, one) if field.at == "tets" else np.nan_to_num(one))
+        shown = Field(field.name, field.name.replace("_", " "), field.unit, None, volume_ratio)
+        found.append(described_values(shown, np.concatenate(known), at_vertices, packer))
+    return [one for one in found if one]
 
 
 def _plots(recording: Recording, frames: Sequence[RecordedFrame], packer: Packer) -> list[dict[str, Any]]:

@@ -70,6 +70,15 @@ def view_of_scene(points: NDArray[np.float64], up: NDArray[np.float64], obstacle
     return View(whole.min(axis=0), whole.max(axis=0), up, whole)
 
 
+def floor_height(view: View, obstacles: Sequence[Obstacle]) -> float | None:
+    """The height along `up` of the highest floor, or of a table under bowls [m]; None where bodies stand on nothing."""
+    planes = [obstacle.plane for obstacle in obstacles]
+    floors = [float(point @ view.up) for point, normal in filter(None, planes) if float(normal @ view.up) > 0.99]
+    if not floors and any(obstacle.is_container for obstacle in obstacles):
+        floors = [float((view.outline @ view.up).min())]
+    return max(floors, default=None)
+
+
 # To corners, edges and sides of a cube: the points that are farthest in these directions stand for all.
 _DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 

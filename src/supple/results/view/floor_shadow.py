@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from supple.results.view.bounds import floor_height
 from supple.results.view.model import Model
 
 # Of the dark rim of a contact and of the wide shadow around it, as shares of the radius of the scene: the height above
@@ -74,13 +75,10 @@ class FloorShadow:
 
 
 def floor_shadow(model: Model, cells: int) -> FloorShadow | None:
-    """On the highest floor of a model; None where it has no floor."""
+    """On the floor of a model; None where it has no floor."""
     view = model.view
-    planes = [one.plane for one in model.obstacles]
-    floors = [point for point, normal in filter(None, planes) if float(normal @ view.up) > 0.99]
-    if not floors:
-        return None
-    return FloorShadow(max(floors, key=lambda point: float(point @ view.up)), view.up, view.center, view.radius, cells)
+    height = floor_height(view, model.obstacles)
+    return None if height is None else FloorShadow(height * view.up, view.up, view.center, view.radius, cells)
 
 
 def _samples(

@@ -83,22 +83,19 @@ class Theme:
     Attributes
     ----------
     top, bottom : of the background; floor : of the disc on which bodies stand, which fades to the background
-    cell, section : of the lines on it; obstacle : of what stands still; text : of legends in films
+    obstacle : of what stands still; text : of legends in films
     """
 
     top: Color
     bottom: Color
     floor: Color
-    cell: Color
-    section: Color
     obstacle: Color
     text: Color
 
 
-BRIGHT = Theme(
-    (236, 242, 250), (205, 217, 233), (232, 236, 243), (210, 216, 226), (176, 184, 198), (196, 201, 210), (44, 50, 60)
-)
-DARK = Theme((44, 50, 61), (20, 23, 29), (58, 64, 76), (74, 81, 95), (98, 106, 122), (104, 112, 128), (226, 230, 236))
+# What the page's light makes of its own: a film does not light them.
+BRIGHT = Theme((214, 224, 238), (238, 242, 247), (216, 218, 224), (196, 201, 210), (44, 50, 60))
+DARK = Theme((20, 23, 29), (46, 51, 61), (64, 69, 79), (104, 112, 128), (226, 230, 236))
 
 
 def theme(dark: bool) -> Theme:
