@@ -94,6 +94,7 @@ class Page {
       stage.show(this.shown, quality.coarse);
       stage.move(this.player?.place ?? 0);
       view.follow(stage.middle(this.shown.follow));
+      if (!this.player) view.include(stage.bodies);
       look.cast(renderer, stage.scene);
       this.plots.move(this.player?.time ?? Infinity);
     }

@@ -94,6 +94,11 @@ export class Stage {
     }
   }
 
+  /** The points (n, 3) of all bodies. */
+  get bodies(): Float32Array {
+    return this.points.subarray(0, 3 * this.block.description.stitches[0]);
+  }
+
   /** The middle of the points of a body; null for -1. */
   middle(number: number): Vector3 | null {
     const body = this.block.description.bodies[number];

@@ -1,6 +1,6 @@
 // The camera and the pointer: turned, moved and brought near beside bodies, which are pulled, pinned and centered.
 
-import { PerspectiveCamera, Plane, type Ray, Raycaster, Vector2, Vector3 } from "three";
+import { Box3, PerspectiveCamera, Plane, type Ray, Raycaster, Vector2, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Block } from "./data.ts";
 
@@ -47,12 +47,14 @@ export class View {
   private fitted: string | null = "fit"; // the view that shows the whole scene, until somebody moves the camera
   private free = [1, 1]; // shares of width and height that panel and bar leave
   private followed: Vector3 | null = null;
+  private seen: Box3; // all that was to be seen since the start
   private readonly end = new AbortController();
 
   /** `panel` is the width that the picture leaves free on its right [pixels]. */
   constructor(block: Block, canvas: HTMLCanvasElement, panel: number, touch: Touch) {
     [this.block, this.panel] = [block, panel];
     const { up, center, radius } = block.description;
+    this.seen = new Box3().setFromArray(block.array(block.description.outline));
     this.camera.up.set(...up);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.minDistance = 0.05 * radius;
@@ -92,7 +94,11 @@ export class View {
     const right = new Vector3(...up).cross(back).normalize(), upward = back.clone().cross(right);
     const slope = Math.tan((this.camera.fov * Math.PI) / 360);
     const slopes = [slope * this.camera.aspect * this.free[0], slope * this.free[1]];
-    const middle = new Vector3(...center), points = this.block.array(outline);
+    const middle = new Vector3(...center), { min, max } = this.seen;
+    // The bounds where bodies have left those of the start.
+    const first = this.block.array(outline), left = !new Box3().setFromArray(first).containsBox(this.seen);
+    const corners = [min, max].flatMap((a) => [min, max].flatMap((b) => [min, max].flatMap((c) => [a.x, b.y, c.z])));
+    const points = left ? corners : first;
     const [target, distance] = framed(points, middle, [right, upward, back], slopes);
     this.controls.target.copy(target);
     this.camera.position.copy(target).addScaledVector(back, distance);
@@ -101,6 +107,17 @@ export class View {
     this.camera.updateProjectionMatrix();
     this.controls.update();
     this.fitted = name;
+  }
+
+  /** Shows also where bodies have gone, at most five times as far, unless somebody has moved the camera. */
+  include(points: Float32Array): void {
+    const { center, radius } = this.block.description, most = new Vector3().setScalar(5 * radius);
+    const now = new Box3().setFromArray(points), farthest = new Box3().setFromCenterAndSize(new Vector3(...center), most);
+    now.intersect(farthest);
+    // Neither one that is held nor one that gets a little wider moves the picture.
+    if (!this.fitted || !this.controls.enabled || now.isEmpty() || this.seen.clone().expandByScalar(0.15 * radius).containsBox(now)) return;
+    this.seen.union(now.expandByScalar(0.1 * radius)).intersect(farthest.expandByScalar(0.1 * radius));
+    this.fit(this.fitted);
   }
 
   /** Moves with a point that moves; null ends that. */

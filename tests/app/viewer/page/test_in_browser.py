@@ -86,7 +86,8 @@ def test_nothing_is_drawn_while_time_stands(still):
 def test_a_body_follows_the_mouse_until_it_is_released(resting):
     screen, mouse = resting.screen, resting.tab.mouse
     low = resting.red()[1]
-    camera = resting.tab.evaluate("supplePage.view.camera.position.toArray()")
+    turn = "supplePage.view.camera.quaternion.toArray()"
+    camera = resting.tab.evaluate(turn)
     grip, up = resting.middle() + np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.2, 0.0])
     mouse.move(*screen.place(grip))
     mouse.down()
@@ -98,7 +99,9 @@ def test_a_body_follows_the_mouse_until_it_is_released(resting):
     mouse.up()
     screen.wait(lambda: not resting.snapshot().grabs, "the end of the spring")
     screen.wait(lambda: resting.middle()[1] < 0.35, "the fall")
-    assert resting.tab.evaluate("supplePage.view.camera.position.toArray()") == camera
+    np.testing.assert_allclose(resting.tab.evaluate(turn), camera, atol=1e-9)
+    resting.tab.reload()  # the camera has shown where the ball was
+    screen.holds("globalThis.supplePage?.pictures > 0")
 
 
 def test_a_drag_beside_a_body_turns_the_camera(still):
@@ -153,6 +156,23 @@ def test_a_field_is_asked_for_and_has_a_legend(still):
     still.screen.wait(lambda: still.tab.locator("#legend .low").inner_text() == "0.98", "the legend")
     still.tab.locator("[data-name='field'] select").select_option("body")
     still.screen.wait(lambda: still.snapshot().tet_quantity is None, "no field")
+
+
+def test_the_camera_shows_where_bodies_go_until_somebody_moves_it(still):
+    tab, at = still.tab, "supplePage.view.camera.position.toArray()"
+    before = np.array(tab.evaluate(at))
+    include = "(by) => supplePage.view.include(supplePage.stage.bodies.map((x, k) => x + (k % 3 ? 0 : by)))"
+    tab.evaluate(include, 1.0)
+    assert np.linalg.norm(np.array(tab.evaluate(at))) > np.linalg.norm(before) + 0.1
+    x, y = still.screen.place(still.middle() + np.array([1.0, 0.0, 0.0]))
+    assert 0 < x < 720 - 250
+    assert 0 < y < 420
+    tab.evaluate("supplePage.view.fitted = null")
+    there = tab.evaluate(at)
+    tab.evaluate(include, 3.0)
+    assert tab.evaluate(at) == there
+    tab.reload()
+    still.screen.holds("globalThis.supplePage?.pictures > 0")
 
 
 def test_plots_grow_with_time_and_begin_anew(still):
