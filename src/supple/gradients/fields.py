@@ -1,8 +1,7 @@
 """Derivatives by fields with an entry for every tet or vertex, in one pass over the elements of each substep.
 
 The product of forces l with the gradient of a tet's energy W is the derivative of W along l. Energies of elastic tets,
-and of their damping, are proportional to the moduli of the tet. Of rest shapes every tet is moved on its own, so that
-24 passes give the derivatives by all vertices.
+and of their damping, are proportional to the moduli of the tet; by rest shapes they have derivatives in closed form.
 """
 
 from __future__ import annotations
@@ -29,8 +28,8 @@ from supple.solvers.implicit.stepping.workspace import Workspace
 
 Floats = NDArray[np.float64]
 
-# Of the smallest body: how far a difference of energies goes. Of the edges of a tet: how far its rest shape is moved.
-_ALONG, _REST = 1e-5, 1e-5
+# Of the smallest body: how far a difference of energies goes.
+_ALONG = 1e-5
 
 
 def by_moduli(replay: Replay, forces: Floats, contact: IPCContact | None) -> Floats:
@@ -63,7 +62,12 @@ def _along(term: Elasticity | Damping, replay: Replay, forces: Floats) -> Floats
 
 
 class RestShapes:
-    """The tets of a system, with the rest shape of each moved along every axis of every corner.
+    """The tets of a system, apart from each other, so that the forces of each are known.
+
+    An energy E = V W(F) has the derivative E B_a - F^T f_a by the rest position of corner a = 1, 2, 3, with the rows
+    B_a of B = Dm^-1 and the forces f_a = dE/dx_a; that of corner 0 makes their sum zero.
+
+    Source: Eshelby, "The elastic energy-momentum tensor" (1975).
 
     Raises
     ------
@@ -75,24 +79,25 @@ class RestShapes:
             raise SolverError(
                 "gradient: rest shapes of tets that are quadratic, damped or flow have no derivative here"
             )
-        self.system, self.sides = system, []
-        corners = system.rest_positions[system.tets]
-        edges = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2).min(axis=1)
-        self.steps = _REST * edges
-        for corner in range(4):
-            for axis in range(3):
-                for sign in (1.0, -1.0):
-                    moved = corners.copy()
-                    moved[:, corner, axis] += sign * self.steps
-                    Dm = np.swapaxes(moved[:, 1:] - moved[:, :1], 1, 2)
-                    volumes = np.linalg.det(Dm) / 6.0
-                    inverse = np.ascontiguousarray(np.linalg.inv(Dm))
-                    changed = replace(system, rest_shape_inverse=inverse, rest_volumes=volumes)
-                    self.sides.append((elasticity_of(changed), volumes))
+        apart = np.arange(system.tets.size, dtype=np.int32).reshape(-1, 4)
+        self.system, self.B = system, system.rest_shape_inverse
+        self.elasticity = elasticity_of(replace(system, tets=apart, rest_positions=np.zeros((system.tets.size, 3))))
+
+    def forces(self, x: Floats) -> Floats:
+        """(m, 3, 3) derivatives of energies by rest positions of corners 1 to 3, at positions x (n, 3)."""
+        corners = x[self.system.tets]
+        own, pulls = np.ascontiguousarray(corners.reshape(-1, 3)), np.zeros((self.system.tets.size, 3))
+        self.elasticity.add_gradient(own, pulls)
+        F = np.einsum("mai,maj->mij", corners[:, 1:] - corners[:, :1], self.B)
+        by_forces = np.einsum("mij,mai->maj", F, pulls.reshape(-1, 4, 3)[:, 1:])
+        return self.elasticity.energies(own)[:, None, None] * self.B - by_forces
 
     def derivatives(self, replay: Replay, forces: Floats) -> Floats:
         """(n, 3) by the rest positions of vertices, of forces (n, 3) on a substep's equations."""
-        system, plan = self.system, replay.plan
+        system, plan, out = self.system, replay.plan, np.zeros_like(forces)
+        most = float(np.abs(forces).max(initial=0.0))
+        if most == 0.0:
+            return out
         pulls = np.tile(system.gravity, (len(forces), 1))
         for load in system.loads:
             if isinstance(load, MassLoad):
@@ -102,10 +107,11 @@ class RestShapes:
         lags = 0.0 if plan.scale is None else (replay.x[: len(pulls)] - plan.predicted[: len(pulls)]) / plan.scale
         per_mass = np.einsum("ij,ij->i", forces[: len(pulls)], lags - pulls)[system.tets].sum(axis=1)
         densities = np.concatenate([_densities(part) for part in system.bodies])
-        found = [_along(one, replay, forces) + 0.25 * densities * volumes * per_mass for one, volumes in self.sides]
-        by_corner = (np.array(found[::2]) - np.array(found[1::2])) / (2.0 * self.steps)
-        out = np.zeros_like(forces)
-        np.add.at(out, system.tets, by_corner.T.reshape(-1, 4, 3))
+        e = _ALONG * replay.workspace.diagonal / most
+        by_corner = (self.forces(replay.x + e * forces) - self.forces(replay.x - e * forces)) / (2.0 * e)
+        by_corner += (0.25 * densities * system.rest_volumes * per_mass)[:, None, None] * self.B
+        np.add.at(out, system.tets[:, 1:], by_corner)
+        np.subtract.at(out, system.tets[:, 0], by_corner.sum(axis=1))
         return out
 
 

@@ -166,8 +166,8 @@ class Sensitivity:
         Parameters
         ----------
         parameters : numbers of those to differentiate by; None: all. Each costs two evaluations of each step's forces.
-        moduli, rest : whether to differentiate by the moduli of every tet, and by rest positions: in all, a pass or 24
-            passes over the tets of each step. Contact's areas count as constant.
+        moduli, rest : whether to differentiate by the moduli of every tet, and by rest positions: in all, two passes
+            each over the tets of each step. Contact's areas count as constant.
         """
         p = _vector(p)
         first, workspace = self._begun(p)
