@@ -27,6 +27,7 @@ from supple.model.state import State
 from supple.model.system import BodyRange, System
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.results.frame import Frame
+from supple.results.readings.sensor_readings import angle_of
 from supple.scene.loads.points import point_corners
 from supple.scene.rigid.pose import rotation_of
 from supple.scene.rigid.rigid_body import RigidBody
@@ -160,23 +161,14 @@ def _sensor(asked: Asked, system: System, state: State) -> Reading:
 
 
 def _angle(sensor: AngleSensor, rest: Floats, x: Floats) -> tuple[float, Floats]:
-    """As `supple.results.readings.sensor_readings` has it, and its derivative (k, 3) by x (k, 3).
+    """The angle, and its derivative (k, 3) by x (k, 3).
 
-    With A = sum x X^T = R S, a turn R exp([w]) of R obeys (tr S - S) w = sum X x (R^T dx).
+    With A = sum x X^T = R S, a turn of R to R exp([w]) obeys (tr S - S) w = sum X x (R^T dx).
     """
-    from scipy.spatial.transform import Rotation
-
     arms, R = rest - rest.mean(axis=0), rotation_of(rest, x)
     S = R.T @ (x - x.mean(axis=0)).T @ arms
-    *vector, scalar = Rotation.from_matrix(R).as_quat(canonical=True)
-    v, length = np.array(vector), float(np.linalg.norm(vector))
-    axis = np.asarray(sensor.axis) if sensor.axis is not None else v / (length or 1.0)
-    along = float(axis @ v)
-    # 2 atan2(a . v, s) where the quaternion (v, s) changes by half of (s w + v x w, -v . w).
-    by_turn = (scalar * (scalar * axis + np.cross(axis, v)) + along * v) / (scalar**2 + along**2)
-    turned = np.linalg.solve(np.trace(S) * np.eye(3) - S, by_turn)
-    by = np.cross(turned, arms) @ R.T
-    return 2.0 * float(np.arctan2(along, scalar)), by
+    angle, by_turn = angle_of(sensor, R)
+    return angle, np.cross(np.linalg.solve(np.trace(S) * np.eye(3) - S, by_turn), arms) @ R.T
 
 
 def _joint(asked: Asked, system: System, state: State) -> Reading:

@@ -115,13 +115,22 @@ def _angle(sensor: AngleSensor, part: BodyRange, x: NDArray[np.float64]) -> floa
     body = part.body
     start = body.place(body.points)
     rows = sensor.select(start)
-    turn = Rotation.from_matrix(rotation_of(start[rows], body.embedded.positions(x[part.vertices])[rows]))
-    if sensor.axis is None:
-        return float(turn.magnitude())
-    # The part of the rotation about the axis: swing and twist (Dobrowolski, "Swing-twist decomposition in Clifford
-    # algebra", 2015).
-    *vector, scalar = turn.as_quat(canonical=True)
-    return 2.0 * float(np.arctan2(np.asarray(sensor.axis) @ vector, scalar))
+    return angle_of(sensor, rotation_of(start[rows], body.embedded.positions(x[part.vertices])[rows]))[0]
+
+
+def angle_of(sensor: AngleSensor, R: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """The angle of a rotation (3, 3) [rad], and its derivative (3,) by a turn w of R to R exp([w]).
+
+    About an axis, it is that of the part of the rotation about it: swing and twist (Dobrowolski, "Swing-twist
+    decomposition in Clifford algebra", 2015).
+    """
+    *vector, s = Rotation.from_matrix(R).as_quat(canonical=True)
+    v = np.array(vector)
+    axis = v / (float(np.linalg.norm(v)) or 1.0) if sensor.axis is None else np.asarray(sensor.axis)
+    along = float(axis @ v)
+    # The quaternion (v, s) changes by half of (s w + v x w, -v . w).
+    by_turn = (s * (s * axis + np.cross(axis, v)) + along * v) / (s**2 + along**2)
+    return 2.0 * float(np.arctan2(along, s)), by_turn
 
 
 def _touched(triangles: NDArray[np.int32], x: NDArray[np.float64], contacts: ContactPoints | None) -> Touched:
