@@ -59,6 +59,7 @@ CASES = [
     (scenes.inflated, "volume", "bar", 1e-4),
     (scenes.inflated, "pressure", "bar", 1e4),
     (gas, "pressure", "bar", 1e4),
+    (scenes.filled, "pressure", "bar", 1e4),
     (scenes.tendon, "length", "cable", 0.3),
     (swing, "joint", "shoulder", 0.1),
     (swing, "joint", "elbow", 0.1),
@@ -74,6 +75,13 @@ def test_of_states(scene_of, quantity, of, target):
 def test_forces_of_obstacles(scene_of):
     solver = implicit("backward_euler" if scene_of is scenes.on_moving_floor else "bdf2")
     compare(scene_of, 4, "reaction", "floor", [0.0, 1.0, 0.0], solver, steps=8)
+
+
+@pytest.mark.parametrize("iterations", [1, 30])
+@pytest.mark.parametrize("scene_of", [scenes.frictionless, scenes.sliding, scenes.on_ball])
+def test_contact_of_a_body(scene_of, iterations):
+    solver = implicit("backward_euler" if iterations == 30 else "bdf2", iterations)
+    compare(scene_of, 4, "contact", "bar", [0.0, 1.0, 0.0], solver, steps=8)
 
 
 def compare(scene_of, q, quantity, of, target, solver=None, steps=4):
@@ -96,7 +104,7 @@ def test_what_has_no_derivative_says_so():
 
     assert "give the 'reaction' of what it touches" in of(bent, "sensor", "touch")
     assert "sensor 'bond' does not exist; did you mean 'bend'?" in of(bent, "sensor", "bond")
-    assert "its volume is given" in of(scenes.filled, "pressure", "bar")
+    assert "body 'bat' does not exist" in of(bent, "contact", "bat", [0.0, 0.0, 0.0])
     assert "joint 'knee' does not exist" in of(swing, "joint", "knee")
     assert "has no coordinate" in of(scenes.chain, "joint", "shoulder")
     with pytest.raises(sp.SceneError, match="give a number, or one for each frame"):

@@ -55,6 +55,20 @@ class StateAdjoint:
 
 
 @dataclass(frozen=True, eq=False)
+class ForceAdjoint:
+    """Derivatives of a loss by forces at the end of a step: at pinned vertices (n, 3), of contact (n, 3), whose minus
+    act on bodies [1/N]; and by those of actuators with a given coordinate (h,)."""
+
+    pins: Floats
+    contact: Floats
+    held: Floats
+
+    @classmethod
+    def zeros(cls, n: int, held: int) -> ForceAdjoint:
+        return cls(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(held))
+
+
+@dataclass(frozen=True, eq=False)
 class StepAdjoint:
     """What the parameters' derivatives need of one substep.
 
@@ -64,6 +78,7 @@ class StepAdjoint:
     multipliers : (c,) u, of the conditions `rows` among all; held : (l,) which laws of joints are conditions
     end : (n, 3) dL/dx; begin : (n, 3) derivative by the positions where it begins
     internal : (k, 11) by the internal variables at the end; anchors : (a, 3) by where pins are then
+    contact : (n, 3) by forces of contact, as in `ForceAdjoint`
     """
 
     forces: Floats
@@ -74,12 +89,15 @@ class StepAdjoint:
     begin: Floats
     internal: Floats
     anchors: Floats
+    contact: Floats
 
     def value(self, replay: Replay) -> float:
         """A function of the scene alone, whose derivative by the parameters is that of the loss in this substep."""
         forces, system = self.forces.copy(), replay.workspace.system
         system.welding.follow(forces)
         total = np.einsum("ij,ij->", forces, replay.gradient) + np.einsum("ij,ij->", self.end, replay.x)
+        if self.contact.any():
+            total += np.einsum("ij,ij->", self.contact, replay.contact.gradient(replay.x))
         if len(self.rows):
             total += self.multipliers @ replay.conditions(self.held)[self.rows]
         if len(self.internal):
@@ -94,13 +112,13 @@ class StepAdjoint:
         return float(total)
 
 
-def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[StepAdjoint, StateAdjoint]:
+def step_adjoint(replay: Replay, after: StateAdjoint, by_forces: ForceAdjoint) -> tuple[StepAdjoint, StateAdjoint]:
     """The adjoint of a substep, and that of the state where it begins.
 
     Parameters
     ----------
     after : of the state at its end
-    seeds : (n, 3) derivatives of the loss by the gradient g at pinned vertices, whose minus is their reaction [1/N]
+    by_forces : of the forces at its end
 
     Raises
     ------
@@ -108,7 +126,7 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     """
     plan = replay.plan
     welding = replay.workspace.system.welding
-    seeds = seeds.copy()
+    seeds = by_forces.pins.copy()
     welding.follow(seeds)
     by_end = after.x.copy()
     rate = 0.0 if plan.scale is None else 1.0 / float(np.sqrt(plan.scale))
@@ -116,11 +134,15 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     if len(after.internal):
         add_by_end(replay, after.internal, by_end)
     equations = Equations.of(replay)
+    contact, by_contact = by_forces.contact, np.zeros_like(by_end)
+    if contact.any():
+        by_contact = equations.contact_product(contact, transposed=True)
+        by_end += by_contact
     right = by_end + equations.transposed_product(seeds)
-    forces, multipliers = equations.solve_transposed(-right, seeds)
+    forces, multipliers = equations.solve_transposed(-right, seeds, by_forces.held)
     forces += seeds
     welding.follow(forces)
-    begin = _by_state(replay, after, forces, rate)
+    begin = _by_state(replay, after, forces, contact, rate)
     if len(after.internal):
         begin.internal = by_begin(replay, forces, after.internal)
     add_by_loads(replay, forces, begin.x)
@@ -129,20 +151,21 @@ def step_adjoint(replay: Replay, after: StateAdjoint, seeds: Floats) -> tuple[St
     of_conditions[rows] = multipliers
     add_by_joints(replay, forces, of_conditions, held, begin.x)
     end = after.x + rate * after.v
-    whole = end + equations.transposed_product(forces) + (equations.C.T @ multipliers).reshape(-1, 3)
+    whole = end + by_contact + equations.transposed_product(forces) + (equations.C.T @ multipliers).reshape(-1, 3)
     anchors = whole[replay.workspace.system.pinned_vertices]
-    return StepAdjoint(forces, multipliers, rows, held, end, begin.x, after.internal, anchors), begin
+    return StepAdjoint(forces, multipliers, rows, held, end, begin.x, after.internal, anchors, contact), begin
 
 
-def _by_state(replay: Replay, after: StateAdjoint, forces: Floats, rate: float) -> StateAdjoint:
-    """What forces (n, 3) on the equations, and the velocities at the end, give to the state at the beginning."""
+def _by_state(replay: Replay, after: StateAdjoint, forces: Floats, contact: Floats, rate: float) -> StateAdjoint:
+    """What forces (n, 3) on the equations, `contact` (n, 3) on its part alone, and the velocities at the end, give to
+    the state at the beginning."""
     plan, x, before = replay.plan, replay.x, replay.kept.before
     out = StateAdjoint.zeros(len(x), 0)
     for lag in replay.lags:
-        pushed = lag.friction.by_start(x, forces)
+        pushed = lag.friction.by_start(x, forces + contact)
         out.x += pushed
         if not replay.kept.at_end:
-            out.x += (lag.derivative(x).T @ forces.ravel()).reshape(-1, 3)
+            out.x += (lag.derivative(x).T @ (forces + contact).ravel()).reshape(-1, 3)
     if plan.scale is None:
         return out
     out.x += after.past_x

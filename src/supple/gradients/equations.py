@@ -84,15 +84,29 @@ class Equations:
         own = self._symmetric_product(forces)
         return own if self.lag is None else own + (self.lag.T @ forces.ravel()).reshape(-1, 3)
 
-    def solve(self, right: Floats, of_conditions: Floats) -> tuple[Floats, Floats]:
-        """The way (n, 3) of the unknowns, zero at pins, that changes g by `right` (n, 3) and conditions by (c,); and
-        (n, 3) the change of g by what the multipliers do."""
-        way, multipliers = self._solved(right, of_conditions, "N")
-        return way, (self.C.T @ multipliers).reshape(-1, 3)
+    def contact_product(self, way: Floats, *, transposed: bool = False) -> Floats:
+        """(n, 3) the derivative of contact's part of g by x, times a way (n, 3)."""
+        blocks, out = HessianBlocks.zeros(0, len(way)), np.zeros_like(way)
+        for term in self.replay.contact.terms:
+            term.add_hessian(self.replay.x, blocks, False)
+        for part in blocks.couplings:
+            part.add_product(way, out)
+        if self.lag is not None:
+            out += ((self.lag.T if transposed else self.lag) @ way.ravel()).reshape(-1, 3)
+        return out
 
-    def solve_transposed(self, right: Floats, seeds: Floats) -> tuple[Floats, Floats]:
-        """The forces (n, 3), zero at pins, and u (c,) for a `right` side (n, 3) and forces at pins (n, 3)."""
-        return self._solved(right, -(self.C @ seeds.ravel()), "T")
+    def solve(self, right: Floats, of_conditions: Floats) -> tuple[Floats, Floats, Floats]:
+        """The way (n, 3) of the unknowns, zero at pins, that changes g by `right` (n, 3) and conditions by (c,); (n, 3)
+        the change of g by what the multipliers do; and these (c,)."""
+        way, multipliers = self._solved(right, of_conditions, "N")
+        return way, (self.C.T @ multipliers).reshape(-1, 3), multipliers
+
+    def solve_transposed(self, right: Floats, pins: Floats, held: Floats) -> tuple[Floats, Floats]:
+        """The forces (n, 3), zero at pins, and u (c,) for a `right` side (n, 3), forces at pins (n, 3), and derivatives
+        of the loss by forces of actuators with a given coordinate, which are minus their multipliers (h,)."""
+        by_multipliers = np.zeros(self.count)
+        by_multipliers[: len(held)] = -held
+        return self._solved(right, -(self.C @ pins.ravel()) - by_multipliers[self.rows], "T")
 
     def _solved(self, right: Floats, of_conditions: Floats, way: str) -> tuple[Floats, Floats]:
         tools = self.replay.workspace.tools

@@ -140,6 +140,11 @@ class Replay:
             terms += [barrier, *frictions]
         return cls(kept, workspace, posed, x, Objective(terms), joints, frictions, lags)
 
+    @cached_property
+    def contact(self) -> Objective:
+        """The barrier and friction alone."""
+        return Objective([term for term in self.objective.terms if isinstance(term, Barrier | Friction)])
+
     @property
     def plan(self) -> Plan:
         return self.posed.plan

@@ -11,10 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from supple.errors import SceneError
-from supple.gradients.quantities import QUANTITIES, driver_of, force_of, sum_of
+from supple.gradients.adjoint import ForceAdjoint
+from supple.gradients.quantities import QUANTITIES, force_of, forces_matrix, quantity_of
+from supple.gradients.tangent import StateTangent
 from supple.kinds.checks import finite_vector
 from supple.kinds.suggestion import suggestion
 from supple.mesh.checked_arrays import vertex_array
+from supple.model.loads.actuators.laws import GivenValue
 from supple.model.state import State
 from supple.model.system import System
 from supple.results.frame import Frame
@@ -26,17 +29,13 @@ OfScene = Callable[[System], float]
 
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """Derivatives of a loss by what one frame has: positions x and velocities v (n, 3), and forces of pins and
-    obstacles (N, 3) on vertices; of_scene : by the scene, at fixed positions and velocities, as functions of that."""
+    """Derivatives of a loss by what one frame has: positions x and velocities v (n, 3), and forces; of_scene : by the
+    scene, at fixed positions and velocities, as functions of that."""
 
     x: Floats
     v: Floats
-    pins: Floats
+    forces: ForceAdjoint
     of_scene: list[OfScene]
-
-    @classmethod
-    def zeros(cls, n: int, whole: int) -> Seeds:
-        return cls(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((whole, 3)), [])
 
 
 class Misfit:
@@ -46,15 +45,15 @@ class Misfit:
     ----------
     quantity : what frames read: "positions" [m] or "velocities" [m/s] of a body's vertices; the "center" of these,
         which is the mean of their positions [m]; the "reaction" of a pin or obstacle, its force on bodies [N]; the
-        angle or distance of a "sensor" [rad], [m]; the coordinate of a "joint" [rad], [m]; the "volume" or "pressure"
-        of a cavity [m^3], [Pa], the latter of given pressures or gases; the "length" of a cable [m].
+        force of all "contact" on a body [N]; the angle or distance of a "sensor" [rad], [m]; the coordinate of a
+        "joint" [rad], [m]; the "volume" or "pressure" of a cavity [m^3], [Pa]; the "length" of a cable [m].
     of : name of the body, obstacle, sensor, joint, cavity or cable, or name or label of the pin, see
         `frame.report.details.reaction_forces`.
-    target : what was measured, in the unit of the quantity: a number, or (f,) of every frame; of a center or reaction
+    target : what was measured, in the unit of the quantity: a number, or (f,) of every frame; of a center or force
         (3,) or (f, 3); of vertices (k, 3) or (f, k, 3). What is NaN was not measured.
     vertices : (k,) rows of `frame.positions[body]`; None: all.
     points : (k, 3) places in the body's own coordinates instead [m], which move with the tets that are there.
-    along : (3,) of a center or reaction: the direction whose component is read, as a number [-].
+    along : (3,) of a center or force: the direction whose component is read, as a number [-].
     frames : (f,) numbers of frames, from 1; None: the last one, or of a target for f frames the last f.
     weight : factor of a square.
 
@@ -119,30 +118,31 @@ class Misfit:
 
         whole : the system with obstacles' vertices
         """
-        quantity = QUANTITIES[self.quantity]
-        if quantity.read is None:
-            found = sum_of(whole.pins[driver_of(self, frame.system)].vertices, len(whole.rest_positions))
+        read = quantity_of(self, frame.system).read
+        if read is None:
+            found = forces_matrix(self, frame.system, whole)
         else:
-            found = quantity.read(self, frame.system, frame.state).matrix
+            found = read(self, frame.system, frame.state).matrix
         found = found if self.along is None else self.along[None] @ found
         known = np.isfinite(np.atleast_1d(self.target[row])).ravel()
         return csr_array((np.sqrt(self.weight) * known)[:, None] * found)
 
     def add_seeds(self, frame: Frame, row: int, by_residual: Floats, whole: System, seeds: Seeds) -> None:
         """Add the derivatives of a loss with these derivatives by `residuals`."""
-        out = getattr(seeds, QUANTITIES[self.quantity].by)
-        out += (self.matrix(frame, row, whole).T @ by_residual.ravel()).reshape(-1, 3)
+        by = quantity_of(self, frame.system).by
+        out = getattr(seeds if by in ("x", "v") else seeds.forces, by)
+        out += (self.matrix(frame, row, whole).T @ by_residual.ravel()).reshape(out.shape)
         if self.is_of_scene(frame.system):
             weights, state = np.sqrt(self.weight) * by_residual, frame.state
             seeds.of_scene.append(lambda system: float((weights * self.read(system, state)).sum()))
 
-    def tangents(self, frame: Frame, row: int, whole: System, changes: Mapping[str, Floats], sides: Any) -> Floats:
-        """(r,) the change of `residuals` with changes of what quantities are functions of, and with the scene.
+    def tangents(self, frame: Frame, row: int, whole: System, changes: StateTangent, sides: Any) -> Floats:
+        """(r,) the change of `residuals` with those of the end of a step, and with the scene.
 
         sides : the systems on both sides of a parameter, and the change from one to the other
         """
         matrix = self.matrix(frame, row, whole)
-        change = matrix @ changes[QUANTITIES[self.quantity].by].ravel()[: matrix.shape[1]]
+        change = matrix @ getattr(changes, quantity_of(self, frame.system).by).ravel()[: matrix.shape[1]]
         if self.is_of_scene(frame.system):
             above, below, step = sides
             scene = (self.read(above, frame.state) - self.read(below, frame.state)) / step
@@ -154,11 +154,11 @@ class Misfit:
         bodies, on sensors, joints and gases."""
         if self.quantity in ("positions", "velocities", "center") and self.points is None:
             return any(part.rigid for part in system.bodies if part.name == self.of)
-        return QUANTITIES[self.quantity].read is not None
+        return quantity_of(self, system).read is not None
 
     def read(self, system: System, state: State, frame: Frame | None = None) -> Floats:
         """What is read of a state; of forces, of the frame."""
-        read = QUANTITIES[self.quantity].read
+        read = quantity_of(self, system).read
         if read is None:
             assert frame is not None
             values = force_of(self, frame)
@@ -206,7 +206,9 @@ class Loss:
     def at(self, frame: Frame, steps: int, whole: System) -> tuple[float, Seeds]:
         """The share of a frame, and its derivatives; whole : the system with obstacles' vertices"""
         system = frame.system
-        seeds, total = Seeds.zeros(len(system.rest_positions), len(whole.rest_positions)), 0.0
+        held = sum(isinstance(one.law, GivenValue) for one in system.actuators)
+        x, v = np.zeros((2, len(system.rest_positions), 3))
+        seeds, total = Seeds(x, v, ForceAdjoint.zeros(len(whole.rest_positions), held), []), 0.0
         for misfit, row in self.rows(frame.index, steps):
             residuals = misfit.residuals(frame, row)
             total += float((residuals**2).sum())

@@ -21,7 +21,7 @@ from supple.model.joints.at_state import coordinates_at, reported
 from supple.model.joints.functions import COSINE, derivatives
 from supple.model.joints.geometry import JointGeometry
 from supple.model.loads.actuators.actuator import Actuator
-from supple.model.loads.actuators.laws import Held
+from supple.model.loads.actuators.laws import GivenValue
 from supple.model.pin_reactions import pin_labels
 from supple.model.state import State
 from supple.model.system import BodyRange, System
@@ -41,6 +41,7 @@ Floats = NDArray[np.float64]
 class Asked(Protocol):
     """What a reading is of: a `Misfit`."""
 
+    quantity: str
     of: str
     vertices: NDArray[np.int64] | None
     points: Floats | None
@@ -62,7 +63,8 @@ class Quantity(NamedTuple):
     Attributes
     ----------
     axes : how many a reading has: 0 of a number, 1 of a vector, 2 of vectors
-    by : what it is a function of: "x", "v", or "pins", the forces of pins and obstacles
+    by : what it is a function of: "x", "v", or forces of a step: "pins", those of pins and obstacles, "contact", and
+        "held", those of actuators with a given coordinate
     read : what is asked, system, state -> reading; None of forces, which the report of a step has
     """
 
@@ -210,8 +212,6 @@ def _length(asked: Asked, system: System, state: State) -> Reading:
 def _pressure(asked: Asked, system: System, state: State) -> Reading:
     one, volume, by = _actuator(asked, system, state, "cavity")
     law = one.law.at(state.time, 0.0)
-    if isinstance(law, Held):
-        raise SceneError(f"{asked.label}: its volume is given, and its pressure has no derivative here; give a gas")
     return _number(law.force(volume), -law.stiffness(volume) * by)
 
 
@@ -231,15 +231,47 @@ def driver_of(asked: Asked, system: System) -> int:
     raise SceneError(f"{asked.label}: pin or obstacle {asked.of!r} does not exist; {suggestion(asked.of, names)}")
 
 
-def sum_of(vertices: NDArray[np.int32], n: int) -> Any:
+def sum_of(vertices: NDArray[np.integer], n: int) -> Any:
     """(3, 3 n) the matrix that takes forces on all vertices to their sum over some."""
     row = csr_array((np.ones(len(vertices)), (np.zeros(len(vertices), int), vertices)), shape=(1, n))
     return csr_array(kron(row, eye_array(3)))
 
 
+def quantity_of(asked: Asked, system: System) -> Quantity:
+    """What a system has of the quantity that is asked for: the pressure of a given volume is a force of the step."""
+    quantity = QUANTITIES[asked.quantity]
+    if asked.quantity == "pressure" and asked.of in _held(system):
+        return Quantity(0, "held", None)
+    return quantity
+
+
+def _held(system: System) -> list[str]:
+    return [one.name for one in system.actuators if isinstance(one.law, GivenValue)]
+
+
+def forces_matrix(asked: Asked, system: System, whole: System) -> Any:
+    """The matrix that takes forces of a step to what is asked for; whole : the system with obstacles' vertices"""
+    by, n = quantity_of(asked, system).by, len(whole.rest_positions)
+    if by == "held":
+        return csr_array(np.eye(len(_held(system)))[[_held(system).index(asked.of)]])
+    if by == "pins":
+        return sum_of(whole.pins[driver_of(asked, system)].vertices, n)
+    part = system.bodies[_chosen(asked.of, [part.name for part in system.bodies], asked.label, "body")]
+    return -sum_of(np.arange(part.vertices.start, part.vertices.stop), n)
+
+
 def force_of(asked: Asked, frame: Frame) -> Floats:
-    """(3,) of a pin or obstacle on bodies [N]."""
+    """What the report of a step has of forces: (3,) [N], or a pressure."""
     system, details = frame.system, frame.report.details
+    by = quantity_of(asked, system).by
+    if by == "held":
+        return np.array(details.cavity_pressure[asked.of])
+    if by == "contact":
+        _chosen(asked.of, [part.name for part in system.bodies], asked.label, "body")
+        assert isinstance(details, ImplicitDetails)
+        return np.sum(
+            [of.get(asked.of, np.zeros(3)) for of in (details.contact_forces, details.friction_forces)], axis=0
+        )
     k, labels = driver_of(asked, system), pin_labels(system)
     if k < len(labels):
         return details.reaction_forces[labels[k]]
@@ -258,4 +290,5 @@ QUANTITIES = {
     "pressure": Quantity(0, "x", _pressure),
     "length": Quantity(0, "x", _length),
     "reaction": Quantity(1, "pins", None),
+    "contact": Quantity(1, "contact", None),
 }

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError, SolverError, SuppleWarning
-from supple.gradients.adjoint import StateAdjoint, StepAdjoint, step_adjoint
+from supple.gradients.adjoint import ForceAdjoint, StateAdjoint, StepAdjoint, step_adjoint
 from supple.gradients.bridges import jax_function, torch_function
 from supple.gradients.check import Check, check
 from supple.gradients.equations import Equations
@@ -136,15 +136,16 @@ class Sensitivity:
             sides.append(side := Side(_STEP * float(self.sizes(p)[k]), above, below, one.state, other.state))
             scenes.append((one.system, other.system, 2.0 * side.step))
         at = [StateTangent.start(side, first.state) for side in sides]
+        contact = any(misfit.quantity == "contact" for misfit in self.loss.misfits)
         residuals, columns, change = [np.zeros(0)], [np.zeros((0, len(p)))], 0.0
         for frame in self._frames(first, workspace):
             for number, taken in enumerate(tape):
                 replay = Replay.of(Kept.of(taken, number == 0), workspace)
                 change, equations = max(change, replay.area_change()), Equations.of(replay)
-                at = [step_tangent(replay, equations, side, one) for side, one in zip(sides, at, strict=True)]
+                pairs = zip(sides, at, strict=True)
+                at = [step_tangent(replay, equations, side, one, contact=contact) for side, one in pairs]
             tape.clear()
-            changes = [{"x": one.x, "v": one.v, "pins": one.forces} for one in at]
-            at = [one.with_vertices(len(first.state.positions)) for one in at]
+            changes, at = at, [one.with_vertices(len(first.state.positions)) for one in at]
             for misfit, row in self.loss.rows(frame.index, self.steps):
                 residuals.append(misfit.residuals(frame, row).ravel())
                 pairs = zip(changes, scenes, strict=True)
@@ -310,13 +311,13 @@ def _backwards(
         at.x += given.x
         at.v += given.v
         whole = len(some[-1].x)
-        at, pins = at.with_vertices(whole), given.pins
+        at, by_forces = at.with_vertices(whole), given.forces
         for one in reversed(some):
             replay = Replay.of(one, workspace)
-            adjoint, at = step_adjoint(replay, at, pins)
+            adjoint, at = step_adjoint(replay, at, by_forces)
             found.append(adjoint)
             changes.append(replay.area_change())
-            pins = np.zeros_like(pins)
+            by_forces = ForceAdjoint.zeros(whole, len(one.held))
         for values in (at.x, at.v):
             placed = np.zeros_like(values)
             placed[n:bodies_end] = values[n:bodies_end]  # points of rigid bodies that something is stitched to

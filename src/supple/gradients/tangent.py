@@ -51,29 +51,40 @@ class Side:
 
 @dataclass(eq=False)
 class StateTangent:
-    """Derivatives by one parameter, named as in `StateAdjoint`; forces : (n, 3) of pins on vertices [N]"""
+    """Derivatives by one parameter, named as in `StateAdjoint`.
+
+    Attributes
+    ----------
+    pins : (n, 3) forces of pins on vertices [N]
+    contact : (n, 3) minus those of contact [N]; zero where they are not asked for
+    held : (h,) of actuators with a given coordinate
+    """
 
     x: Floats
     v: Floats
     past_x: Floats
     past_v: Floats
     internal: Floats
-    forces: Floats
+    pins: Floats
+    contact: Floats
+    held: Floats
 
     @classmethod
     def start(cls, side: Side, at: State) -> StateTangent:
         one, other, e = side.start_above, side.start_below, 2.0 * side.step
         zero = np.zeros_like(at.positions)
         x, v = (one.positions - other.positions) / e, (one.velocities - other.velocities) / e
-        return cls(x, v, zero, zero, np.zeros_like(at.internal), zero)
+        return cls(x, v, zero, zero, np.zeros_like(at.internal), zero, zero, np.zeros(0))
 
     def with_vertices(self, n: int) -> StateTangent:
         """The state at the end of a step, without vertices that only a solver has."""
-        return replace(self, x=self.x[:n], v=self.v[:n], forces=self.forces[:n])
+        return replace(self, x=self.x[:n], v=self.v[:n], pins=self.pins[:n], contact=self.contact[:n])
 
 
-def step_tangent(replay: Replay, equations: Equations, side: Side, at: StateTangent) -> StateTangent:
-    """The tangent at the end of a substep."""
+def step_tangent(
+    replay: Replay, equations: Equations, side: Side, at: StateTangent, *, contact: bool = False
+) -> StateTangent:
+    """The tangent at the end of a substep; contact : whether that of contact's forces is asked for"""
     kept, workspace, plan = replay.kept, replay.workspace, replay.plan
     if kept.first:
         at = _extended(at, kept, side)
@@ -81,24 +92,34 @@ def step_tangent(replay: Replay, equations: Equations, side: Side, at: StateTang
     def equations_at(place: Workspace, changed: Kept) -> Floats:
         there = Replay.of(changed, place)
         of_conditions = there.conditions(equations.held)[equations.rows]
-        return np.concatenate([there.gradient.ravel(), of_conditions, there.x.ravel()])
+        of_contact = there.contact.gradient(there.x).ravel() if contact else np.zeros(0)
+        return np.concatenate([there.gradient.ravel(), of_conditions, of_contact, there.x.ravel()])
 
     size = kept.x.size
     c = len(equations.rows)
+    more = size if contact else 0
     by_scene = side.difference(lambda place, _: equations_at(place, kept))
-    pins = by_scene[size + c :].reshape(-1, 3)
-    way, by_state = pins, np.zeros(size + c)
+    pins = by_scene[size + c + more :].reshape(-1, 3)
+    way, by_state, multipliers = pins, np.zeros(size + c + more), np.zeros(c)
     later = any(there is not kept.before.positions for there in kept.met)
     for _ in range(_PASSES if later else 1):
         e = _step_along(kept, workspace, at, way)
         if e:
             above, below = (equations_at(workspace, _moved(kept, at, way, sign * e)) for sign in (1.0, -1.0))
-            by_state = ((above - below) / (2.0 * e))[: size + c]
+            by_state = ((above - below) / (2.0 * e))[: size + c + more]
             for friction in replay.frictions:
-                by_state[:size] += friction.by_start(replay.x, at.x).ravel()
-        right = -(by_scene[: size + c] + by_state)
-        own, of_multipliers = equations.solve(right[:size].reshape(-1, 3), right[size:])
+                by_start = friction.by_start(replay.x, at.x).ravel()
+                by_state[:size] += by_start
+                by_state[size + c :] += by_start[:more]
+        right = -(by_scene[: size + c + more] + by_state)
+        own, of_multipliers, multipliers = equations.solve(right[:size].reshape(-1, 3), right[size : size + c])
         way = own + pins
+    of_contact = np.zeros_like(way)
+    if contact:
+        # Where pins are is a part of the scene, with which the gradient was differentiated.
+        of_contact = equations.contact_product(own) - right[size + c :].reshape(-1, 3)
+    held = np.zeros(equations.count)
+    held[equations.rows] = -multipliers
     change = equations.product(own) + of_multipliers - right[:size].reshape(-1, 3)
     rate = 0.0 if plan.scale is None else 1.0 / float(np.sqrt(plan.scale))
     one, two = plan.past
@@ -111,7 +132,9 @@ def step_tangent(replay: Replay, equations: Equations, side: Side, at: StateTang
             return place.elasticity_at(time).flowed(kept.x + e * way, begun + e * at.internal, kept.h)
 
         internal = side.difference(flowed)
-    return StateTangent(way, v, at.x, at.v, internal, workspace.system.welding.reduced(change))
+    return StateTangent(
+        way, v, at.x, at.v, internal, workspace.system.welding.reduced(change), of_contact, held[: len(kept.held)]
+    )
 
 
 def _extended(at: StateTangent, kept: Kept, side: Side) -> StateTangent:
