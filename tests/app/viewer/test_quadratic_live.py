@@ -9,7 +9,7 @@ import supple as sp
 from supple.app.viewer.engine.describe import describe
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop
-from supple.app.viewer.from_snapshot import RenderFrameBuilder
+from supple.app.viewer.messages import frame_of
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
 
@@ -24,7 +24,7 @@ def test_it_falls_and_is_drawn():
     (shown,) = described.bodies
     np.testing.assert_array_equal(shown.body.mesh.nodes, ball.nodes)
     loop = SimulationLoop(live, CommandQueue(), None)
-    model = RenderFrameBuilder().frame(replace(loop.snapshot(0.0), description=described)).model
+    model = frame_of(replace(loop.snapshot(0.0), description=described)).model
     np.testing.assert_array_equal(model.tets, ball.tets)
     (drawn,) = model.bodies
     assert drawn.skin.corners.shape == (len(skin.vertices), 10)

@@ -10,8 +10,7 @@ from supple.app.viewer.engine.describe import contact_points, describe, measures
 from supple.app.viewer.engine.scene.changes import change
 from supple.app.viewer.engine.scene.live_scene import LiveScene
 from supple.app.viewer.engine.simulation_loop import SimulationLoop
-from supple.app.viewer.from_snapshot import RenderFrameBuilder
-from supple.app.viewer.messages import measured
+from supple.app.viewer.messages import frame_of, measured
 from supple.app.viewer.protocol import commands
 from supple.app.viewer.protocol.command_queue import CommandQueue
 from supple.app.viewer.protocol.live_source import LiveSource
@@ -63,7 +62,7 @@ def swinging():
 def moment_of(live):
     """What the page draws."""
     snapshot = SimulationLoop(live, CommandQueue(), None).snapshot(0.0)
-    return RenderFrameBuilder().frame(replace(snapshot, description=describe(live))), snapshot
+    return frame_of(replace(snapshot, description=describe(live))), snapshot
 
 
 def test_a_drag_pulls_at_the_point_under_the_mouse_and_a_throw_keeps_the_velocity(live):

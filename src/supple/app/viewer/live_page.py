@@ -20,10 +20,9 @@ from supple.runtime.kernel_count import KernelCount
 
 if TYPE_CHECKING:  # what a scene needs is imported with it: the page is there before
     from supple.app.viewer.engine.engine import Engine
-    from supple.app.viewer.from_snapshot import RenderFrameBuilder
     from supple.app.viewer.protocol.snapshots import Snapshot
     from supple.app.viewer.server import PageServer
-    from supple.results.view.model import RenderFrame
+    from supple.results.view.model import Model, RenderFrame
 
 logger = logging.getLogger(__name__)
 
@@ -65,7 +64,7 @@ class LivePage:
         self._recorded: tuple[float, list[tuple[float, RenderFrame]]] | None = None
         self._restarts = threading.Lock()
         self._end = threading.Event()
-        self._builder: RenderFrameBuilder | None = None
+        self._model: Model | None = None
         self._began, self._error, self._line = time.monotonic(), "", LastLine()
         self._kernels = KernelCount()
 
@@ -207,7 +206,7 @@ class LivePage:
     def _send_newest(self, simulation: Engine) -> None:
         snapshot = simulation.latest()
         if simulation.starts != self._starts:
-            self._starts, self._notice, self._builder = simulation.starts, 0, None
+            self._starts, self._notice, self._model = simulation.starts, 0, None
             simulation.send(self._view)  # the new process does not know it
         if snapshot is None:
             return
@@ -226,11 +225,10 @@ class LivePage:
             self._server.soon(visitor.put, "frame", self._message)
 
     def _show(self, snapshot: Snapshot) -> None:
-        from supple.app.viewer.from_snapshot import RenderFrameBuilder
-        from supple.app.viewer.messages import Messages, plotted
+        from supple.app.viewer.messages import Messages, frame_of, model_of, plotted
 
-        self._builder = self._builder or RenderFrameBuilder()
-        frame, self._snapshot = self._builder.frame(snapshot), snapshot
+        self._model = self._model or model_of(snapshot.description)
+        frame, self._snapshot = frame_of(snapshot, self._model), snapshot
         if self.frame is None or frame.model is not self.frame.model:
             self._number += 1
             self._messages = Messages(frame, plotted(snapshot), self._about)

@@ -11,17 +11,40 @@ from numpy.typing import NDArray
 from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.parameters import PARAMETERS
 from supple.app.viewer.protocol.quantities import pretty_unit, written
-from supple.app.viewer.protocol.snapshots import Snapshot
+from supple.app.viewer.protocol.snapshots import SceneDescription, Snapshot
 from supple.results.page.described import described_motion, described_scene, points_of
 from supple.results.page.packed import Packer
 from supple.results.readings.frame_readings import JointReading
+from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.fields import FIELDS, Limits, Range, color_map, nodal_values
 from supple.results.view.joints import lines_of_joints
-from supple.results.view.model import RenderFrame
+from supple.results.view.model import Model, RenderFrame
 from supple.results.view.surfaces import obstacle_surfaces
 
 _MOST_JOINTS = 12  # in the text
 _ARROW = 0.5  # length of the arrow of the largest force of contact, as a share of the radius of the scene
+
+
+def model_of(scene: SceneDescription) -> Model:
+    """What no frame changes of a live scene."""
+    view = view_of_scene(box_corners(scene.low, scene.high), np.asarray(scene.up), scene.obstacles)
+    return Model(scene.bodies, scene.obstacles, view, scene.stitches, scene.joints)
+
+
+def frame_of(snapshot: Snapshot, model: Model | None = None) -> RenderFrame:
+    """What is drawn of a snapshot; `model` is that of its scene, where it is known."""
+    rotations, translations = snapshot.obstacle_poses
+    poses = np.concatenate([rotations.reshape(-1, 3, 3), translations.reshape(-1, 3, 1)], axis=2)
+    known = snapshot.tet_values is not None and snapshot.tet_quantity is not None
+    return RenderFrame(
+        model or model_of(snapshot.description),
+        snapshot.time,
+        snapshot.positions,
+        poses,
+        pinned=snapshot.pinned.astype(np.int64),
+        tet_values={snapshot.tet_quantity: snapshot.tet_values} if known else {},  # pyright: ignore[reportArgumentType]
+        broken_stitches=snapshot.broken_stitches,
+    )
 
 
 class Messages:
@@ -59,7 +82,8 @@ class Messages:
         """The message of a frame."""
         packer, timing, description = Packer(), snapshot.timing, snapshot.description
         poses = np.nan_to_num([surface.pose(frame) for surface in self._surfaces])
-        springs = [ends for ends in frame.springs.values()]
+        springs = [(grab.point, grab.target) for grab in snapshot.grabs]
+        touching = snapshot.contact_points
         told = {
             "kind": "frame",
             "time": snapshot.time,
@@ -71,8 +95,8 @@ class Messages:
             "poses": packer.add(poses, "f4"),
             "pins": packer.add(frame.pinned, "u4"),
             "grabs": packer.add(springs, "f4"),
-            "contacts": packer.add(self._arrows(frame), "f4"),
-            "touching": packer.add([] if frame.contact_points is None else np.nan_to_num(frame.contact_points), "f4"),
+            "contacts": packer.add(self._arrows(snapshot, frame.model.view.radius), "f4"),
+            "touching": packer.add([] if touching is None else np.nan_to_num(touching), "f4"),
             "field": self._field(snapshot, frame, packer),
             "solver": description.solver,
             "values": description.values,
@@ -94,13 +118,13 @@ class Messages:
         share = (nodal_values(frame, snapshot.tet_values) - ends[0]) / (ends[1] - ends[0])
         return {"key": key, "ends": list(ends), "values": packer.add(np.round(255.0 * share.clip(0.0, 1.0)), "u1")}
 
-    def _arrows(self, frame: RenderFrame) -> NDArray[np.float64]:
+    def _arrows(self, snapshot: Snapshot, radius: float) -> NDArray[np.float64]:
         """(k, 2, 3) lines from contacts along their forces [m]."""
-        if frame.contact_forces is None or not len(frame.contact_forces[0]):
+        if snapshot.contact_forces is None or not len(snapshot.contact_forces[0]):
             return np.zeros((0, 2, 3))
-        points, forces = frame.contact_forces
+        points, forces = snapshot.contact_forces
         largest = max(float(np.linalg.norm(forces, axis=1).max()), 1e-300)
-        reach = _ARROW * frame.model.view.radius / largest
+        reach = _ARROW * radius / largest
         return np.nan_to_num(np.stack([points, points + reach * forces], axis=1))
 
 

@@ -8,22 +8,8 @@ import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
-from supple.app.viewer.protocol.commands import (
-    Command,
-    Grab,
-    MoveGrab,
-    Pause,
-    Pin,
-    Play,
-    ReleaseGrab,
-    Reset,
-    SetParameter,
-    SetSolver,
-    SetSpeed,
-    SetView,
-    Step,
-    Unpin,
-)
+from supple.app.viewer.protocol import commands
+from supple.app.viewer.protocol.commands import Command, Grab, MoveGrab, Pin, ReleaseGrab, SetView, Unpin
 from supple.app.viewer.protocol.values import checked_point, displayed
 from supple.errors import CommandError, SuppleError
 
@@ -32,7 +18,8 @@ if TYPE_CHECKING:  # the page is there before the scene
     from supple.results.view.picking import SurfacePoint
 
 # What a browser may ask for by name, with the fields of the command.
-_COMMANDS = {kind.__name__: kind for kind in (Play, Pause, Step, Reset, SetSpeed, SetSolver, SetParameter, Unpin)}
+_NAMES = ("Play", "Pause", "Step", "Reset", "SetSpeed", "SetSolver", "SetParameter", "Unpin")
+_COMMANDS: dict[str, Callable[..., Command]] = {name: getattr(commands, name) for name in _NAMES}
 _numbers = itertools.count(1)  # of grabs
 
 

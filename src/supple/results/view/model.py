@@ -79,10 +79,7 @@ class RenderFrame:
     model : its constant data; time : [s]
     positions : (n, 3) [m]
     poses : (obstacles, 3, 4) rotation and translation of each obstacle since time 0
-    contact_points : (c, 3) [m], or None where they are not known
-    contact_forces : points (c, 3) [m] and forces (c, 3) [N] of contacts, or None where they are not known
     pinned : (p,) vertices that are pinned
-    springs : point of a body and target (3,) [m], by number of the grab
     tet_values : values of tets (m,) that the simulation sent, by the key of their field
     internal : (k, 11) internal variables of a recorded frame, see `State`
     broken_stitches : (b,) numbers of the pairs of stitches that have broken
@@ -93,10 +90,7 @@ class RenderFrame:
     time: float
     positions: NDArray[np.float64]
     poses: NDArray[np.float64]
-    contact_points: NDArray[np.float64] | None = None
-    contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     pinned: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
     tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     internal: NDArray[np.float64] = field(default_factory=lambda: NEVER_FLOWED)
     broken_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))

@@ -86,8 +86,8 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
 
 
 def snapshot_of(description: SceneDescription, **changes) -> Snapshot:
-    still, spins = np.zeros(3), np.zeros((len(description.bodies), 3))
-    measures = Measures(0.9, 1.0, 2.0, 3.0, 0.0, None, still, still, "converged", "", spins, 0, None, 1)
+    still = np.zeros(3)
+    measures = Measures(0.9, 1.0, 2.0, 3.0, 0.0, None, still, still, "converged", "", 0, None, 1)
     made = Snapshot(
         description=description,
         frame=0,

@@ -103,7 +103,7 @@ def test_acts_become_commands(visitor, received):
         ('{"act": "Step", "count": 1e9}', "count is 1000000000.0; give a whole number"),
         ('{"act": "SetSpeed", "factor": "fast"}', "speed is 'fast'; give a number"),
         ('{"act": "SetParameter", "name": "__class__", "value": 1}', "parameter '__class__' does not exist"),
-        ('{"act": "SetSolver", "kind": ["xpbd"]}', "does not exist; there are xpbd and implicit"),
+        ('{"act": "SetSolver", "kind": ["xpbd"]}', "solver is ['xpbd']; it must be xpbd or implicit"),
         ('{"act": "grab", "point": [0, 0, NaN], "target": [0, 0, 0]}', "point is nan"),
         ('{"act": "grab", "point": [0, 0, 0], "target": [1e99, 0, 0]}', "target is 1e+99"),
         ('{"act": "click", "point": 7}', "point is 7; give a list"),

@@ -16,8 +16,7 @@ from supple.app.viewer.protocol.snapshots import BodyDescription, Measures, Read
 from supple.materials.own.energy_material import EnergyMaterial
 from supple.model.actuator_readings import cable_readings, cavity_readings
 from supple.model.diagnostics import measure
-from supple.model.state import State
-from supple.model.system import BodyRange, System
+from supple.model.system import BodyRange
 from supple.results.readings.frame_readings import joint_readings
 from supple.results.readings.sensor_readings import sensor_readings
 from supple.scene.joints.placed import placed_joints
@@ -74,25 +73,11 @@ def measures(live: LiveScene) -> Measures:
         **vars(measure(live.system, live.state)),
         status=str(report.status),
         message=report.message,
-        spin=np.array([spin(live.system, part, live.state) for part in live.system.bodies]),
         contacts=details.contacts,
         min_distance=details.smallest_gap if isinstance(details, XPBDDetails) else report.min_distance,
         iterations=int(report.iterations),
         joints=joint_readings(details),
     )
-
-
-def spin(system: System, part: BodyRange, state: State) -> NDArray[np.float64]:
-    """(3,) angular velocity of a body about its center of mass [rad/s]: I w = L."""
-    m, x, v = system.masses[part.vertices], state.positions[part.vertices], state.velocities[part.vertices]
-    M = m.sum()
-    r = x - m @ x / M
-    L = m @ np.cross(r, v - m @ v / M)
-    S = (r * m[:, None]).T @ r
-    inertia = np.trace(S) * np.eye(3) - S
-    if not np.isfinite(inertia).all() or np.linalg.cond(inertia) > 1e12:
-        return np.zeros(3)
-    return np.linalg.solve(inertia, L)
 
 
 def readings(live: LiveScene) -> tuple[Reading, ...]:

@@ -57,9 +57,9 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection, ap
 
             pulse.stage = "preparing the scene"
             live = LiveScene(source)
-            pulse.stage = "measuring a step"
+            pulse.stage = "measuring steps"
             live.warm_up()
-            live, chosen = _in_time(live, pulse)
+            live, chosen = _in_time(live)
             pulse.stage = "loading kernels"
             kernels.compile_rest()  # the first contact, too, does not wait for it
         except (SuppleError, MemoryError) as error:
@@ -78,7 +78,7 @@ def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection, ap
     loop.run()
 
 
-def _in_time(live: LiveScene, pulse: Pulse) -> tuple[LiveScene, str]:
+def _in_time(live: LiveScene) -> tuple[LiveScene, str]:
     """The live scene, or where it is slower than real time, by counts, one that is faster; and what was chosen."""
     from supple.app.viewer.engine.scene.lightening import coarsened, linearized
     from supple.app.viewer.engine.scene.live_scene import LiveScene
@@ -90,7 +90,6 @@ def _in_time(live: LiveScene, pulse: Pulse) -> tuple[LiveScene, str]:
         found = choice(live)
         if found is None:
             continue
-        pulse.stage = "measuring a step that is faster"
         try:
             other = LiveScene(found[0])
             other.warm_up()

@@ -15,13 +15,14 @@ from supple.app.viewer.protocol import limits
 from supple.app.viewer.protocol.parameters import Value, find_parameter
 from supple.app.viewer.protocol.values import (
     Point,
+    boolean,
     checked_index,
     checked_name,
     checked_point,
     checked_vertices,
     checked_weights,
-    displayed,
     number,
+    one_of,
     whole,
 )
 from supple.errors import CommandError
@@ -74,9 +75,6 @@ class SetSpeed(Command):
 
     factor: float
 
-    def __post_init__(self) -> None:
-        _set(self, "factor", number(self.factor, "speed", limits.SLOWEST_MOTION, limits.FASTEST_MOTION))
-
 
 @dataclass(frozen=True)
 class Watch(Command):
@@ -84,20 +82,12 @@ class Watch(Command):
 
     watched: bool
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.watched, bool):
-            raise CommandError(f"watched is {displayed(self.watched)}; give true or false")
-
 
 @dataclass(frozen=True)
 class SetSolver(Command):
     """Continue from the current state with another solver: "xpbd" or "implicit"."""
 
     kind: str
-
-    def __post_init__(self) -> None:
-        if self.kind not in ("xpbd", "implicit"):
-            raise CommandError(f"solver {displayed(self.kind)} does not exist; there are xpbd and implicit")
 
 
 @dataclass(frozen=True)
@@ -116,11 +106,10 @@ class SetParameter(Command):
 
     def __post_init__(self) -> None:
         parameter = find_parameter(self.name)
+        super().__post_init__()
         _set(self, "value", parameter.checked(self.value))
-        if self.body is not None:
-            if parameter.owner != "body":
-                raise CommandError(f"{self.name} belongs to the {parameter.owner}; give no body")
-            _set(self, "body", checked_name(self.body, "body"))
+        if self.body is not None and parameter.owner != "body":
+            raise CommandError(f"{self.name} belongs to the {parameter.owner}; give no body")
 
 
 @dataclass(frozen=True)
@@ -135,12 +124,6 @@ class SetView(Command):
 
     tet_values: str | None = None
     contacts: bool = False
-
-    def __post_init__(self) -> None:
-        if self.tet_values not in (None, "J", "von_mises", "energy"):
-            raise CommandError(f"tet_values is {displayed(self.tet_values)}; give J, von_mises, energy or None")
-        if not isinstance(self.contacts, bool):
-            raise CommandError(f"contacts is {displayed(self.contacts)}; give true or false")
 
 
 @dataclass(frozen=True)
@@ -167,7 +150,6 @@ class Grab(Command):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _set(self, "vertices", checked_vertices(self.vertices))
         _set(self, "weights", checked_weights(self.weights, len(self.vertices)))
 
 
@@ -214,7 +196,12 @@ def _set(command: Command, name: str, value: object) -> None:
 # By name of the field: equal names have equal meanings. Fields that are not here are checked by their own class.
 _CHECKS: dict[str, Callable[[Any, str], object]] = {
     "body": checked_name,
-    "name": checked_name,
+    "factor": lambda value, _: number(value, "speed", limits.SLOWEST_MOTION, limits.FASTEST_MOTION),
+    "watched": boolean,
+    "kind": lambda value, _: one_of(value, "solver", ("xpbd", "implicit")),
+    "tet_values": partial(one_of, names=(None, "J", "von_mises", "energy")),
+    "contacts": boolean,
+    "vertices": checked_vertices,
     "grab": checked_index,
     "vertex": checked_index,
     "target": checked_point,

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from supple.app.viewer.protocol.values import displayed, number
+from supple.app.viewer.protocol.values import boolean, displayed, number
 from supple.errors import CommandError
 
 Owner = Literal["solver", "scene", "body"]
@@ -20,8 +18,8 @@ class Parameter:
 
     Attributes
     ----------
-    name : in commands and descriptions; label, hint : on the panel; unit : that the panel
-        displays, "" where it has none; factor : how many of the SI unit it is
+    name : in commands and descriptions; label : on the panel; unit : that the panel displays, "" where it has none
+    factor : how many of the SI unit it is
     owner : "body" where each body has its own value
     kind : float, int or bool; low, high : both are allowed
     """
@@ -34,14 +32,11 @@ class Parameter:
     high: float
     unit: str = ""
     factor: float = 1.0
-    hint: str = ""
 
     def checked(self, value: object) -> Value:
         """`value`, converted to `kind`; raises `CommandError` where it is of another kind or out of range."""
         if self.kind is bool:
-            if not isinstance(value, (bool, np.bool_)):
-                raise CommandError(f"{self.name} is {displayed(value)}; give true or false")
-            return bool(value)
+            return boolean(value, self.name)
         checked = number(value, self.name, self.low, self.high)
         if self.kind is int:
             if checked != int(checked):
@@ -50,107 +45,21 @@ class Parameter:
         return checked
 
 
-PARAMETERS: dict[str, Parameter] = {
-    parameter.name: parameter
-    for parameter in (
-        Parameter(
-            "substeps",
-            "substeps (0: automatic)",
-            "solver",
-            int,
-            0,
-            200,
-            hint="Substeps of a time step; 0: as many as the step needs",
-        ),
-        Parameter(
-            "momentum_restore",
-            "momentum restore",
-            "solver",
-            bool,
-            0,
-            1,
-            hint="Correct the momentum that iterations lose",
-        ),
-        Parameter(
-            "contact", "contact of bodies", "solver", bool, 0, 1, hint="Whether bodies touch each other, and themselves"
-        ),
-        Parameter("dt", "time step", "scene", float, 1e-4, 0.1, "ms", 1e-3, hint="Simulated time of a frame"),
-        Parameter(
-            "gravity",
-            "gravity",
-            "scene",
-            float,
-            -100.0,
-            100.0,
-            "m/s^2",
-            hint="Acceleration along the gravity of the scene; negative: upwards",
-        ),
-        Parameter(
-            "youngs",
-            "Young's modulus",
-            "body",
-            float,
-            1e2,
-            1e11,
-            "kPa",
-            1e3,
-            hint="Stiffness: stress per strain. Rubber 1 MPa, gummy bears 30 kPa",
-        ),
-        Parameter(
-            "poisson",
-            "Poisson's ratio",
-            "body",
-            float,
-            -0.5,
-            0.499,
-            hint="How much a body narrows when stretched; 0.5 keeps its volume",
-        ),
-        Parameter(
-            "edge_compliance",
-            "edge compliance",
-            "body",
-            float,
-            0.0,
-            1.0,
-            "mm/N",
-            1e-3,
-            hint="How far edges give way to a force",
-        ),
-        Parameter(
-            "volume_compliance",
-            "volume compliance",
-            "body",
-            float,
-            0.0,
-            1.0,
-            "mm^5/N",
-            1e-15,
-            hint="How far the volume of tets gives way to a pressure",
-        ),
-        Parameter(
-            "damping",
-            "damping",
-            "body",
-            float,
-            0.0,
-            1.0,
-            "ms",
-            1e-3,
-            hint="Relaxation time of the viscous stress",
-        ),
-        Parameter(
-            "density",
-            "density",
-            "body",
-            float,
-            1.0,
-            1e5,
-            "kg/m^3",
-            hint="Mass per volume; water 1000 kg/m³",
-        ),
-        Parameter(
-            "friction", "friction", "body", float, 0.0, 10.0, hint="Coulomb's coefficient; of a pair, see the scene"
-        ),
+PARAMETERS = {
+    one.name: one
+    for one in (
+        Parameter("substeps", "substeps (0: automatic)", "solver", int, 0, 200),
+        Parameter("momentum_restore", "momentum restore", "solver", bool, 0, 1),
+        Parameter("contact", "contact of bodies", "solver", bool, 0, 1),
+        Parameter("dt", "time step", "scene", float, 1e-4, 0.1, "ms", 1e-3),
+        Parameter("gravity", "gravity", "scene", float, -100.0, 100.0, "m/s^2"),
+        Parameter("youngs", "Young's modulus", "body", float, 1e2, 1e11, "kPa", 1e3),
+        Parameter("poisson", "Poisson's ratio", "body", float, -0.5, 0.499),
+        Parameter("edge_compliance", "edge compliance", "body", float, 0.0, 1.0, "mm/N", 1e-3),
+        Parameter("volume_compliance", "volume compliance", "body", float, 0.0, 1.0, "mm^5/N", 1e-15),
+        Parameter("damping", "damping", "body", float, 0.0, 1.0, "ms", 1e-3),
+        Parameter("density", "density", "body", float, 1.0, 1e5, "kg/m^3"),
+        Parameter("friction", "friction", "body", float, 0.0, 10.0),
     )
 }
 

@@ -102,7 +102,6 @@ class Measures(Diagnostics):
     Attributes
     ----------
     status, message : of the last step, see `supple.model.state.Status`
-    spin : (bodies, 3) angular velocity of each body about its own center of mass [rad/s]
     contacts : number of active contacts; min_distance : smallest gap [m] or None
     iterations : of the last step
     joints : what joints do, by name
@@ -110,7 +109,6 @@ class Measures(Diagnostics):
 
     status: str
     message: str
-    spin: NDArray[np.float64]
     contacts: int
     min_distance: float | None
     iterations: int

@@ -31,6 +31,20 @@ def number(value: object, what: str, low: float, high: float) -> float:
     return float(value)
 
 
+def boolean(value: object, what: str) -> bool:
+    """The value; raises `CommandError` where it is neither true nor false."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise CommandError(f"{what} is {displayed(value)}; give true or false")
+    return bool(value)
+
+
+def one_of(value: object, what: str, names: tuple[str | None, ...]) -> object:
+    """The value; raises `CommandError` where it is none of these."""
+    if not isinstance(value, str | None) or value not in names:
+        raise CommandError(f"{what} is {displayed(value)}; it must be {' or '.join(map(str, names))}")
+    return value
+
+
 def whole(value: object, what: str, low: int, high: int) -> int:
     """The value as int; raises `CommandError` where it is not a whole number from `low` to `high`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
@@ -54,7 +68,7 @@ def checked_items(value: object, what: str, least: int, most: int) -> list[objec
     return list(value)
 
 
-def checked_vertices(value: object) -> tuple[int, ...]:
+def checked_vertices(value: object, what: str) -> tuple[int, ...]:
     vertices = tuple(whole(item, "vertices", 0, 2**31 - 1) for item in checked_items(value, "vertices", 1, 4))
     if len(set(vertices)) != len(vertices):
         raise CommandError(f"vertices {list(vertices)} contains a vertex twice; give each once")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.app.viewer.from_snapshot import RenderFrameBuilder
+from supple.app.viewer.messages import frame_of
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
 from supple.results.view.fields import FIELDS, Limits, Range
 
@@ -17,7 +17,7 @@ J, MISES, ENERGY = FIELDS.values()
 def stretched(fake):
     """Body 0 stretched to twice its length in x, body 1 at rest; body 0 made of StVK, body 1 of something unknown."""
     x = fake.snapshot.positions.copy()
-    model = RenderFrameBuilder().frame(fake.snapshot).model
+    model = frame_of(fake.snapshot).model
     first = model.bodies[0]
     count = first.tets.stop - first.tets.start
     known = sp.StVenantKirchhoff(youngs=1000.0, poisson=0.0).per_tet(count)
@@ -25,7 +25,7 @@ def stretched(fake):
     volumes = 1.0 / (6.0 * np.linalg.det(model.rest_shape_inverse))
     laws = TetLaws(model.tets, model.rest_shape_inverse, volumes, joined_materials([known, other]))
     x[first.vertices] *= [2.0, 1.0, 1.0]
-    frame = RenderFrameBuilder().frame(fake.show(positions=x))
+    frame = frame_of(fake.show(positions=x))
     return replace(frame, laws=laws)
 
 

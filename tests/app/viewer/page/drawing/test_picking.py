@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from supple.app.viewer.from_snapshot import RenderFrameBuilder
+from supple.app.viewer.messages import frame_of
 from supple.results.view.picking import nearest_surface_point
 
 
 @pytest.fixture
 def frame(fake):
-    return RenderFrameBuilder().frame(fake.snapshot)
+    return frame_of(fake.snapshot)
 
 
 def place_of(frame, point):
