@@ -56,12 +56,13 @@ class SimulationFit:
         lines = [f"{name} = {value:.6g} +- {error:.2g}" for name, value, error in rows]
         return "\n".join([*lines, f"loss {self.loss:.6g} after {self.evaluations} runs: {self.message}"])
 
-    def plot(self, path: str | Path, over: tuple[str, ArrayLike] | None = None) -> Path:
+    def plot(self, path: str | Path, over: tuple[str, str, ArrayLike] | None = None) -> Path:
         """Draw what was simulated over what was measured to a PNG, PDF or SVG file.
 
         Parameters
         ----------
-        over : a label with its unit, and the values (k,) of each reading, over which to draw both instead.
+        over : labels of a quantity and of the readings, with their units in brackets, and the values (k,) of that
+            quantity, over which to draw both instead.
 
         Raises
         ------
@@ -70,17 +71,17 @@ class SimulationFit:
         path = Path(path)
         with paper_figure(path, 4.5, 4.2) as figure:
             axes = figure.subplots()
-            for k, (label, values) in enumerate(self.measured.items()):
+            for label, values in self.measured.items():
                 if over is None:
                     axes.plot(values, self.simulated[label], ".", markersize=4, label=label)
-                    continue
-                axes.plot(over[1], values, "o", markersize=4, color=f"C{k}", label=f"measured: {label}")
-                axes.plot(over[1], self.simulated[label], "-", color=f"C{k}", label="simulated")
+                else:
+                    axes.plot(over[2], values, "o", markersize=4, label="measured")
+                    axes.plot(over[2], self.simulated[label], "-", label="simulated")
             if over is None:
                 low, high = axes.get_xlim()
                 axes.plot([low, high], [low, high], "-", color="0.6", linewidth=1)
             axes.set_xlabel("measured" if over is None else over[0])
-            axes.set_ylabel("simulated" if over is None else "")
+            axes.set_ylabel("simulated" if over is None else over[1])
             axes.legend()
         return path
 

@@ -12,6 +12,7 @@ import pytest
 import supple as sp
 from supple.app.cli.app import main
 from supple.app.cli.console import ExitCode
+from supple.app.studies import scene_fit
 
 SCENE = """\
 bodies:
@@ -132,6 +133,36 @@ def test_a_crush_curve(tmp_path, capfd):
         assert message in capfd.readouterr().err
 
 
+def test_a_press_of_obstacles_with_friction(tmp_path):
+    """A file that leaves the solver to the scene; the only obstacle that moves has the force."""
+    text = (
+        BLOCK.replace("YOUNGS", "4e4").replace("POISSON", "0.3").replace("divisions: [2, 2, 2]", "divisions: [1, 1, 1]")
+    )
+    plates = """obstacles:
+  - {kind: half_space, name: table, point: [0, -0.0251, 0], friction: 0.3}
+  - kind: half_space
+    name: plate
+    point: [0, 0.0251, 0]
+    normal: [0, -1, 0]
+    friction: 0.3
+    motion: {times: [0, 1], displacements: [[0, 0, 0], [0, -0.02, 0]]}
+"""
+    text = (
+        text[: text.index("pins:")]
+        + plates
+        + text[text.index("gravity:") : text.index("solver:")]
+        + "dt: 0.2\nsteps: 2\n"
+    )
+    (tmp_path / "press.yaml").write_text(text)
+    scene, solver = sp.load_scene(tmp_path / "press.yaml"), scene_fit.FITTED_WITH
+    force = [frame.sensors["plate"].force[1] for frame in sp.simulate(scene, solver, 0.2, 2)]
+    rows = [f"{0.004 * (k + 1)};{2 * value}" for k, value in enumerate(force)]
+    (tmp_path / "curve.csv").write_text("\n".join(["displacement;force", "0;0", *rows]))
+    youngs = "bodies.foam.material.youngs=1e4:1e6"
+    assert fit(tmp_path, "-p", youngs, scene="press.yaml", data="curve.csv") == ExitCode.OK
+    assert fitted(tmp_path, "youngs") == pytest.approx(8e4, rel=0.02)  # without inertia, forces are as moduli
+
+
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
@@ -168,6 +199,9 @@ def test_faults_of_data(film, capfd, rows, message):
         (["-p", "bodies.bar.material.youngs=-5:1e6"], "youngs"),
         (["-p", "bodies.bar.material.damping=0:1"], "has no value; give bodies.bar.material.damping=LOW:START:HIGH"),
         (["-p", "bodies.bar.name=0:1"], "name"),
+        (["-p", "dt=0.01:0.1"], "dt is not a part of the scene"),
+        (["-p", "solver.tolerance=1e-9:1"], "solver.tolerance is not a part of the scene"),
+        (["-p", "gravity.1=-20:0"], "has no gravity; write it there"),
         (["-p", YOUNGS, YOUNGS], "each path once"),
         ([], "give --parameters"),
         (["-p", YOUNGS, "--of", "bear"], "body 'bear' does not exist; give --of, did you mean 'bar'?"),

@@ -32,13 +32,15 @@ from supple.scene.body import PlacedBody
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 from supple.solvers.auto import Auto
+from supple.solvers.implicit.contact.settings import IPCContact
 from supple.solvers.implicit.solver import Implicit
 
 Floats = NDArray[np.float64]
 
 _AXES = ("x", "y", "z")
+_NOT_OF_SCENES = ("supple", "solver", "dt", "steps", "output")
 # What a file that leaves the choice to the scene is fitted with.
-_SOLVER = Implicit(integrator="bdf2", tolerance=1e-6)
+FITTED_WITH = Implicit(integrator="bdf2", tolerance=1e-6, contact=IPCContact(friction_iterations=1))
 # Of the diagonal of a body: a marker on a round surface may be so far outside of its mesh, which has flat sides.
 _OUTSIDE = 0.05
 # Of the largest displacement: noise by which that of a test may go back while it is loaded.
@@ -65,7 +67,13 @@ class Parameter(NamedTuple):
             values = []
         if not path or len(values) not in (2, 3) or not np.isfinite(values).all() or values != sorted(set(values)):
             raise SceneError(f"--parameters {text}: give PATH=LOW:HIGH, such as bodies.bear.material.youngs=1e4:1e6")
-        given = value_at(document.data, path)
+        given, above = value_at(document.data, path), path.rpartition(".")[0]
+        if path.partition(".")[0] in _NOT_OF_SCENES:
+            raise SceneError(
+                f"--parameters {text}: {path} is not a part of the scene; give a path of a body, a load ..."
+            )
+        if above and value_at(document.data, above) is None:
+            raise SceneError(f"{path}: {document.path} has no {above}; write it there")
         for value in values:  # says what a path lacks
             validated(replace(document, data=with_values(document.data, {path: value})))
         if len(values) == 2:
@@ -79,10 +87,10 @@ class Parameter(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """A misfit; over : a label and values, over which its readings are drawn, or None"""
+    """A misfit; over : see `SimulationFit.plot`"""
 
     misfit: Misfit
-    over: tuple[str, Floats] | None
+    over: tuple[str, str, Floats] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +101,7 @@ class SceneFit:
     parameters: tuple[Parameter, ...]
     data: tuple[Path, ...]
     sensitivity: Sensitivity
-    over: tuple[str, Floats] | None
+    over: tuple[str, str, Floats] | None
 
     @classmethod
     def of(cls, path: str | Path, parameters: Sequence[str], data: Sequence[Path], of: str | None = None) -> SceneFit:
@@ -122,7 +130,7 @@ class SceneFit:
         run = run_at([one.start for one in varied])
         if run.initial_positions:
             raise SceneError(f"{path}: body {next(iter(run.initial_positions))!r} starts deformed, which is not fitted")
-        solver = _SOLVER if isinstance(run.solver, Auto) else run.solver
+        solver = FITTED_WITH if isinstance(run.solver, Auto) else run.solver
         if not isinstance(solver, Implicit):
             raise SolverError(f"{path}: {solver.label} has no derivatives; give solver: {{kind: implicit}}")
         if not data:
@@ -287,7 +295,7 @@ def _force(table: Table, run: Run, of: str | None) -> Compared:
     frames = (np.flatnonzero(used) + 1).tolist()
     weight = 1.0 / max(float(np.abs(target[used]).max()), np.finfo(float).tiny) ** 2
     misfit = Misfit("reaction", name, target[used], along=along, frames=frames, weight=weight)
-    return Compared(misfit, ("displacement [m]", gone[frames]))
+    return Compared(misfit, ("displacement [m]", f"force of {name} [N]", gone[frames]))
 
 
 def _motions(run: Run, times: Floats) -> dict[str, Floats]:
