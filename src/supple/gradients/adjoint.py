@@ -54,7 +54,12 @@ class StateAdjoint:
         return StateAdjoint(x, v, past_x, past_v, self.internal)
 
 
-@dataclass(frozen=True, eq=False)
+def no_derivatives(n: int) -> Floats:
+    """(n, 3) zeros that take no memory."""
+    return np.broadcast_to(0.0, (n, 3))
+
+
+@dataclass(eq=False)
 class ForceAdjoint:
     """Derivatives of a loss by forces at the end of a step: at pinned vertices (n, 3), of contact (n, 3), whose minus
     act on bodies [1/N]; and by those of actuators with a given coordinate (h,)."""
@@ -65,7 +70,8 @@ class ForceAdjoint:
 
     @classmethod
     def zeros(cls, n: int, held: int) -> ForceAdjoint:
-        return cls(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(held))
+        """Of arrays that take no memory, and are not written to."""
+        return cls(no_derivatives(n), no_derivatives(n), np.zeros(held))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from supple.errors import SceneError
-from supple.gradients.adjoint import ForceAdjoint
+from supple.gradients.adjoint import ForceAdjoint, no_derivatives
 from supple.gradients.quantities import QUANTITIES, force_of, forces_matrix, quantity_of
 from supple.gradients.tangent import StateTangent
 from supple.kinds.checks import finite_vector
@@ -27,7 +27,7 @@ OwnLoss = Callable[[Frame], "tuple[float, Mapping[str, ArrayLike]] | None"]
 OfScene = Callable[[System], float]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Seeds:
     """Derivatives of a loss by what one frame has: positions x and velocities v (n, 3), and forces; of_scene : by the
     scene, at fixed positions and velocities, as functions of that."""
@@ -130,8 +130,9 @@ class Misfit:
     def add_seeds(self, frame: Frame, row: int, by_residual: Floats, whole: System, seeds: Seeds) -> None:
         """Add the derivatives of a loss with these derivatives by `residuals`."""
         by = quantity_of(self, frame.system).by
-        out = getattr(seeds if by in ("x", "v") else seeds.forces, by)
-        out += (self.matrix(frame, row, whole).T @ by_residual.ravel()).reshape(out.shape)
+        of = seeds if by in ("x", "v") else seeds.forces
+        known = getattr(of, by)
+        setattr(of, by, known + (self.matrix(frame, row, whole).T @ by_residual.ravel()).reshape(known.shape))
         if self.is_of_scene(frame.system):
             weights, state = np.sqrt(self.weight) * by_residual, frame.state
             seeds.of_scene.append(lambda system: float((weights * self.read(system, state)).sum()))
@@ -207,8 +208,8 @@ class Loss:
         """The share of a frame, and its derivatives; whole : the system with obstacles' vertices"""
         system = frame.system
         held = sum(isinstance(one.law, GivenValue) for one in system.actuators)
-        x, v = np.zeros((2, len(system.rest_positions), 3))
-        seeds, total = Seeds(x, v, ForceAdjoint.zeros(len(whole.rest_positions), held), []), 0.0
+        zero = no_derivatives(len(system.rest_positions))
+        seeds, total = Seeds(zero, zero, ForceAdjoint.zeros(len(whole.rest_positions), held), []), 0.0
         for misfit, row in self.rows(frame.index, steps):
             residuals = misfit.residuals(frame, row)
             total += float((residuals**2).sum())
