@@ -30,12 +30,13 @@ WAYS = {
     "page": "the same with a served page, and a websocket that reads all messages",
 }
 LISTEN = """
-import sys, viser
+import sys
 from websockets.sync.client import connect
-with connect(sys.argv[1], subprotocols=["viser-v" + viser.__version__], max_size=None) as page:
+with connect(sys.argv[1], max_size=None, compression=None) as page:
     print("connected", flush=True)
-    for _ in page:
-        pass
+    for message in page:
+        if isinstance(message, bytes):
+            page.send('{"act": "drawn"}')
 """
 
 
@@ -103,8 +104,8 @@ def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: 
     """Run all programs alternately and print their times [ms/frame]; returns the figures."""
     live = source(edge_length)
     at_start = circumstances()
-    with Engine(live) as engine, opened_page(live, 0) as page, listening(page.url):
-        behind_page = page.content.controller.simulation
+    with Engine(live) as engine, opened_page("ball", 0) as page, page.simulating(live), listening(page.url):
+        behind_page = page.content.simulation
         assert isinstance(behind_page, Engine)
         programs: dict[str, Callable[[], float]] = {
             "headless": lambda: headless(live, frames),

@@ -42,21 +42,15 @@ def volume_ratio(frame: RenderFrame) -> NDArray[np.float64]:
     return determinants(frame.deformation_gradients)
 
 
-def von_mises_stress(frame: RenderFrame) -> NDArray[np.float64]:
-    """Von Mises stress of every tet (m,) [Pa]."""
-    return _of_laws(frame, "von_mises")
+def _of_laws(quantity: str) -> Callable[[RenderFrame], NDArray[np.float64]]:
+    """What the elastic laws give, see `tet_values`; not known of a live simulation, which sends it."""
 
+    def measure(frame: RenderFrame) -> NDArray[np.float64]:
+        if frame.laws is None:
+            return np.full(len(frame.model.tets), np.nan)
+        return tet_values(frame.laws, frame.positions, quantity, frame.internal)
 
-def energy_density(frame: RenderFrame) -> NDArray[np.float64]:
-    """Elastic energy per rest volume of every tet (m,) [J/m^3]."""
-    return _of_laws(frame, "energy")
-
-
-def _of_laws(frame: RenderFrame, quantity: str) -> NDArray[np.float64]:
-    laws = frame.laws
-    if laws is None:
-        return np.full(len(frame.model.tets), np.nan)
-    return tet_values(laws, frame.positions, quantity, frame.internal)
+    return measure
 
 
 COLOR_BY_BODY = "body"  # instead of the name of a field
@@ -64,8 +58,8 @@ FIELDS = {
     field.name: field
     for field in (
         Field("J", "volume ratio J", "", 1.0, volume_ratio),
-        Field("von_mises", "von Mises stress", "Pa", None, von_mises_stress),
-        Field("energy", "energy density", "J/m^3", None, energy_density),
+        Field("von_mises", "von Mises stress", "Pa", None, _of_laws("von_mises")),
+        Field("energy", "energy density", "J/m^3", None, _of_laws("energy")),
     )
 }
 

@@ -64,7 +64,7 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
     surface = None if skin is None else sp.SurfaceMesh(*skin)
     things = [sp.Body(f"body {i}", mesh, material, skin=None if i else surface) for i, mesh in enumerate(meshes)]
     rows = rows_of(things)
-    bodies = [BodyDescription(one.body, one.number, one.vertices, one.tets, values, 1.0) for one in rows]
+    bodies = [BodyDescription(one.body, one.number, one.vertices, one.tets, values) for one in rows]
     n, m = rows[-1].vertices.stop, rows[-1].tets.stop
     x = np.concatenate([mesh.vertices for mesh in meshes])
     floor = sp.HalfSpace(name="floor")
@@ -78,9 +78,7 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
         low=x.min(axis=0),
         high=x.max(axis=0),
         stitches=StitchEnds.of(no_stitching(n), things),
-        n_vertices=n,
         n_tets=m,
-        n_constraints=3 * m,
     )
     return replace(made, **changes)
 

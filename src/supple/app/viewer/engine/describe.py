@@ -31,7 +31,7 @@ def describe(live: LiveScene) -> SceneDescription:
     positions = system.points.positions(live.state.positions)
     return SceneDescription(
         revision=live.revision,
-        bodies=tuple(_body(part, system.masses) for part in system.bodies),
+        bodies=tuple(_body(part) for part in system.bodies),
         obstacles=tuple(replace(obstacle, motion=None) for obstacle in system.obstacles),
         solver=kind_of(setup.solver),
         values={**solver_values(setup.solver), "dt": setup.dt, "gravity": gravity},
@@ -39,21 +39,18 @@ def describe(live: LiveScene) -> SceneDescription:
         low=positions.min(axis=0),
         high=positions.max(axis=0),
         stitches=StitchEnds.of(system.scene.stitching, system.scene.bodies),
-        n_vertices=len(live.state.positions),
         n_tets=len(system.tets),
-        n_constraints=sum(int(made.count) for made in getattr(live.workspace, "sets", ())),
         joints=placed_joints(system.scene.bodies, system.scene.joints, system.obstacles),
     )
 
 
-def _body(part: BodyRange, masses: NDArray[np.float64]) -> BodyDescription:
+def _body(part: BodyRange) -> BodyDescription:
     body = part.body
     values = {"friction": body.friction, **({} if part.rigid else _material_values(body.material))}
     if isinstance(body.material, EnergyMaterial):  # what is compiled stays here
         body = body.changed(material=body.material.recorded())
     _ = body.attached_skin  # found once, and sent with the body
-    rows = part.number, part.vertices, part.tets
-    return BodyDescription(body, *rows, values, float(masses[part.vertices].sum()))
+    return BodyDescription(body, part.number, part.vertices, part.tets, values)
 
 
 def _material_values(material: Any) -> dict[str, Value]:

@@ -16,8 +16,6 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rows import BodyRows
 from supple.scene.stitches.measures import StitchEnds
 
-RIGID = "rigid"  # instead of a material
-
 
 @dataclass(frozen=True, eq=False)
 class BodyDescription(BodyRows):
@@ -26,16 +24,9 @@ class BodyDescription(BodyRows):
     Attributes
     ----------
     values : of the parameters that a page can change, by name
-    mass : [kg]
     """
 
     values: dict[str, Value]
-    mass: float
-
-    @property
-    def material(self) -> str:
-        """The name of its class, or `RIGID`."""
-        return RIGID if self.rigid else type(self.body.material).__name__
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +42,7 @@ class SceneDescription:
     low, high : (3,) corners of the bounding box of the bodies at the start [m]
     stitches : of all kinds
     joints : of rigid bodies
-    n_vertices, n_tets, n_constraints : of the whole scene; constraints are the solver's, 0 where it has none
+    n_tets : of the whole scene
     """
 
     revision: int
@@ -63,17 +54,12 @@ class SceneDescription:
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     stitches: StitchEnds
-    n_vertices: int
     n_tets: int
-    n_constraints: int
     joints: tuple[PlacedJoint, ...] = ()
 
     def body(self, name: str) -> BodyDescription:
-        """The body of that name; raises `KeyError` where none exists."""
-        for body in self.bodies:
-            if body.name == name:
-                return body
-        raise KeyError(name)
+        """The body of that name."""
+        return {body.name: body for body in self.bodies}[name]
 
 
 @dataclass(frozen=True)
@@ -210,7 +196,3 @@ class Snapshot:
     contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     readings: tuple[Reading, ...] = ()
     broken_stitches: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-
-    def body_positions(self, name: str) -> NDArray[np.float64]:
-        """(n, 3) of one body [m]."""
-        return self.positions[self.description.body(name).vertices]
