@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from supple.mesh.skin import Embedding
 from supple.model.joints.at_state import coordinates_at, reported
 from supple.model.joints.functions import COSINE, derivatives
 from supple.model.joints.geometry import JointGeometry
-from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.laws import GivenValue
 from supple.model.pin_reactions import pin_labels
 from supple.model.state import State
@@ -38,16 +37,8 @@ from supple.solvers.implicit.energies.joints import JointPotential
 Floats = NDArray[np.float64]
 
 
-class Asked(Protocol):
-    """What a reading is of: a `Misfit`."""
-
-    quantity: str
-    of: str
-    vertices: NDArray[np.int64] | None
-    points: Floats | None
-
-    @property
-    def label(self) -> str: ...
+# What is asked for: a `Misfit`.
+Asked = Any
 
 
 class Reading(NamedTuple):
@@ -115,14 +106,9 @@ def _matrix(points: EmbeddedPoints, system: System) -> Any:
     return csr_array(kron(csr_array((points.weights, points.vertices, points.start), shape=shape), eye_array(3)))
 
 
-def _positions(asked: Asked, system: System, state: State) -> Reading:
-    matrix = _points_of(asked, system)
-    return Reading((matrix @ state.positions.ravel()).reshape(-1, 3), matrix)
-
-
-def _velocities(asked: Asked, system: System, state: State) -> Reading:
-    matrix = _points_of(asked, system)
-    return Reading((matrix @ state.velocities.ravel()).reshape(-1, 3), matrix)
+def _points(asked: Asked, system: System, state: State) -> Reading:
+    matrix, values = _points_of(asked, system), state.velocities if asked.quantity == "velocities" else state.positions
+    return Reading((matrix @ values.ravel()).reshape(-1, 3), matrix)
 
 
 def _center(asked: Asked, system: System, state: State) -> Reading:
@@ -192,27 +178,15 @@ def _joint(asked: Asked, system: System, state: State) -> Reading:
     return _number(reported(geometry, coordinates_at(geometry, state))[asked.of], out)
 
 
-def _actuator(asked: Asked, system: System, state: State, kind: str) -> tuple[Actuator, float, Floats]:
-    """The actuator, its coordinate, and the derivative (n, 3) of that."""
+def _actuator(asked: Asked, system: System, state: State) -> Reading:
+    """The coordinate of a cavity or cable, or the force that its law has there."""
+    kind = "cable" if asked.quantity == "length" else "cavity"
     known = [one for one in system.actuators if one.kind == kind]
     one = known[_chosen(asked.of, [one.name for one in known], asked.label, kind)]
     out, own = np.zeros_like(state.positions), state.positions[one.coordinate.vertices]
     out[one.coordinate.vertices] = one.coordinate.gradient(own)
-    return one, one.coordinate.value(own), out
-
-
-def _volume(asked: Asked, system: System, state: State) -> Reading:
-    return _number(*_actuator(asked, system, state, "cavity")[1:])
-
-
-def _length(asked: Asked, system: System, state: State) -> Reading:
-    return _number(*_actuator(asked, system, state, "cable")[1:])
-
-
-def _pressure(asked: Asked, system: System, state: State) -> Reading:
-    one, volume, by = _actuator(asked, system, state, "cavity")
-    law = one.law.at(state.time, 0.0)
-    return _number(law.force(volume), -law.stiffness(volume) * by)
+    s, law = one.coordinate.value(own), one.law.at(state.time, 0.0)
+    return _number(law.force(s), -law.stiffness(s) * out) if asked.quantity == "pressure" else _number(s, out)
 
 
 def _number(value: float, by: Floats) -> Reading:
@@ -240,7 +214,8 @@ def sum_of(vertices: NDArray[np.integer], n: int) -> Any:
 def quantity_of(asked: Asked, system: System) -> Quantity:
     """What a system has of the quantity that is asked for: the pressure of a given volume is a force of the step."""
     quantity = QUANTITIES[asked.quantity]
-    if asked.quantity == "pressure" and asked.of in _held(system):
+    of_cavity = [one for one in system.actuators if one.kind == "cavity" and one.name == asked.of]
+    if asked.quantity == "pressure" and any(one.name in _held(system) for one in of_cavity):
         return Quantity(0, "held", None)
     return quantity
 
@@ -266,29 +241,28 @@ def force_of(asked: Asked, frame: Frame) -> Floats:
     by = quantity_of(asked, system).by
     if by == "held":
         return np.array(details.cavity_pressure[asked.of])
-    if by == "contact":
-        _chosen(asked.of, [part.name for part in system.bodies], asked.label, "body")
-        assert isinstance(details, ImplicitDetails)
-        return np.sum(
-            [of.get(asked.of, np.zeros(3)) for of in (details.contact_forces, details.friction_forces)], axis=0
-        )
-    k, labels = driver_of(asked, system), pin_labels(system)
-    if k < len(labels):
-        return details.reaction_forces[labels[k]]
-    name = str(system.obstacles[k - len(labels)].name)
+    name, sign = asked.of, 1.0
+    if by == "pins":
+        k, labels = driver_of(asked, system), pin_labels(system)
+        if k < len(labels):
+            return details.reaction_forces[labels[k]]
+        name, sign = str(system.obstacles[k - len(labels)].name), -1.0
+    else:
+        _chosen(name, [part.name for part in system.bodies], asked.label, "body")
     assert isinstance(details, ImplicitDetails)
-    return -(details.contact_forces[name] + details.friction_forces[name])
+    both = (of.get(name, np.zeros(3)) for of in (details.contact_forces, details.friction_forces))
+    return sign * sum(both, start=np.zeros(3))
 
 
 QUANTITIES = {
-    "positions": Quantity(2, "x", _positions),
-    "velocities": Quantity(2, "v", _velocities),
+    "positions": Quantity(2, "x", _points),
+    "velocities": Quantity(2, "v", _points),
     "center": Quantity(1, "x", _center),
     "sensor": Quantity(0, "x", _sensor),
     "joint": Quantity(0, "x", _joint),
-    "volume": Quantity(0, "x", _volume),
-    "pressure": Quantity(0, "x", _pressure),
-    "length": Quantity(0, "x", _length),
+    "volume": Quantity(0, "x", _actuator),
+    "pressure": Quantity(0, "x", _actuator),
+    "length": Quantity(0, "x", _actuator),
     "reaction": Quantity(1, "pins", None),
     "contact": Quantity(1, "contact", None),
 }
