@@ -8,6 +8,7 @@ from tests.gradients import scenes
 from tests.gradients.scenes import implicit
 
 import supple as sp
+from supple.gradients.check import check
 
 
 def tip(frame, factor=1.0):
@@ -77,3 +78,18 @@ def test_a_run_that_is_divided_otherwise_is_a_jump():
     found = sensitivity(lambda p: scenes.twisted([1, 1, p[0]]), loss, solver, steps=2).check([high], 1)
     assert found.verdict == "kink", str(found)
     assert "substeps in one of the two runs" in found.reason
+
+
+def test_runs_that_do_not_converge_with_a_sharper_tolerance_are_compared_as_they_are():
+    class Square:
+        solver = sp.Implicit()
+
+        def value_and_gradient(self, p):
+            if self.solver.tolerance is not None:
+                raise sp.SolverError("frame 1 did not converge")
+            return float(p @ p), 2.1 * p
+
+        def value_and_structure(self, p):
+            return float(p @ p), [{"contacts": 1.0}]
+
+    assert check(Square(), np.ones(2), np.eye(2), 1e-4).verdict == "wrong"

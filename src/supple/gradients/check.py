@@ -118,16 +118,16 @@ def check(one: Runs, p: Floats, ways: Floats, h: float) -> Check:
     # The finest difference has no part in what begins to act within the coarser ones.
     off = np.abs(np.stack([extrapolated[:, -1], slopes[:, -1]]) - along)
     best = np.where(off[0] <= off[1], extrapolated[:, -1], slopes[:, -1])
-    found, off = (
-        replace(found, gradient=along, differences=best, noise=found.noise * _RATIO ** (_SIZES - 1)),
-        off.min(axis=0),
+    noise, off = found.noise * _RATIO ** (_SIZES - 1), off.min(axis=0)
+    found = replace(found, gradient=along, differences=best, noise=noise)
+    given, sharp = (
+        "the default tolerance" if of.solver.tolerance is None else f"tolerance={of.solver.tolerance:.2g}"
+        for of in (one, fine)
     )
-    given, sharp = one.solver.tolerance, fine.solver.tolerance
-    of_tolerance = "the default tolerance" if given is None else f"tolerance={given:.2g}"
     if (off <= _AGREE * scale).all():
         if np.abs(slopes[:, 0] - [pair.slope for pair in rough]).max() <= _AGREE * scale:
             return replace(found, reason="gradient and differences agree, as far as steps are small enough")
-        text = f"differences are too noisy with {of_tolerance}; use tolerance={sharp:.2g}, with which they agree"
+        text = f"differences are too noisy with {given}; use {sharp}, with which they agree"
         return replace(found, verdict="noisy", reason=text)
     worst = int(off.argmax())
     settled = abs(extrapolated[worst, -1] - extrapolated[worst, -2]) <= _SETTLED * off[worst]
@@ -138,9 +138,7 @@ def check(one: Runs, p: Floats, ways: Floats, h: float) -> Check:
         text = f"there is a kink or jump between the two runs: {where}; check at other parameters, or with another step"
         return replace(found, verdict="kink", reason=text)
     if not settled:
-        text = (
-            f"differences are too noisy, even with tolerance={sharp:.2g}; use a larger step, or fewer steps of the run"
-        )
+        text = f"differences are too noisy, even with {sharp}; use a larger step, or fewer steps of the run"
         return replace(found, verdict="noisy", reason=text)
     return replace(found, verdict="wrong", reason="the gradient is wrong, as differences settle on other values")
 
