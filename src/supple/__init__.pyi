@@ -33,6 +33,7 @@ from .materials.own.energy_material import EnergyMaterial as EnergyMaterial
 from .materials.rubber import MooneyRivlin as MooneyRivlin
 from .materials.rubber import Ogden as Ogden
 from .materials.rubber import Yeoh as Yeoh
+from .materials.shells.shell_material import ShellMaterial as ShellMaterial
 from .materials.viscoelastic import Viscoelastic as Viscoelastic
 from .mesh import shapes as shapes
 from .mesh.meshing.decimation import decimate_surface as decimate_surface
@@ -88,6 +89,7 @@ from .scene.sensors import AngleSensor as AngleSensor
 from .scene.sensors import DistanceSensor as DistanceSensor
 from .scene.sensors import ForceSensor as ForceSensor
 from .scene.sensors import Taxels as Taxels
+from .scene.shell import Shell as Shell
 from .scene.stitches.springs import VertexEdgeStitch as VertexEdgeStitch
 from .scene.stitches.springs import VertexVertexStitch as VertexVertexStitch
 from .scene.stitches.vertex_triangle import SoftVertexTriangleStitch as SoftVertexTriangleStitch

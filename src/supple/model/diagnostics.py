@@ -23,7 +23,8 @@ class Diagnostics:
 
     Attributes
     ----------
-    min_det_F : smallest J over all tets, of quadratic ones at their nodes and quadrature points [-]
+    min_det_F : smallest J over all tets, of quadratic ones at their nodes and quadrature points; of triangles of shells
+        their area over that at rest [-]
     kinetic_energy, elastic_energy : [J], elastic from the rest state
     potential_energy : of gravity [J], zero where all mass is at the origin
     stitch_energy : of all stitches, from their rest state [J]
@@ -55,10 +56,15 @@ def measure(system: System, state: State) -> Diagnostics:
     laws, stitching = system.laws_at(state.time), system.stitching
     F = mean_deformation_gradients(laws, x)
     points = stitching.points(x, state.time)
+    elastic = float((energy_densities(laws, x, F, state.internal) * laws.volumes)[laws.known].sum())
+    smallest = float(least_ratios(laws, x, F).min(initial=np.inf))
+    if system.shells is not None:
+        elastic += system.shells.energy(x)
+        smallest = min(smallest, float(system.shells.area_ratios(x).min()))
     return Diagnostics(
-        min_det_F=float(least_ratios(laws, x, F).min()),
+        min_det_F=smallest,
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
-        elastic_energy=float((energy_densities(laws, x, F, state.internal) * laws.volumes)[laws.known].sum()),
+        elastic_energy=elastic,
         potential_energy=-float((m @ x) @ system.gravity),
         stitch_energy=stitch_energy(stitching, points) if len(stitching) else 0.0,
         largest_stitch_stretch=largest_stitch_stretch(stitching, points) if len(stitching) else None,

@@ -20,6 +20,7 @@ from supple.materials.elastic import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
 from supple.materials.elastic_tets.quadratic import QuadraticTets
+from supple.materials.shells.elements import ShellElements, elements_of
 from supple.mesh.topology import graph_components
 from supple.model.loads.actuators.actuator import Actuator
 from supple.model.loads.actuators.build import actuators_of
@@ -33,8 +34,9 @@ from supple.scene.motion import Motion, moved_points, points_at_origin, rigid_po
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.rows import BodyRows
+from supple.scene.rows import BodyRows, rows_of
 from supple.scene.scene import Scene
+from supple.scene.shell import Shell
 from supple.scene.stitches.stitching import Stitching, no_stitching
 
 
@@ -105,6 +107,7 @@ class System:
     effective_masses : (n,) with which constraints see vertices, where a solver gives them others than `masses` [kg]
     start_states : where a simulation began, then where it continues; vertices in the scene's order
     quadratic : the quadratic ones among the tets, of which `tets` and `rest_shape_inverse` have the corners; or None
+    shells : triangles and hinges of all shells; or None
     """
 
     scene: Scene
@@ -129,6 +132,7 @@ class System:
     effective_masses: NDArray[np.float64] | None = None
     start_states: tuple[State, ...] = ()
     quadratic: QuadraticTets | None = None
+    shells: ShellElements | None = None
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -260,7 +264,27 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         welding=scene.welding,
         start_states=start_states,
         quadratic=_quadratic_tets(ranges, rest_positions),
+        shells=shells_of(scene),
     )
+
+
+def shells_of(scene: Scene) -> ShellElements | None:
+    """The triangles and hinges of all shells, clamped where a pin or a weld holds whole triangles."""
+    rows = rows_of(scene.bodies)
+    parts = [
+        (part.body.points, part.body.triangles, part.vertices.start, part.body.material)
+        for part in rows
+        if isinstance(part.body, Shell)
+    ]
+    if not parts:
+        return None
+    begins = {part.name: part.vertices.start for part in rows}
+    holders = np.full(rows[-1].vertices.stop, -1, dtype=np.int64)
+    for number, pin in enumerate(scene.pins):
+        body = scene.body(pin.body)
+        holders[pin.select(body.place(body.mesh.vertices)) + begins[pin.body]] = number
+    holders[scene.welding.vertices] = scene.welding.weld + len(scene.pins)
+    return elements_of(parts, holders)
 
 
 def _quadratic_tets(ranges: list[BodyRange], rest_positions: NDArray[np.float64]) -> QuadraticTets | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,8 +57,12 @@ class PlacedBody(Kind):
     friction: Annotated[float, NON_NEGATIVE] = 0.0
     look: Annotated[str | None, Choice(LOOKS)] = None
     mesh: TetMesh = field(init=False, repr=False)
-    material: Material = field(init=False, repr=False)
     skin: SurfaceMesh | None = field(init=False, repr=False)
+
+    if TYPE_CHECKING:  # a field of every body, at its own place among the arguments
+
+        @property
+        def material(self) -> Material: ...
 
     @property
     def drawn_look(self) -> str:

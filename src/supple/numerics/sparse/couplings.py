@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,15 @@ def _add_product(rows, columns, blocks, x, out):
             for r in range(3):
                 for c in range(3):
                     out[j, c] += blocks[t, r, c] * x[i, r]
+
+
+class Correction(Protocol):
+    """A symmetric matrix, not above zero, that is known by its products. Those of CG that has the factors of all the
+    rest for a preconditioner are few where it is a share of that."""
+
+    def add_product(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Add the product with x (n, 3) to `out` (n, 3)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

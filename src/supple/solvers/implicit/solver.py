@@ -31,6 +31,7 @@ from supple.solvers.implicit.energies.damping import quadratic_viscosity_of, vis
 from supple.solvers.implicit.energies.elasticity import elasticity_of, refuse_materials
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.regularization import regularization_of
+from supple.solvers.implicit.energies.shells import ShellViscosity
 from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
 from supple.solvers.implicit.energies.stitches import StitchEnergy
 from supple.solvers.implicit.inversion_guard import refuse_inverted
@@ -133,6 +134,8 @@ class Implicit(Solver):
         if refusal := integrator_of(self.integrator).refusal(system):
             raise SolverError(refusal)
         refuse_materials(system)
+        if system.shells is not None and self.linear_solver == "pcg":
+            raise SolverError("Implicit: linear_solver='pcg' cannot simulate shells; use 'auto' or 'direct'")
 
     def prepare(self, system: System, tools: Tools | None = None) -> Workspace:
         """Compute the patterns, groups and memory for a system.
@@ -173,7 +176,12 @@ class Implicit(Solver):
             hessian = HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching))
             tools = Tools(linear_solver, hessian, system.pinned_vertices, free_motion)
         stitches = StitchEnergy.of(system.stitching, 0.0) if len(system.stitching) else None
-        dampers = viscosity_of(elasticity), quadratic_viscosity_of(elasticity), StitchViscosity.of(system.stitching)
+        dampers = (
+            viscosity_of(elasticity),
+            quadratic_viscosity_of(elasticity),
+            StitchViscosity.of(system.stitching),
+            ShellViscosity.of(system.shells),
+        )
         return Workspace(
             system,
             contact,

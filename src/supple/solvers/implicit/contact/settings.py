@@ -13,6 +13,7 @@ from supple.kinds.kind import Kind
 from supple.kinds.validators import COUNT, POSITIVE, Union
 from supple.model.system import BodyRange, System
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.shell import Shell
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,8 @@ def _modulus(part: BodyRange, shear_moduli: NDArray[np.float64]) -> float:
     """Of one body [Pa]; of a rigid body, ten times the stress that its default stiffness is made for."""
     if isinstance(part.body, RigidBody):
         return _RIGID_SHARE * part.body.kappa
+    if isinstance(part.body, Shell):
+        return 3.0 * part.body.material.mu
     return 3.0 * float(np.mean(shear_moduli))
 
 

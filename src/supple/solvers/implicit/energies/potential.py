@@ -10,7 +10,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.sparse.couplings import Couplings, RankOne
+from supple.numerics.sparse.couplings import Correction, Couplings, RankOne
 
 
 class Projection(Enum):
@@ -33,6 +33,7 @@ class HessianBlocks:
     couplings : matrices of contacts and joints, between vertices that no element joins [N/m]
     patches, loads : matrices of patches of tets and of quadratic tets, and of loads, likewise [N/m]
     low_rank : matrices between all vertices of an actuator [N/m]
+    corrections : what the sum of all others exceeds the Hessian by, where no sparse matrix could hold that
     blank : whether nothing has been added to `elements`; the memory may then hold an earlier sum
     """
 
@@ -43,6 +44,7 @@ class HessianBlocks:
     patches: list[Couplings] = field(default_factory=list)
     loads: list[Couplings] = field(default_factory=list)
     low_rank: list[RankOne] = field(default_factory=list)
+    corrections: list[Correction] = field(default_factory=list)
     blank: bool = False
 
     def clear(self) -> None:
@@ -52,6 +54,7 @@ class HessianBlocks:
         self.patches.clear()
         self.loads.clear()
         self.low_rank.clear()
+        self.corrections.clear()
         self.blank = True
 
     @property

@@ -50,4 +50,8 @@ def regularization_of(system: System) -> Regularization:
         squares = np.einsum("ks,ksai,ksai->ka", points.volumes, points.gradients, points.gradients)
         share = _SHARE * mu[system.quadratic.rows, None] * squares
         stiffness += np.bincount(points.nodes.ravel(), weights=share.ravel(), minlength=len(stiffness))
+    if (shells := system.shells) is not None:
+        squares = np.einsum("tpa,tpa->t", shells.gradients, shells.gradients)
+        share = np.repeat(_SHARE * shells.mu * shells.thickness * shells.areas * squares, 3)
+        stiffness += np.bincount(shells.triangles.ravel(), weights=share, minlength=len(stiffness))
     return Regularization(stiffness)

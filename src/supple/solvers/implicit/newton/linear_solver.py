@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from supple.model.system import System
 from supple.numerics.sparse.block_csr import BlockPattern, build_pattern
 from supple.numerics.sparse.block_sum import JointPattern
-from supple.numerics.sparse.couplings import Couplings
+from supple.numerics.sparse.couplings import Correction, Couplings
 from supple.numerics.sparse.pcg import CGResult, conjugate_gradients
 from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
 from supple.runtime.thread_tuning import ThreadTuner
@@ -57,6 +57,7 @@ class LinearSolver:
     kind : "auto" (CG, and a factorization where CG stalls), "pcg" or "direct"
     order : which vertex each row belongs to; row_of : (n,) row of each vertex, -1 where it is pinned
     matrix : the sparse part; low_rank : (k, rows, 3) vectors g, of which g g^T is added to it
+    corrections : what else is added; such a matrix is factorized
     age, fresh_iterations : the number of runs of CG on the present coarse level (-1: none), and the iterations of the
         first one
     solves : how many systems have been solved
@@ -75,6 +76,7 @@ class LinearSolver:
     joint: JointPattern | None = None
     reduction: Reduction | None = None
     low_rank: NDArray[np.float64] = field(init=False)
+    corrections: Sequence[Correction] = ()
     age: int = -1
     fresh_iterations: int = 0
     solves: int = 0
@@ -128,7 +130,8 @@ class LinearSolver:
         self.low_rank = np.zeros((len(hessian.low_rank), count, 3))
         for k, part in enumerate(hessian.low_rank):
             self.low_rank[k] = part.in_rows(self.row_of, count)
-        if self.kind != "direct":
+        self.corrections = tuple(hessian.corrections)
+        if self.kind != "direct" and not self.corrections:
             self.preconditioner.update(self.matrix, coarse=self.age < 0)
 
     def _assemble_joint(
@@ -183,7 +186,7 @@ class LinearSolver:
             return p, LinearReport("none", 0, 0.0)
         first_norm = 0.0
         iterations = 0
-        if self.kind != "direct":
+        if self.kind != "direct" and not self.corrections:
             most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
             result = self._conjugate_gradients(b, x, tolerance, most)
             if result.indefinite and not convex:
@@ -204,11 +207,25 @@ class LinearSolver:
                 return None, LinearReport("pcg", iterations, first_norm)
             logger.debug("CG stalled after %d iterations; factorizing", iterations)
         pattern = self.preconditioner.pattern
-        solution = solve_directly(pattern, self.matrix, b, not convex, self.low_rank)
+        correct = self._correct if self.corrections else None
+        solution = solve_directly(pattern, self.matrix, b, not convex, self.low_rank, correct)
         if solution is None:
             return None, LinearReport("direct", iterations, first_norm)
         p[self.order.vertices] = solution
         return p, LinearReport("direct", iterations, first_norm)
+
+    def _correct(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The products of the corrections with a vector of the free vertices (n, 3)."""
+        whole = np.zeros((len(self.row_of), 3))
+        whole[self.order.vertices] = rows
+        if self.reduction is not None:
+            self.reduction.welding.follow(whole)
+        out = np.zeros_like(whole)
+        for one in self.corrections:
+            one.add_product(whole, out)
+        if self.reduction is not None:
+            out = self.reduction.welding.reduced(out)
+        return out[self.order.vertices]
 
     def _conjugate_gradients(
         self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int

@@ -18,6 +18,7 @@ from supple.solvers.implicit.energies.loads.pressure import drags_at, pressures_
 from supple.solvers.implicit.energies.loads.springs import soft_targets_at, springs_at
 from supple.solvers.implicit.energies.midpoint import ActingWithin
 from supple.solvers.implicit.energies.potential import Potential
+from supple.solvers.implicit.energies.shells import ShellEnergy
 from supple.solvers.implicit.energies.vertex_potential import VertexPotential, inertia
 from supple.solvers.implicit.inversion_guard import InversionGuard
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
@@ -282,6 +283,8 @@ def stored_and_loaded(
     """All but contact and the inversion barrier, with the loads of `time` [s]; energies of loads are zero at x."""
     system = workspace.system
     terms: list[Potential] = [elasticity]
+    if system.shells is not None:
+        terms.append(ShellEnergy(system.shells))
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
     if forces.any():
