@@ -18,7 +18,7 @@ def hessian_product(potential, tets, x, d, project=False):
     potential.add_hessian(x, blocks, project)
     out = np.einsum("nij,nj->ni", blocks.vertices, d)
     np.add.at(out, tets, np.einsum("eij,ej->ei", blocks.tets, d[tets].reshape(-1, 12)).reshape(-1, 4, 3))
-    for part in (*blocks.beyond_elements, *blocks.low_rank):
+    for part in (*blocks.beyond_elements, *blocks.low_rank, *blocks.corrections):
         part.add_product(d, out)
     return out
 

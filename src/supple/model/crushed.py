@@ -57,7 +57,13 @@ def too_soft(system: System, part: BodyRange) -> str:
     """What is wrong with the stiffness of a body that its own weight crushes; "" where it carries its weight."""
     youngs = getattr(part.body.material, "youngs", None)
     gravity = math.hypot(*system.gravity)
-    if part.rigid or isinstance(part.body, Shell) or youngs is None or not gravity or not (system.obstacles or system.pins):
+    if (
+        part.rigid
+        or isinstance(part.body, Shell)
+        or youngs is None
+        or not gravity
+        or not (system.obstacles or system.pins)
+    ):
         return ""
     heights = system.start_states[0].positions[part.vertices] @ (system.gravity / gravity)
     density = float(system.masses[part.vertices].sum() / system.rest_volumes[part.tets].sum())

@@ -123,7 +123,8 @@ class ShellElements:
         missing = self.hinge_of < 0
         both = missing[:, :, None] | missing[:, None, :]
         kept = np.where(both, np.where(np.eye(3, dtype=bool), 1.0, 0.0), self.compliances)
-        shares = 1.0 / np.bincount(self.hinge_of[~missing], minlength=1)[np.maximum(self.hinge_of, 0)]
+        counts = np.bincount(self.hinge_of[~missing], minlength=1)
+        shares = 1.0 / np.maximum(counts, 1)[np.maximum(self.hinge_of, 0)]
         return np.where(both, 0.0, shares[:, :, None] * np.linalg.inv(kept) * shares[:, None, :])
 
     @cached_property
@@ -162,9 +163,7 @@ class ShellElements:
         return csr_array((gradients.reshape(-1), columns, starts), shape=(len(self.hinges), 3 * vertices))
 
 
-def elements_of(
-    parts: Sequence[tuple[Floats, Ints, int, ShellMaterial]], holders: NDArray[np.int64]
-) -> ShellElements:
+def elements_of(parts: Sequence[tuple[Floats, Ints, int, ShellMaterial]], holders: NDArray[np.int64]) -> ShellElements:
     """Of shells, each with its vertices at rest (n, 3), triangles (t, 3), number of its first vertex, and material.
 
     holders : of every vertex of the scene, the number of what holds it, -1 for nothing
@@ -202,7 +201,7 @@ def _elements(
         hinge_of[held] = -1
         used = np.zeros(len(hinges), dtype=bool)
         used[hinge_of[hinge_of >= 0]] = True
-        hinge_of = np.where(hinge_of < 0, -1, (np.cumsum(used) - 1)[hinge_of])
+        hinge_of = np.append(np.cumsum(used) - 1, -1)[hinge_of]
         hinges = hinges[used]
         C = D * np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 2.0 * (1.0 - nu)]])
         inverse = np.linalg.inv(B)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from supple.model.loads.applied import AppliedLoad, DragLoad, Setting
 from supple.scene.loads.over_time import script_of
 from supple.scene.loads.surface_loads import Wind
+from supple.scene.shell import Shell
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,4 +141,6 @@ def wind_drag(load: Wind, setting: Setting) -> list[AppliedLoad]:
     """The wind on a body of a scene."""
     body = setting.body(load.body)
     triangles = body.triangles[load.triangles(body)] + setting.begins[load.body]
+    if isinstance(body, Shell):  # which has two sides
+        triangles = np.concatenate([triangles, triangles[:, ::-1]])
     return [WindDrag(triangles.astype(np.int32), script_of(load, "velocity"), load.density * load.drag)]

@@ -20,6 +20,7 @@ from supple.scene.loads.over_time import script_of
 from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction, Wind
 from supple.scene.rows import BodyRows
+from supple.scene.shell import Shell
 
 Work = tuple[str, Forces | str]
 """The name of a work, and the forces that do it, or why they are not known."""
@@ -74,7 +75,9 @@ def _(load: Wind, of: Known) -> Work:
     def forces(time: float, x: Floats, v: Floats) -> Floats:
         out, against = np.zeros_like(x), velocity(time) - v[triangles]
         facing = -np.einsum("ti,ti->t", area_vectors(x, triangles), against.mean(axis=1))
-        share = load.density * load.drag / 6.0 * np.where(facing > 0.0, facing, 0.0)
+        # A shell has two sides, one of which faces the flow.
+        facing = np.abs(facing) if isinstance(body, Shell) else np.where(facing > 0.0, facing, 0.0)
+        share = load.density * load.drag / 6.0 * facing
         np.add.at(out, triangles, share[:, None, None] * against)
         return out
 

@@ -11,6 +11,7 @@ from supple.materials.elastic import EdgesAndVolume
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.results.check.known import Cable, Cavity, Growing, Ints, Weld
 from supple.results.check.loads import combined, forces_of
+from supple.results.check.shells import StoredByShell
 from supple.results.check.trajectory import Snapshot, Trajectory
 from supple.results.recording.reader import Recording
 from supple.scene.body import PlacedBody
@@ -21,7 +22,9 @@ from supple.scene.joints.placed import placed_joints
 from supple.scene.loads.growth import Growth
 from supple.scene.loads.over_time import script_of
 from supple.scene.pins import Pin
+from supple.scene.rows import BodyRows
 from supple.scene.scene import Scene
+from supple.scene.shell import Shell
 from supple.scene.stitches.measures import StitchEnds
 
 
@@ -42,6 +45,7 @@ class RecordedTrajectory(Trajectory):
         self.tets = _joined(part.body.mesh.tets + part.vertices.start for part in source.bodies).astype(np.int32)
         self.material = joined_materials([tet_material(b.material, len(b.mesh.tets), b.mesh.order) for b in bodies])
         self.springs = [b.material if isinstance(b.material, EdgesAndVolume) else None for b in bodies]
+        self.shells = [(part, _shell(part, source.scene)) for part in source.bodies if isinstance(part.body, Shell)]
         curved = [part for part in source.bodies if part.body.mesh.order == 2]
         if curved:
             numbers = _joined(np.arange(part.tets.start, part.tets.stop) for part in curved)
@@ -87,6 +91,20 @@ class RecordedTrajectory(Trajectory):
 
 def _joined(parts: Iterable[NDArray]) -> NDArray:
     return np.concatenate(list(parts))
+
+
+def _shell(part: BodyRows, scene: Scene) -> StoredByShell:
+    body, welding = part.body, scene.welding
+    assert isinstance(body, Shell)
+    holder = np.full(len(body.points), -1)
+    for number, pin in enumerate(scene.pins):
+        if pin.body == body.name:
+            holder[pin.select(body.place(body.points))] = number
+    own = (welding.vertices >= part.vertices.start) & (welding.vertices < part.vertices.stop)
+    holder[welding.vertices[own] - part.vertices.start] = len(scene.pins) + welding.weld[own]
+    corners = holder[body.triangles]
+    held = (corners[:, 0] >= 0) & (corners == corners[:, :1]).all(axis=1)
+    return StoredByShell(body.points, body.triangles.astype(np.int64), body.material, held)
 
 
 def _limits(joint: Joint) -> tuple[float, float]:

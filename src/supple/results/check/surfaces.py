@@ -208,10 +208,13 @@ class Surfaces:
         labels = graph_components(self.points, *np.concatenate(parts).T)[triangles[:, 0]]
         order = np.argsort(labels, kind="stable")
         starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
-        pieces = []
+        pieces, shells = [], {body.number for body, _ in of.shells}
         for rows in np.split(order, starts[1:]) if len(order) else []:
             own = triangles[rows]
-            pieces.append(Piece(int(self.owners[rows[0]]), rows, _is_closed(own), int(own[0, 0])))
+            owner = int(self.owners[rows[0]])
+            # A thing may be in a closed shell, which is hollow.
+            closed = _is_closed(own) and owner not in shells
+            pieces.append(Piece(owner, rows, closed, int(own[0, 0])))
         return tuple(pieces)
 
 

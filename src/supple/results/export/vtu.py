@@ -7,33 +7,42 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from supple.mesh.surface import SurfaceMesh
 from supple.results.recording.reader import Recording
 from supple.runtime.replacing import whole_file
+from supple.scene.shell import Shell
 
 
 def write_last_vtu(recording: Recording, output: Path) -> None:
-    """Write the last frame: tets, velocities, J, body numbers and recorded fields; rigid bodies as their surfaces."""
+    """Write the last frame: tets, velocities, J, body numbers and recorded fields; rigid bodies and shells as their
+    surfaces, and their ratios of areas as J."""
     import meshio
 
     frame = recording[-1]
     positions, velocities = list(frame.positions.values()), list(frame.velocities.values())
     starts = np.cumsum([0, *map(len, positions)])
     triangles = [np.zeros((0, 3), np.int32)]
-    of_point, of_triangle = np.zeros(starts[-1], np.int32), []
+    of_point, of_triangle, ratios = np.zeros(starts[-1], np.int32), [], []
     parts, tets = [], []
     for i, body in enumerate(recording.bodies):
         of_point[starts[i] : starts[i + 1]] = i
         if body.rigid and body.skin is not None:
             triangles.append(body.skin.triangles + starts[i])
             of_triangle += [i] * len(body.skin.triangles)
+            ratios += [float(frame.det_F[body.tets.start])] * len(body.skin.triangles)
+        elif isinstance(body.body, Shell):
+            triangles.append(body.boundary + starts[i])
+            of_triangle += [i] * len(body.boundary)
+            at_rest = SurfaceMesh(body.body.points, body.boundary), SurfaceMesh(positions[i], body.boundary)
+            areas = [np.linalg.norm(surface.area_vectors, axis=1) for surface in at_rest]
+            ratios += (areas[1] / areas[0]).tolist()
         else:
             nodes = body.body.mesh.nodes + starts[i]
             tets.append(body.tets)
             kind = "tetra" if nodes.shape[1] == 4 else "tetra10"
             parts.append((kind, nodes, frame.det_F[body.tets], np.full(len(nodes), i, dtype=np.int32)))
-    rigid = np.array([frame.det_F[body.tets.start] if body.rigid else 1.0 for body in recording.bodies])
     if of_triangle:
-        parts.append(("triangle", np.concatenate(triangles), rigid[of_triangle], np.array(of_triangle, dtype=np.int32)))
+        parts.append(("triangle", np.concatenate(triangles), np.array(ratios), np.array(of_triangle, dtype=np.int32)))
     at_points: dict[str, ArrayLike] = {"velocities": np.concatenate(velocities), "body": of_point}
     at_cells = {"det_F": [values for _, _, values, _ in parts], "body": [numbers for _, _, _, numbers in parts]}
     for field in recording.fields:

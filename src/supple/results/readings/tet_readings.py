@@ -28,6 +28,7 @@ from supple.numerics.svd3 import principal_stretches
 from supple.results.readings.by_body import TetField
 from supple.runtime.displayed import DisplayedFrame
 from supple.scene.rigid.pose import Pose, pose_of
+from supple.scene.shell import Shell
 
 QUANTITIES = ("J", "von_mises", "energy")
 
@@ -52,6 +53,7 @@ def tet_values(
 
 
 _OF_RIGID = "is rigid: it does not have strains and stresses"
+_OF_SHELL = "is a shell: fields on tets are not those of its triangles"
 _NO_LAW = "has no known elastic law, so it has no {}; give it an elastic material such as StableNeoHookean"
 _RIGID = "has rigid edges or volumes, whose forces do not follow from positions; give both a compliance above 0"
 
@@ -122,13 +124,13 @@ class TetReadings(DisplayedFrame):
     @cached_property
     def principal_stretches(self) -> TetField:
         """(m, 3) singular values of F [-], descending; the last one is negative where the tet is inverted."""
-        return TetField(principal_stretches(self._F), self.system.bodies, self._refused_of_rigid, self._to_vertices)
+        return TetField(principal_stretches(self._F), self.system.bodies, self._without_tets, self._to_vertices)
 
     @cached_property
     def energy_density(self) -> TetField:
         """Strain energy per rest volume (m,) [J/m^3], zero at rest. Rigid edges and volumes have none."""
         refused = {name: _NO_LAW.format("energy") for name in self._names_where(~self.laws.known)}
-        refused |= self._refused_of_rigid
+        refused |= self._without_tets
         return TetField(
             energy_densities(self.laws, self.state.positions, self._F, self.state.internal),
             self.system.bodies,
@@ -152,7 +154,7 @@ class TetReadings(DisplayedFrame):
         for tets, rows in material.flowing_laws:
             if chosen(tets):
                 out[tets.rows] += self.laws.means(tets, internal[rows, column])
-        return TetField(out, self.system.bodies, self._refused_of_rigid, self._to_vertices)
+        return TetField(out, self.system.bodies, self._without_tets, self._to_vertices)
 
     @cached_property
     def _F(self) -> NDArray[np.float64]:
@@ -161,12 +163,13 @@ class TetReadings(DisplayedFrame):
     def _field(self, values: NDArray[np.float64], what: str) -> TetField:
         refused = dict.fromkeys(self._names_where(~self.laws.stressed), _RIGID)
         refused |= {name: _NO_LAW.format(what) for name in self._names_where(~self.laws.known)}
-        refused |= self._refused_of_rigid
+        refused |= self._without_tets
         return TetField(values, self.system.bodies, refused, self._to_vertices)
 
     @property
-    def _refused_of_rigid(self) -> dict[str, str]:
-        return {body.name: _OF_RIGID for body in self.system.bodies if body.rigid}
+    def _without_tets(self) -> dict[str, str]:
+        rigid = {body.name: _OF_RIGID for body in self.system.bodies if body.rigid}
+        return rigid | {body.name: _OF_SHELL for body in self.system.bodies if isinstance(body.body, Shell)}
 
     def _names_where(self, chosen: NDArray[np.bool_]) -> list[str]:
         return [body.name for body in self.system.bodies if chosen[body.tets].any()]

@@ -186,7 +186,7 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
                 )
             else:
                 data = _reserve(new, series, shape)
-            step = max(1, _COPY_BYTES // max(1, series.frame_bytes)) * series.rows
+            step = max(1, _COPY_BYTES // max(1, series.frame_bytes)) * max(1, series.rows)
             for row in range(0, rows if 0 not in shape else 0, step):
                 if not small:
                     _require_room(target, step * series.frame_bytes // max(1, series.rows))

@@ -60,7 +60,8 @@ class Pressure(OnSurface):
 
 @dataclass(frozen=True, eq=False)
 class Wind(OnSurface):
-    """The drag of a flow on triangles: density/2 drag A |u| u of each triangle that faces the flow.
+    """The drag of a flow on triangles: density/2 drag A |u| u of each triangle that faces the flow; of a shell, on both
+    sides.
 
     u is the velocity of the flow against the triangle, and A the area of the triangle's projection along u. So a plate
     across the flow feels density/2 drag area |u|^2, whatever its tets, and a body that falls in still air reaches a

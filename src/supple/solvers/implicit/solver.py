@@ -23,6 +23,7 @@ from supple.numerics.inner_product import norm
 from supple.numerics.noninverting_step import KEEP
 from supple.runtime.threads import threads_for
 from supple.scene.scene import Scene
+from supple.scene.shell import Shell
 from supple.solvers.implicit.contact.model import contact_model
 from supple.solvers.implicit.contact.points import forces_on_owners
 from supple.solvers.implicit.contact.settings import IPCContact, smallest_diagonal
@@ -62,6 +63,8 @@ _BYTES_PER_TET = 5000
 _BYTES_OF_FACTOR = 1200
 # Beyond the above, for the matrices of its quadrature points and its blocks: 45,000 on a cube of 6,000.
 _BYTES_PER_QUADRATIC_TET = 50_000
+# Of shells, for their stencils' matrices and the two factorizations.
+_BYTES_PER_TRIANGLE = 25_000
 # Tets from which two threads pay for the time that it takes to compile the kernels' parallel forms.
 _SHARED_FROM = 1_500
 
@@ -120,6 +123,8 @@ class Implicit(Solver):
         for body in scene.bodies:
             per_tet = _BYTES_PER_TET + (_BYTES_PER_QUADRATIC_TET if body.mesh.order == 2 else 0)
             needed += per_tet * len(body.mesh.tets)
+            if isinstance(body, Shell):
+                needed += _BYTES_PER_TRIANGLE * len(body.triangles)
         if self.linear_solver == "direct":
             needed += int(_BYTES_OF_FACTOR * sum(len(body.mesh.vertices) ** (4.0 / 3.0) for body in scene.bodies))
         return needed
@@ -134,8 +139,16 @@ class Implicit(Solver):
         if refusal := integrator_of(self.integrator).refusal(system):
             raise SolverError(refusal)
         refuse_materials(system)
-        if system.shells is not None and self.linear_solver == "pcg":
-            raise SolverError("Implicit: linear_solver='pcg' cannot simulate shells; use 'auto' or 'direct'")
+        shell = next((part.name for part in system.bodies if isinstance(part.body, Shell)), None)
+        if shell is not None and self.linear_solver == "pcg":
+            raise SolverError(
+                f"body {shell!r}: Implicit(linear_solver='pcg') cannot simulate shells; use 'auto' or 'direct'"
+            )
+        if shell is not None and self.contact is not None:
+            raise SolverError(
+                f"body {shell!r} is a shell, and Implicit does not simulate their contact yet; give "
+                "Implicit(contact=None)"
+            )
 
     def prepare(self, system: System, tools: Tools | None = None) -> Workspace:
         """Compute the patterns, groups and memory for a system.

@@ -56,8 +56,10 @@ class Finite(FrameCheck):
 
     def _bad_rows(self, values: NDArray[np.float64], what: str, kind: Literal["vertex", "tet"]) -> tuple[int, str]:
         count = _bad_count(values)
+        if not count:
+            return 0, ""
         row = int(np.argmin(np.isfinite(values).all(axis=1)))
-        return count, f"{what} of {self.of.name(kind, row)}" if count else ""
+        return count, f"{what} of {self.of.name(kind, row)}"
 
 
 def _bad_count(values: NDArray[np.float64]) -> int:

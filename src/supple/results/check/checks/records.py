@@ -39,13 +39,16 @@ class Records(FrameCheck):
         sizes = np.maximum(1.0, sizes) ** 3
         apart = np.abs(of.records[at.number].det_F - at.J) / sizes
         apart[~np.isfinite(apart)] = 0.0
-        row = int(np.argmax(apart))
-        yield float(apart[row]), f"det F of {of.name('tet', row)}"
+        if len(apart):
+            row = int(np.argmax(apart))
+            yield float(apart[row]), f"det F of {of.name('tet', row)}"
+        shells = [shell.least_ratio(x[body.vertices]) for body, shell in of.shells]
+        J, largest = np.append(at.least_J, shells), np.append(sizes, np.ones(len(shells)))
         g, speeds = float(np.linalg.norm(of.gravity)), np.linalg.norm(v, axis=1)
         momentum, r = m @ v, x - m @ x / m.sum()
         turning = float(m @ (np.linalg.norm(r, axis=1) * speeds))
         measured = {
-            "min_det_F": (at.least_J.min(), sizes[int(np.argmin(at.least_J))]),
+            "min_det_F": (J.min(), largest[int(np.argmin(J))]),
             "kinetic_energy": (at.kinetic_energy, at.kinetic_energy + _NOTHING),
             "potential_energy": (-float((m @ x) @ of.gravity), float(m @ np.linalg.norm(x, axis=1)) * g + _NOTHING),
             "linear_momentum": (momentum, float(m @ speeds) + _NOTHING),

@@ -33,6 +33,9 @@ class RestShape(FrameCheck):
 
     def begin(self) -> None:
         of, volumes = self.of, self.of.rest_volumes
+        if not len(volumes):
+            self.why_not = "the scene has no tets"
+            return
         flat = volume_signs(of.rest_positions, of.tets) <= 0
         flat[of.quadratic[0]] |= ~quadratic_tets.are_positive(of.quadratic_at_rest)
         bad = np.flatnonzero(flat)
@@ -56,6 +59,8 @@ class Inversion(FrameCheck):
 
     def begin(self) -> None:
         self._crushed: list[int] = []
+        if not len(self.of.tets):
+            self.why_not = "the scene has no tets"
 
     def see(self, at: Snapshot) -> None:
         bad = np.flatnonzero(at.signs <= 0)
