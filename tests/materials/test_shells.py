@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from tests.derivatives import assert_derivatives, gradient_of, hessian_product
 from scipy.spatial.transform import Rotation
+from tests.derivatives import assert_derivatives, gradient_of, hessian_product
 
 import supple as sp
 from supple.materials.shells.elements import elements_of

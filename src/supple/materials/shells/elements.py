@@ -6,7 +6,8 @@ A shell stores t A psi(E) in each triangle, and in bending
 
 theta the angles of the hinges. m_e is the moment per length times the length of edge e: moments are constant in each
 triangle, and their normal components are continuous. A boundary edge carries none. A triangle whose corners one thing
-holds does not bend: the edges beside it are clamped. W sums for each other triangle Q^-1, with the energy 1/2 phi . Q phi of a triangle whose edges turn by phi against its plane: its curvature is
+holds does not bend: the edges beside it are clamped. W sums for each other triangle Q^-1, with the energy
+1/2 phi . Q phi of a triangle whose edges turn by phi against its plane: its curvature is
 
     S = sum over edges of phi_e l_e/A n_e n_e^T,    energy A D/2 ((tr S)^2 - 2 (1 - nu) det S),
 
