@@ -2,8 +2,8 @@
 
 With the Green strain E = (C - 1)/2 of a triangle's F (3, 2), C = F^T F, J^2 = det C, and a = nu / (1 - nu):
 
-    neo-Hookean             psi = mu/2 (tr C - 2 + (J^(-2 a) - 1) / a),      - 2 ln J in place of the quotient where a = 0
-    St. Venant-Kirchhoff    psi = mu E : E + lam/2 (tr E)^2,                 lam = 2 mu a
+    neo-Hookean             psi = mu/2 (tr C - 2 + (J^(-2 a) - 1) / a),   - 2 ln J in place of the quotient where a = 0
+    St. Venant-Kirchhoff    psi = mu E : E + lam/2 (tr E)^2,              lam = 2 mu a
 
 The first is Ogden's compressible neo-Hookean energy mu/2 (tr C_3 - 3 + (J_3^(-2 b) - 1)/b), b = nu/(1 - 2 nu), where no
 stress acts along the normal: the stretch of the thickness is then J^(-a). At nu = 1/2 it is incompressible. Stresses

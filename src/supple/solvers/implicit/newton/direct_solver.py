@@ -86,7 +86,7 @@ def solve_directly(
     Parameters
     ----------
     low_rank : (k, n, 3) the columns of G
-    correct : the products (n, 3) -> (n, 3) with C, which is not above zero. CG then follows, preconditioned by the factors
+    correct : the products (n, 3) -> (n, 3) with C, which is not above zero. CG follows, preconditioned by the factors
 
     Returns
     -------
