@@ -1,7 +1,5 @@
 """`supple fit scene.yaml` and `supple check-gradient`: values, files, faults of input, and a fit that was killed."""
 
-import os
-import signal
 import subprocess
 import sys
 import time
@@ -233,7 +231,7 @@ def test_a_fit_that_is_killed_goes_on(film, capfd):
         assert process.poll() is None
         assert time.monotonic() < deadline
         time.sleep(0.01)
-    os.kill(process.pid, signal.SIGKILL)
+    process.kill()
     process.wait()
     whole = logs[0].read_text()
     logs[0].write_text(whole[: whole.rfind("\n") + 1] + "0.0000")
