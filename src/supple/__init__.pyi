@@ -8,6 +8,7 @@ from .app.scene_file.loader import load_run as load_run
 from .app.scene_file.loader import load_scene as load_scene
 from .app.studies.modes import modes as modes
 from .app.studies.study import sweep as sweep
+from .app.viewer.view import view as view
 from .errors import MeshError as MeshError
 from .errors import OutputError as OutputError
 from .errors import SceneError as SceneError

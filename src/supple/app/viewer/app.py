@@ -59,12 +59,16 @@ class OpenPage:
 
 
 @contextmanager
-def opened_page(title: str, port: int | None = None) -> Iterator[OpenPage]:
+def opened_page(
+    title: str, port: int | None = None, *, command: str | None = None, framed: bool = False
+) -> Iterator[OpenPage]:
     """Serve a page within a block.
 
     Parameters
     ----------
     port : 0 takes any free port; None takes 8080, or the next free one
+    command : that starts the page again; None: that of the shell
+    framed : whether pages of this machine, and VS Code, may show it within themselves, as notebooks do
 
     Raises
     ------
@@ -74,8 +78,8 @@ def opened_page(title: str, port: int | None = None) -> Iterator[OpenPage]:
         require_free_port(port)
     with ExitStack() as ends:
         token = new_token()
-        content = LivePage({"title": title, "command": shlex.join(["supple", *sys.argv[1:]])})
-        gate = Gate(token, client(title))
+        content = LivePage({"title": title, "command": command or shlex.join(["supple", *sys.argv[1:]])})
+        gate = Gate(token, client(title), framed=framed)
         server = ends.enter_context(served(gate, content.visit, DEFAULT_PORT if port is None else port))
         content.start(server)
         ends.callback(content.stop)
@@ -83,7 +87,13 @@ def opened_page(title: str, port: int | None = None) -> Iterator[OpenPage]:
 
 
 def serve(
-    read: Callable[[], LiveSource], title: str, port: int | None = None, *, open_browser: bool = True, reload: bool
+    read: Callable[[], LiveSource],
+    title: str,
+    port: int | None = None,
+    *,
+    open_browser: bool = True,
+    reload: bool,
+    command: str | None = None,
 ) -> None:
     """Serve a live scene until interrupted.
 
@@ -92,13 +102,13 @@ def serve(
     Parameters
     ----------
     read : the scene; reload : whether the page may have it read again
-    port : see `opened_page`
+    port, command : see `opened_page`
 
     Raises
     ------
     SceneError, SolverError, OutputError : where the scene cannot be read or simulated, or the port is not free.
     """
-    with opened_page(title, port) as page, ExitStack() as ends, suppress(KeyboardInterrupt):
+    with opened_page(title, port, command=command) as page, ExitStack() as ends, suppress(KeyboardInterrupt):
         print(f"{page.url}  (press Ctrl+C to end)", flush=True)
         if open_browser:
             ends.enter_context(browser_at(page.url))

@@ -18,14 +18,15 @@ _HEADERS = {
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",  # the address contains the token
     "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
 }
 # The page has all that it needs, and asks nobody else. A page of another site may not show this one within itself,
 # where clicks would be led astray.
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
-    "connect-src 'self' ws://{host}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+    "connect-src 'self' ws://{host}; frame-ancestors {framing}; base-uri 'none'; form-action 'none'"
 )
+# Notebooks of this machine show the page in a frame. Its address has the secret that another page does not know.
+_NOTEBOOKS = "http://localhost:* http://127.0.0.1:* https://localhost:* https://127.0.0.1:* vscode-webview:"
 
 
 def new_token() -> str:
@@ -39,11 +40,11 @@ class Gate:
     Parameters
     ----------
     token : the address, or the cookie that the page sets, must contain it
-    page : the HTML
+    page : the HTML; framed : whether notebooks may show it in a frame
     """
 
-    def __init__(self, token: str, page: str) -> None:
-        self._token, self._page = token.encode(), page
+    def __init__(self, token: str, page: str, *, framed: bool = False) -> None:
+        self._token, self._page, self._framed = token.encode(), page, framed
 
     def answer(self, connection: Any, request: Any) -> Any:
         """The answer to a request: a refusal, the page, or None, which opens a websocket."""
@@ -57,7 +58,9 @@ class Gate:
         host = request.headers["Host"]
         response = connection.respond(http.HTTPStatus.OK, self._page)
         del response.headers["Content-Type"]
-        headers = {"Content-Type": "text/html; charset=utf-8", "Content-Security-Policy": _POLICY.format(host=host)}
+        policy = _POLICY.format(host=host, framing=_NOTEBOOKS if self._framed else "'none'")
+        headers = {"Content-Type": "text/html; charset=utf-8", "Content-Security-Policy": policy}
+        headers |= {} if self._framed else {"X-Frame-Options": "DENY"}
         for name, value in {**_HEADERS, **headers}.items():
             response.headers[name] = value
         # The browser also sends it when it opens the websocket.

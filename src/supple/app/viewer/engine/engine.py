@@ -7,6 +7,7 @@ import logging
 import multiprocessing
 import pickle
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -20,8 +21,6 @@ from supple.app.viewer.protocol.outbox import DESCRIPTION, ERROR, PROGRESS, SNAP
 from supple.app.viewer.protocol.snapshots import Progress, SceneDescription, Snapshot
 from supple.errors import CommandError, SceneError, SolverError
 
-# The exit code of a process that reads a program without this guard, and would start itself again.
-_UNGUARDED = 117
 # A process that does not end by itself within this time [s] is terminated.
 GRACE = 2.0
 
@@ -46,6 +45,21 @@ def _interrupts_held() -> Iterator[None]:
             signal.signal(signal.SIGINT, handler)
     if heard:
         raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def _program_not_read() -> Iterator[None]:
+    """A process that starts in this block does not execute the user's program, which would start it once more.
+
+    It need not: what the program defines is in what the process is sent.
+    """
+    program = sys.modules["__main__"]
+    hidden = {key: vars(program).pop(key) for key in ("__file__", "__spec__") if key in vars(program)}
+    program.__spec__ = None
+    try:
+        yield
+    finally:
+        vars(program).update(hidden)
 
 
 class Engine:
@@ -91,9 +105,15 @@ class Engine:
 
     def _start(self) -> None:
         """Start the process."""
-        if getattr(multiprocessing.current_process(), "_inheriting", False):
-            raise SystemExit(_UNGUARDED)
-        source = self.source
+        from numba import cloudpickle
+
+        try:
+            source = cloudpickle.dumps(self.source)
+        except Exception as error:  # whatever a function of the user refers to
+            raise SceneError(
+                f"the scene cannot be sent to another process ({error}); use Keyframes, Curve, or functions of time "
+                "that refer to numbers and arrays only"
+            ) from None
         self.starts += 1  # before any snapshot of it comes
         self._begun = False  # whether one has come
         self._description: SceneDescription | None = None
@@ -113,14 +133,8 @@ class Engine:
             name="supple simulation",
             daemon=True,
         )
-        try:
-            with _interrupts_held():
-                self._process.start()
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
-            raise SceneError(
-                f"the scene cannot be sent to another process ({error}); use Keyframes instead of functions of time "
-                "that are defined inside other functions"
-            ) from None
+        with _interrupts_held(), _program_not_read():
+            self._process.start()
         # Only the child keeps these ends open: so each process detects the end of the other one.
         command_reader.close()
         snapshot_writer.close()
@@ -274,14 +288,8 @@ class Engine:
                 self._arrived.notify_all()
         self._process.join(GRACE)
         with self._arrived:
-            code = self._process.exitcode
-            if code == _UNGUARDED:
-                self.error = (
-                    "the process of the simulation reads this program again; write what the program does below "
-                    'the line if __name__ == "__main__":'
-                )
-            elif not self._closing and self.error is None:
-                self.error = f"the simulation ended unexpectedly (exit code {code})"
+            if not self._closing and self.error is None:
+                self.error = f"the simulation ended unexpectedly (exit code {self._process.exitcode})"
             self._arrived.notify_all()
 
     def _write(self, outgoing: CommandQueue) -> None:

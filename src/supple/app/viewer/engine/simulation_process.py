@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import logging
 import os
+import pickle
 import signal
 import threading
 import time
@@ -22,13 +23,12 @@ if TYPE_CHECKING:
     from supple.app.viewer.engine.scene.live_scene import LiveScene
 
 
-def run_simulation(
-    source: LiveSource, commands: Connection, snapshots: Connection, log_level: int, applied: int
-) -> None:
+def run_simulation(source: bytes, commands: Connection, snapshots: Connection, log_level: int, applied: int) -> None:
     """Simulate until the other end of `commands` is closed, by `Engine.close` or by the end of the page's process.
 
     Parameters
     ----------
+    source : a pickled `LiveSource`, with the functions that it has
     applied : number of the last command to an earlier simulation of the same page
     """
     # Ctrl-C in a terminal reaches both processes; the process of the page ends this one.
@@ -43,7 +43,7 @@ def run_simulation(
 
     # One core is left to the page and the browser: a kernel waits long for a thread that does not get a core.
     with numba_threads(max(1, numba.get_num_threads() - 1)):
-        _simulate(source, inbox, snapshots, applied)
+        _simulate(pickle.loads(source), inbox, snapshots, applied)
 
 
 def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection, applied: int) -> None:
