@@ -57,6 +57,8 @@ def draw_live(tab, page) -> None:
 
     def show(name: str, **values) -> None:
         set_values = """(values) => {
+          const { fields } = supplePage.block.description;
+          values.field = fields.find(({ key }) => key === values.field) ?? null;
           for (const control of supplePage.gui.controllersRecursive())
             if (control.domElement.dataset.name in values) control.setValue(values[control.domElement.dataset.name]);
         }"""
@@ -67,7 +69,8 @@ def draw_live(tab, page) -> None:
     simulation.send(Play())
     while simulation.latest().time < 0.5:
         settle(0.1)
-    bear = simulation.latest().body_positions("bear")
+    snapshot = simulation.latest()
+    bear = snapshot.positions[snapshot.description.body("bear").vertices]
     ear = int(np.argmax(bear[:, 1]))
     target = tuple(float(x) for x in bear[ear] + np.array([-0.1, 0.5, 0.0]))
     simulation.send(Grab(1, "bear", (ear,), (1.0,), target, stiffness=0.05))
@@ -79,13 +82,13 @@ def draw_live(tab, page) -> None:
     for command in (ReleaseGrab(1), SetSpeed(1.0), Reset(), SetParameter("youngs", 1.5e4), Step(15)):
         simulation.send(command)
     settle()
-    show("live_stress.png", surface="tets", color=1)
-    show("live_exploded.png", color=0, explode=0.4)
-    show("live_cut.png", color=2, explode=0.0, axis=2, cut=0.5)
+    show("live_stress.png", surface="tets", field="von_mises")
+    show("live_exploded.png", field="J", explode=0.4)
+    show("live_cut.png", field="energy", explode=0.0, axis=2, cut=0.5)
     for command in (Reset(), SetParameter("youngs", 6e4), Step(40)):
         simulation.send(command)
     settle()
-    show("live_stitches.png", surface="skin", color=-1, cut=0.0, contacts=True)
+    show("live_stitches.png", surface="skin", cut=0.0, contacts=True)
 
 
 def main() -> None:

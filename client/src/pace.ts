@@ -4,11 +4,13 @@
 export interface Quality { sharp: number; coarse: boolean; shadows: boolean; taps: number }
 
 const SLOW = 160; // [ms] between two pictures; a person sees single pictures from about there
+const FAST = 25; // [ms]; then all that a still picture has is drawn while something moves, too
 const NOTES = ["", "", "slow renderer: lighter skins", "slow renderer: lighter skins, no shadows"];
 
-/** Measures how long a picture takes, and goes to lighter ones where that is long. */
+/** Measures how long a picture takes, and goes to lighter ones where that is long: from plain ones, as software needs two
+ * seconds for the finest. */
 export class Pace {
-  private level = 0;
+  private level = 1;
   private costs: number[] = [];
   private drawn: number[] = [];
   private readonly levels: Quality[];
@@ -48,10 +50,12 @@ export class Pace {
     this.drawn.push(now);
     this.costs = [...this.costs, cost].slice(-8);
     const known = this.costs.slice(1).sort((a, b) => a - b); // the first one has programs to compile
-    const middle = known[known.length >> 1], last = this.levels.length - 1;
-    if (known.length < (middle > 3 * SLOW ? 2 : 4) || middle < SLOW || this.level === last) return false;
-    this.level = Math.min(this.level + (middle > 3 * SLOW ? 2 : 1), last);
-    this.costs = [];
-    return true;
+    const middle = known[known.length >> 1], { level } = this;
+    if (middle > 3 * SLOW) this.level += 2;
+    else if (middle > SLOW && known.length >= 4) this.level += 1;
+    else if (middle < FAST && known.length === 7 && level === 1) this.level = 0;
+    this.level = Math.min(this.level, this.levels.length - 1);
+    if (this.level !== level) this.costs = [];
+    return this.level !== level;
   }
 }

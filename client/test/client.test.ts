@@ -148,10 +148,12 @@ test("slow pictures lower the quality, once they are known to be slow", () => {
   };
   assert.equal(run(16, 200).note, "");
   assert.ok(Math.abs(run(16, 200).rate(1000 + 16 * 200) - 62.5) < 1);
-  assert.equal(run(300, 4).quality.sharp, 2);
-  assert.equal(run(300, 5).quality.sharp, 1);
+  assert.equal(run(16, 7).quality.sharp, 1);
+  assert.equal(run(16, 8).quality.sharp, 2);
+  assert.equal(run(300, 4).quality.coarse, false);
+  assert.equal(run(300, 5).quality.coarse, true);
   assert.equal(run(300, 40).quality.shadows, false);
   assert.match(run(300, 40).note, /lighter skins, no shadows/);
   assert.equal(run(300, 40).best.shadows, true);
-  assert.ok(run(600, 5).quality.coarse);
+  assert.equal(run(600, 2).quality.shadows, false);
 });
