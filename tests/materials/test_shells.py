@@ -7,8 +7,10 @@ from tests.derivatives import assert_derivatives, gradient_of, hessian_product
 
 import supple as sp
 from supple.materials.shells.elements import elements_of
+from supple.numerics.sparse.block_csr import build_pattern
 from supple.solvers.implicit.energies.damping import StrainRate
 from supple.solvers.implicit.energies.shells import ShellEnergy, ShellViscosity
+from supple.solvers.implicit.newton import direct_solver
 
 NO_TETS = np.zeros((0, 4), dtype=np.int32)
 TETRAHEDRON = sp.SurfaceMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -117,3 +119,29 @@ def test_sheet_without_bending_stiffness_folds_at_no_cost():
     x[3] = x[1] + Rotation.from_rotvec(1.0 * axis).apply(x[3] - x[1])
     assert shells_of(surface, bending=0.0).energy(x) == pytest.approx(0.0, abs=1e-15)
     assert shells_of(surface).energy(x) > 0.0
+
+
+@pytest.mark.parametrize("without_pardiso", [False, True])
+def test_direct_solver_adds_a_correction_and_finds_what_is_indefinite(monkeypatch, without_pardiso):
+    if without_pardiso:
+        monkeypatch.setattr(direct_solver, "_pardiso", lambda: None)
+    pattern = build_pattern(np.array([[0, 1, 2, 3], [1, 2, 3, 4]], dtype=np.int32), 5)
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(2, 12, 12))
+    data = np.zeros((pattern.blocks, 3, 3))
+    pattern.assemble(np.einsum("kij,klj->kil", root, root) + np.eye(12), np.zeros((5, 3, 3)), data)
+    A, b, g = pattern.to_scipy(data).toarray(), rng.normal(size=(5, 3)), rng.normal(size=15)
+    C = -0.5 * np.outer(g, g) / (g @ np.linalg.solve(A, g))
+
+    def correct(share):
+        return lambda v: share * (C @ v.ravel()).reshape(v.shape)
+
+    low_rank = rng.normal(size=(1, 5, 3))
+    whole = A + C + np.outer(low_rank, low_rank)
+    for definite in (False, True):
+        x = direct_solver.solve_directly(pattern, data, b, definite, low_rank, correct(1.0))
+        np.testing.assert_allclose(x.ravel(), np.linalg.solve(whole, b.ravel()), rtol=1e-4)
+    # The sum is indefinite, and so is the matrix alone.
+    along = g.reshape(5, 3)
+    assert direct_solver.solve_directly(pattern, data, along, False, correct=correct(3.0)) is None
+    assert direct_solver.solve_directly(pattern, -data, b, True, correct=correct(1.0)) is None

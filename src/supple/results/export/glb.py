@@ -23,6 +23,7 @@ from supple.results.view.from_recording import evenly, model_of_recording, rende
 from supple.results.view.model import RenderFrame
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 from supple.runtime.replacing import whole_file
+from supple.scene.shell import Shell
 
 logger = logging.getLogger(__name__)
 
@@ -163,8 +164,10 @@ class _Glb:
         ) ** 2.4  # sRGB; all our colors are above its linear part
         surface = {"baseColorFactor": [*linear.tolist(), opacity], "metallicFactor": drawn.look.metallic}
         surface["roughnessFactor"] = drawn.look.roughness
-        transparent = {"doubleSided": True, "alphaMode": "BLEND"} if opacity < 1.0 else {}
-        return self._added("materials", {"pbrMetallicRoughness": surface, **transparent})
+        more: dict[str, Any] = {"doubleSided": True, "alphaMode": "BLEND"} if opacity < 1.0 else {}
+        if isinstance(drawn, SoftSurface) and isinstance(drawn.body.body, Shell):
+            more["doubleSided"] = True
+        return self._added("materials", {"pbrMetallicRoughness": surface, **more})
 
     def _vectors(self, values: NDArray, *, bounds: bool = False) -> int:
         return self._accessor(values, "VEC3", bounds=bounds, target=_VERTICES)

@@ -96,7 +96,7 @@ def solve_directly(
     G = low_rank.reshape(len(low_rank), b.size).T if len(low_rank) else np.zeros((b.size, 0))
     right = np.column_stack([b.ravel(), G]) if len(low_rank) else b.ravel()
     if pardiso is not None:
-        x, negative, solve = _by_pardiso(*pardiso, matrix, right)
+        x, negative, solve = _by_pardiso(*pardiso, matrix, right, correct is not None)
     else:
         x, negative, solve = _by_superlu(matrix, right, require_definite)
     if x is None or not np.isfinite(x).all():
@@ -139,16 +139,19 @@ def _corrected(product: Product, inverse: Product, b: NDArray[np.float64], x: ND
 
 
 def _by_pardiso(
-    solver: Any, failure: type[Exception], matrix: bsr_matrix, b: NDArray[np.float64]
+    solver: Any, failure: type[Exception], matrix: bsr_matrix, b: NDArray[np.float64], kept: bool
 ) -> tuple[NDArray[np.float64] | None, int, Product]:
-    """The solution, the number of negative eigenvalues, and what solves for more right-hand sides."""
+    """The solution, the number of negative eigenvalues, and what solves for more right-hand sides; kept : whether some
+    follow, for which the factors stay."""
     upper = triu(matrix, format="csr")
     try:
+        if kept:
+            solver.factorize(upper)
         x = solver.solve(upper, b)
     except failure as error:
         logger.debug("direct solve: %s", error)
         return None, 0, np.copy
-    return x, solver.get_iparm(_NEGATIVE_EIGENVALUES), lambda r: solver.solve(upper, r)  # it keeps the last factors
+    return x, solver.get_iparm(_NEGATIVE_EIGENVALUES), lambda r: solver.solve(upper, r)
 
 
 def _by_superlu(
