@@ -8,8 +8,8 @@ export interface Frame extends Record<Marks, Ref> {
   time: number; frame: number; paused: boolean; speed: number; points: Ref; poses: Ref;
   field: { key: string; ends: [number, number]; values: Ref } | null;
   solver: string; values: Values; bodies: Values[]; rate: string; slow: string; measures: string[];
-  /** by title and name, as `Description.plots` has them */
-  numbers: number[][];
+  /** (k, 1 + n): the last times, and what was measured then, as `Description.plots` has it */
+  numbers: Ref;
 }
 
 /** `ended`: whether the server ends, because of this error. */
@@ -60,6 +60,11 @@ export class Live implements Source {
 
   marks(kind: Marks): Numbers {
     return this.block!.array(this.latest![kind]);
+  }
+
+  /** See `Frame.numbers`. */
+  numbers(): Numbers {
+    return this.block!.array(this.latest!.numbers);
   }
 
   private connect(): void {

@@ -178,7 +178,7 @@ class LivePage {
       frame: (frame) => {
         if (block) this.show(new Page(renderer, pace, block, live), live);
         block = null;
-        this.frame(frame);
+        this.frame(frame, live);
       },
       status: (status) => {
         this.status = status;
@@ -215,9 +215,9 @@ class LivePage {
     Object.assign(globalThis, { supplePage: page });
   }
 
-  private frame(frame: Frame): void {
+  private frame(frame: Frame, live: Live): void {
     const { panel, plots } = this.page!;
-    plots.append(frame.time, frame.numbers);
+    plots.append(live.numbers());
     panel.frame(frame);
     this.page!.again();
   }

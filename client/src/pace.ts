@@ -11,6 +11,7 @@ const NOTES = ["", "", "slow renderer: lighter skins", "slow renderer: lighter s
  * seconds for the finest. */
 export class Pace {
   private level = 1;
+  private wasSlow = false;
   private costs: number[] = [];
   private drawn: number[] = [];
   private readonly levels: Quality[];
@@ -53,8 +54,9 @@ export class Pace {
     const middle = known[known.length >> 1], { level } = this;
     if (middle > 3 * SLOW) this.level += 2;
     else if (middle > SLOW && known.length >= 4) this.level += 1;
-    else if (middle < FAST && known.length === 7 && level === 1) this.level = 0;
+    else if (middle < FAST && known.length === 7 && level === 1 && !this.wasSlow) this.level = 0;
     this.level = Math.min(this.level, this.levels.length - 1);
+    this.wasSlow ||= this.level > level;
     if (this.level !== level) this.costs = [];
     return this.level !== level;
   }

@@ -1,7 +1,7 @@
 // Plots of what was measured over time: of a recording with a line at the time that is shown, of a simulation as it runs.
 
 import uPlot from "uplot";
-import type { Block } from "./data.ts";
+import type { Block, Numbers } from "./data.ts";
 import { find } from "./panel.ts";
 
 const COLORS = ["#e65c3c", "#409ce1", "#34ac78", "#ce70b2", "#f5b324", "#78c8eb", "#a07850"];
@@ -11,10 +11,10 @@ const HEIGHT = 170;
 export class Plots {
   private plot: uPlot | null = null;
   private time = 0;
-  private times: number[];
+  private readonly times: number[];
   private shown = -1;
   private readonly names: { title: string; series: { name: string }[] }[];
-  private values: (number | null)[][][];
+  private readonly values: (number | null)[][][];
   private readonly seek: (time: number) => void;
 
   constructor(block: Block, seek: (time: number) => void) {
@@ -24,16 +24,18 @@ export class Plots {
     this.values = plots.map(({ series }) => series.map(({ values }) => (values ? Array.from(block.array(values), known) : [])));
   }
 
-  /** Appends what a simulation measured at a time; begins anew where that is before the last one. */
-  append(time: number, numbers: number[][]): void {
-    const last = this.times.at(-1) ?? -Infinity, keep = time < last ? () => false : (_: unknown, k: number) => k % 2 === 0;
-    if (time === last) return;
-    if (time < last || this.times.length > MOST) {
-      this.times = this.times.filter(keep);
-      this.values = this.values.map((series) => series.map((all) => all.filter(keep)));
+  /** Appends what a simulation measured, rows of times and values; begins anew where they end before the last one. */
+  append(rows: Numbers): void {
+    const flat = this.values.flat(), width = 1 + flat.length, end = rows[rows.length - width];
+    const thin = end >= (this.times.at(-1) ?? end);
+    if (!thin || this.times.length > MOST)
+      for (const all of [this.times, ...flat]) all.splice(0, all.length, ...all.filter((_, k) => thin && k % 2 === 0));
+    const last = this.times.at(-1) ?? -Infinity;
+    for (let i = 0; i < rows.length; i += width) {
+      if (rows[i] <= last) continue;
+      this.times.push(rows[i]);
+      flat.forEach((all, k) => all.push(known(rows[i + 1 + k])));
     }
-    this.times.push(time);
-    this.values.forEach((series, k) => series.forEach((all, j) => all.push(known(numbers[k]?.[j] ?? NaN))));
   }
 
   /** Draws one of the plots; none for -1. */
@@ -50,7 +52,7 @@ export class Plots {
       axes: [axis, { ...axis, size: 58 }],
       cursor: { drag: { x: false, y: false }, y: false },
       series: [{ label: "time [s]" }, ...series.map(({ name }, k) =>
-        ({ label: name, stroke: COLORS[k % COLORS.length], width: 1.5 }))],
+        ({ label: name, stroke: COLORS[k % COLORS.length], width: 1.5, points: { show: false } }))],
       hooks: {
         draw: [({ ctx, bbox, valToPos }) => {
           ctx.fillStyle = ink;

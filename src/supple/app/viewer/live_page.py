@@ -233,6 +233,7 @@ class LivePage:
             self._number += 1
             self._messages = Messages(frame, plotted(snapshot), self._about)
         self.frame, self._message = frame, None
+        self._messages.note(snapshot)
         for notice in snapshot.notices:
             if notice.number > self._notice:
                 self._notice = notice.number

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from supple.results.view.model import Model, RenderFrame
 from supple.results.view.surfaces import obstacle_surfaces
 
 _MOST_JOINTS = 12  # in the text
+_HISTORY = 240  # snapshots whose numbers are sent with each frame: those of four seconds
 _ARROW = 0.5  # length of the arrow of the largest force of contact, as a share of the radius of the scene
 
 
@@ -58,6 +59,7 @@ class Messages:
 
     def __init__(self, frame: RenderFrame, numbers: dict[str, dict[str, float]], about: dict[str, Any]) -> None:
         model, packer = frame.model, Packer()
+        self._history: deque[list[float]] = deque(maxlen=_HISTORY)
         self._lines, self._surfaces = lines_of_joints(model), obstacle_surfaces(model)
         self._limits = {field.key: Limits(field, Range()) for field in FIELDS.values()}
         described = {**described_scene(model, packer), **described_motion([(frame.time, frame)], packer)}
@@ -104,9 +106,18 @@ class Messages:
             "rate": f"{timing.frames_per_second:.0f} steps/s, {timing.real_time_ratio:.2f} of real time",
             "slow": slowness(snapshot),
             "measures": measured(snapshot),
-            "numbers": [[finite(one) for one in series.values()] for series in plotted(snapshot).values()],
+            "numbers": packer.add(list(self._history), "f8"),
         }
         return packer.block(told)
+
+    def note(self, snapshot: Snapshot) -> None:
+        """Keep what plots show of a snapshot, also of those that no browser draws."""
+        if self._history and snapshot.time <= self._history[-1][0]:
+            if snapshot.time == self._history[-1][0]:
+                return
+            self._history.clear()
+        numbers = [one for series in plotted(snapshot).values() for one in series.values()]
+        self._history.append([snapshot.time, *numbers])
 
     def _field(self, snapshot: Snapshot, frame: RenderFrame, packer: Packer) -> dict[str, Any] | None:
         key = snapshot.tet_quantity
@@ -126,11 +137,6 @@ class Messages:
         largest = max(float(np.linalg.norm(forces, axis=1).max()), 1e-300)
         reach = _ARROW * radius / largest
         return np.nan_to_num(np.stack([points, points + reach * forces], axis=1))
-
-
-def finite(value: float) -> float | None:
-    """A number as JSON has it."""
-    return value if isfinite(value) else None
 
 
 def plotted(snapshot: Snapshot) -> dict[str, dict[str, float]]:

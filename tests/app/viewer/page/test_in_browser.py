@@ -210,7 +210,7 @@ def test_a_sleeping_tab_draws_nothing_and_continues_when_it_wakes(still):
       slept.forEach((act) => requestAnimationFrame(act));
     }""")
     still.screen.holds(f"supplePage.pictures > {before[0] + 3} && suppleLive.latest.frame > {before[1] + 60}")
-    assert tab.evaluate("supplePage.pace.level") == before[2]
+    assert tab.evaluate("supplePage.pace.level") <= before[2]  # the time asleep does not count as slow
 
 
 def test_two_tabs_show_the_same_and_a_reload_continues(still, look):

@@ -188,6 +188,22 @@ def test_springs_contacts_and_fields_are_in_frames(visitor, fake, until):
     assert shares.max() > 195
 
 
+def test_numbers_of_all_snapshots_are_in_frames(live, visitor, fake, until):
+    titles = {plot["title"]: [one["name"] for one in plot["series"]] for plot in visitor.scenes[0]["plots"]}
+    assert titles["energy [J]"] == ["kinetic", "elastic", "potential"]
+    width = 1 + sum(map(len, titles.values()))
+    rows = lambda: visitor.arrays[-1](visitor.frames[-1]["numbers"]).reshape(-1, width)  # noqa: E731
+    for k in range(1, 5):
+        fake.show(time=0.1 * k, measures=replace(fake.snapshot.measures, kinetic_energy=float(k)))
+        until(lambda k=k: live.frame.time == 0.1 * k)
+    until(lambda: rows()[-1, 0] == 0.4)
+    np.testing.assert_allclose(rows()[:, 0], [0.0, 0.1, 0.2, 0.3, 0.4])
+    np.testing.assert_allclose(rows()[1:, 1], [1.0, 2.0, 3.0, 4.0])
+    fake.show(time=0.0)
+    until(lambda: rows()[-1, 0] == 0.0)
+    assert len(rows()) == 1
+
+
 def test_a_visitor_who_never_reads_does_not_block_others(live, fake, until):
     stuck = Visitor(live.port, reads=False)
     others = [Visitor(live.port) for _ in range(9)]
