@@ -171,7 +171,7 @@ def _by_state(replay: Replay, after: StateAdjoint, forces: Floats, contact: Floa
         pushed = lag.friction.by_start(x, forces + contact)
         out.x += pushed
         if not replay.kept.at_end:
-            out.x += (lag.derivative(x).T @ (forces + contact).ravel()).reshape(-1, 3)
+            out.x += (replay.lag_from_begin(lag).T @ (forces + contact).ravel()).reshape(-1, 3)
     if plan.scale is None:
         return out
     out.x += after.past_x

@@ -22,6 +22,7 @@ from scipy.sparse.linalg import splu
 from supple.errors import SolverError
 from supple.gradients.kept import Replay
 from supple.model.loads.actuators.laws import Held
+from supple.solvers.implicit.contact.areas import area_derivatives, barrier_by_areas
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.natural_modes import (
     column,
@@ -33,12 +34,9 @@ from supple.solvers.implicit.natural_modes import (
     unknowns,
 )
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms
-from supple.solvers.implicit.newton.minimize import free_norm
 
 Floats = NDArray[np.float64]
 
-# Of contact's forces: what friction of the end may change. The relative error of a gradient is about this.
-_LAGGED = 1e-3
 # Relative, of systems that the step's own solver can solve: those that are symmetric and have no conditions.
 _EXACT = 1e-12
 
@@ -49,7 +47,8 @@ class Equations:
 
     Attributes
     ----------
-    lag : (3 n, 3 n) the derivative of friction by the state of its normal forces; None where that is not the end
+    lag : (3 n, 3 n) the derivative of contact by the state that its areas, and the normal forces of friction, belong
+        to; None where that is not the end, or nothing depends on it
     rows : (c,) which of the conditions C (c, 3 n) are independent, of `count`; held : (l,) which laws of joints are
         conditions
     """
@@ -64,14 +63,17 @@ class Equations:
 
     @classmethod
     def of(cls, replay: Replay) -> Equations:
-        """Raises `SolverError` where friction is neither that of the beginning nor of the end."""
-        _refuse_lag(replay)
         blocks, x, lag = replay.workspace.tools.hessian, replay.x, None
         for friction in replay.frictions:
             friction.settle(x)
         replay.objective.model(x, blocks, ProjectedTerms.NONE)
-        if replay.kept.at_end and replay.lags:
-            lag = sum(one.derivative(x) for one in replay.lags)
+        barrier = replay.barrier
+        if barrier is not None and len(barrier.collisions.at(x).kinds):
+            weights, areas = barrier.collisions.at(x).weights, area_derivatives(barrier.collisions, x)
+            parts = [barrier_by_areas(barrier, x, areas)] if areas.nnz else []
+            if replay.kept.at_end:
+                parts += [one.derivative(x, weights, areas) for one in replay.lags]
+            lag = sum(parts[1:], start=parts[0]) if parts else None
         return cls(replay, blocks, lag, *_conditions(replay))
 
     def product(self, way: Floats) -> Floats:
@@ -107,6 +109,10 @@ class Equations:
         by_multipliers = np.zeros(self.count)
         by_multipliers[: len(held)] = -held
         return self._solved(right, -(self.C @ pins.ravel()) - by_multipliers[self.rows], "T")
+
+    def newton_step(self, gradient: Floats, values: Floats) -> tuple[Floats, Floats]:
+        """The way (n, 3) to where g and conditions (c,) vanish, and the changes (c,) of multipliers."""
+        return self._solved(-gradient, -values, "N")
 
     def _solved(self, right: Floats, of_conditions: Floats, way: str) -> tuple[Floats, Floats]:
         tools = self.replay.workspace.tools
@@ -163,20 +169,6 @@ class Equations:
             return splu(K.tocsc())
         except RuntimeError as error:
             raise SolverError(f"gradient: the equations of a step are singular ({error})") from None
-
-
-def _refuse_lag(replay: Replay) -> None:
-    """Raise `SolverError` where friction has normal forces that are neither those of the beginning nor of the end."""
-    if not (replay.kept.at_end and replay.lags):
-        return
-    tools = replay.workspace.tools
-    left = free_norm(replay.gradient, tools)
-    of_contact = free_norm(replay.objective.contact_gradient(replay.x), tools)
-    if left > _LAGGED * of_contact:
-        raise SolverError(
-            f"gradient: at t = {replay.kept.end:.6g} s friction has normal forces that are {left / of_contact:.1g} of "
-            "contact's away from those of the step's end; give IPCContact(friction_iterations=1), or 20"
-        )
 
 
 def _conditions(replay: Replay) -> tuple[Any, NDArray[np.int64], NDArray[np.int64], int]:

@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 
 from supple.model.loads.actuators.laws import Held
 from supple.model.state import State
-from supple.numerics.inner_product import norm
+from supple.solvers.implicit.contact.areas import area_derivatives
 from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.contact.lagged import LaggedFriction
 from supple.solvers.implicit.energies.joints import JointPotential
-from supple.solvers.implicit.energies.loads.actuators import ActuatorPotential
+from supple.solvers.implicit.newton.minimize import free_norm
 from supple.solvers.implicit.newton.objective import Objective
 from supple.solvers.implicit.stepping.contact_step import ContactStep
 from supple.solvers.implicit.stepping.integrators import Plan
-from supple.solvers.implicit.stepping.substep import Posed, StepSettings, Substep, pose
+from supple.solvers.implicit.stepping.substep import Ending, Posed, StepSettings, pose
 from supple.solvers.implicit.stepping.workspace import Workspace
 
 
@@ -37,7 +37,6 @@ class Kept:
     before : where it begins; x : (n, 3) positions at its end, obstacles' vertices included [m]
     end, h : its time and length [s]
     first : whether it is the first one of its step
-    met : positions at which contacts got their weights
     stiffening : how often the barrier became stiffer
     at_end : whether friction has the normal forces of the end, and not those of the beginning
     multipliers : of the joints' differences and laws, or None
@@ -51,7 +50,6 @@ class Kept:
     h: float
     first: bool
     settings: StepSettings
-    met: tuple[NDArray[np.float64], ...]
     stiffening: int
     at_end: bool
     multipliers: tuple[NDArray[np.float64], NDArray[np.float64]] | None
@@ -59,28 +57,21 @@ class Kept:
     slips_from: NDArray[np.float64] | None = None
 
     @classmethod
-    def of(cls, taken: tuple[State, Substep, float], first: bool) -> Kept:
-        """Of what a workspace's tape has."""
-        before, substep, h = taken
-        assert substep.settings is not None
-        contact, joints = substep.contact, substep.joints
+    def of(cls, ending: Ending, first: bool) -> Kept:
+        contact, joints = ending.contact, ending.joints
         updates = contact.stiffness_increases + contact.friction_updates + (0 if joints is None else joints.updates)
-        terms = contact.objective.terms
-        laws = (term.law for term in terms if isinstance(term, ActuatorPotential))
         joined = None if joints is None else (joints.potential.multipliers, joints.potential.law_multipliers)
-        met = () if contact.model is None else tuple(contact.model.collisions.met)
         return cls(
-            before=before,
-            x=substep.outcome.end.positions,
-            end=substep.state.time,
-            h=h,
+            before=ending.before,
+            x=ending.outcome.end.positions,
+            end=ending.end,
+            h=ending.h,
             first=first,
-            settings=substep.settings,
-            met=met,
+            settings=ending.settings,
             stiffening=contact.stiffness_increases,
-            at_end=updates > 0,
+            at_end=updates > 0 or (contact.model is not None and contact.model.friction_iterations != 1),
             multipliers=joined,
-            held=tuple(law.multiplier for law in laws if isinstance(law, Held)),
+            held=tuple(law.multiplier for law in ending.held),
         )
 
 
@@ -132,8 +123,7 @@ class Replay:
             begun = before.positions if kept.slips_from is None else kept.slips_from
             if not kept.at_end:  # before contacts keep weights
                 frictions = tuple(model.frictions(barrier, lag, begun, kept.h))
-            for there in kept.met:
-                model.collisions.keep_weights(there)
+            model.collisions.settle_weights(x)
             if kept.at_end:
                 frictions = tuple(model.frictions(barrier, lag, begun, kept.h))
             lags = tuple(LaggedFriction.of(one, lag, begun) for one in frictions)
@@ -155,21 +145,35 @@ class Replay:
         return self.objective.gradient(self.x)
 
     @property
-    def contact_gradient(self) -> NDArray[np.float64]:
-        """(n, 3) of the barrier [N]."""
-        return Objective([term for term in self.objective.terms if isinstance(term, Barrier)]).gradient(self.x)
+    def barrier(self) -> Barrier | None:
+        return next((term for term in self.objective.terms if isinstance(term, Barrier)), None)
 
-    def area_change(self) -> float:
-        """How much contact's forces (n, 3) would change with the areas that contacts have at the end, as a share.
+    def lag_from_begin(self, lag: LaggedFriction) -> Any:
+        """(3 n, 3 n) the derivative of friction by positions where the step begins, with the areas there."""
+        model, there = self.workspace.contact, self.kept.before.positions
+        assert model is not None
+        model.collisions.settle_weights(there)
+        weights, areas = model.collisions.at(there).weights, area_derivatives(model.collisions, there)
+        model.collisions.settle_weights(self.x)
+        return lag.derivative(self.x, weights, areas)
 
-        Afterwards, contacts have those.
+    @property
+    def unbalanced(self) -> float:
+        """The norm of the forces that are left on free vertices [N]."""
+        return free_norm(self.gradient, self.workspace.tools)
+
+    @property
+    def contact_force(self) -> float:
+        """The norm of contact's forces on free vertices [N]."""
+        return free_norm(self.objective.contact_gradient(self.x), self.workspace.tools)
+
+    def imbalance(self) -> float:
+        """The forces that are left, as a share of contact's; 0 where nothing touches.
+
+        They are where areas of contacts or normal forces of friction were not those of the end.
         """
-        model, kept = self.workspace.contact, self.contact_gradient
-        if model is None or not len(model.collisions.at(self.x).kinds):
-            return 0.0
-        model.collisions.forget_weights()
-        change = norm(self.contact_gradient - kept)
-        return change / max(norm(kept), np.finfo(float).tiny)
+        of_contact = self.contact_force
+        return self.unbalanced / of_contact if of_contact else 0.0
 
     def conditions(self, held: NDArray[np.int64]) -> NDArray[np.float64]:
         """The values that are zero at the end, of actuators with a given coordinate and of joints.

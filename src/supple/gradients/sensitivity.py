@@ -20,6 +20,7 @@ from supple.gradients.fields import by_anchors, fields_of
 from supple.gradients.kept import Kept, Replay
 from supple.gradients.misfit import Loss, Misfit, OfScene, OwnLoss, Seeds
 from supple.gradients.refusals import refuse
+from supple.gradients.settled import settle
 from supple.gradients.tangent import Side, StateTangent, step_tangent
 from supple.model.state import State
 from supple.model.system import System, initial_state
@@ -35,8 +36,8 @@ Floats = NDArray[np.float64]
 # Of a parameter: the step of central differences at fixed states. Their error of truncation is about its square, and
 # that of round-off its inverse times 1e-16.
 _STEP = 1e-5
-# Of contact's forces: a larger change by the areas of contacts is warned of.
-_AREAS = 1e-3
+# Of contact's forces: what is left of all forces at the end of a step before it is warned of.
+_BALANCED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,7 @@ class Sensitivity:
     loss : a `Misfit`, or a function: frame -> None, or the loss's share of that frame and its derivatives by
         `frame.positions`, (n, 3) by name of the body; or several of both, which are added.
     solver : an `Implicit`. Its `tolerance` limits what the gradient is worth: it is that of each step's exact minimum.
+        Where things touch, runs differ a little from those of `simulate`: see `settled`.
     dt, steps : time from frame to frame [s], and their number.
     scales : (q,) sizes of the parameters, in the unit of each, whose 1e-5 is the step of differences at fixed states;
         None: the parameters, and 1 where one is zero.
@@ -141,7 +143,7 @@ class Sensitivity:
         for frame in self._frames(first, workspace):
             for number, taken in enumerate(tape):
                 replay = Replay.of(Kept.of(taken, number == 0), workspace)
-                change, equations = max(change, replay.area_change()), Equations.of(replay)
+                change, equations = max(change, replay.imbalance()), Equations.of(replay)
                 pairs = zip(sides, at, strict=True)
                 at = [step_tangent(replay, equations, side, one, contact=contact) for side, one in pairs]
             tape.clear()
@@ -151,7 +153,7 @@ class Sensitivity:
                 pairs = zip(changes, scenes, strict=True)
                 found = [misfit.tangents(frame, row, workspace.system, *pair) for pair in pairs]
                 columns.append(np.stack(found, axis=1))
-        _warn_of_areas(change)
+        _warn_of(change)
         return np.concatenate(residuals), np.concatenate(columns)
 
     def value_and_gradient(self, p: ArrayLike) -> tuple[float, Floats]:
@@ -240,6 +242,7 @@ class Sensitivity:
         scene = self._scene(p)
         first, workspace = prepared(scene, initial_state(scene), self.solver)
         refuse(first.system, self.solver)
+        workspace.settle = settle
         return first, workspace
 
     def _scene(self, p: Floats) -> Scene:
@@ -316,7 +319,7 @@ def _backwards(
             replay = Replay.of(one, workspace)
             adjoint, at = step_adjoint(replay, at, by_forces)
             found.append(adjoint)
-            changes.append(replay.area_change())
+            changes.append(replay.imbalance())
             by_forces = ForceAdjoint.zeros(whole, len(one.held))
         for values in (at.x, at.v):
             placed = np.zeros_like(values)
@@ -325,16 +328,17 @@ def _backwards(
         past = at.past_x, at.past_v
         at = at.with_vertices(n)
         at.past_x, at.past_v = past
-    _warn_of_areas(max(changes))
+    _warn_of(max(changes))
     return found[::-1], at
 
 
-def _warn_of_areas(change: float) -> None:
-    """Warn where contact's forces change so much by the areas of contacts, which are constants in the derivatives."""
-    if change > _AREAS:
+def _warn_of(imbalance: float) -> None:
+    """Warn where areas of contacts, or normal forces of friction, were so far from those of a step's end."""
+    if imbalance > _BALANCED:
         warnings.warn(
-            f"gradient: the areas of contacts change by up to {100.0 * change:.2g} % in a step; that they depend "
-            "on the parameters is left out, see docs/theory/gradients.md",
+            f"gradient: areas of contacts and forces of friction are up to {100.0 * imbalance:.2g} % of contact's "
+            "forces away from those at the end of a step, and the gradient is wrong by more than that; give a shorter "
+            "dt, or IPCContact(friction_iterations=1), see docs/theory/gradients.md",
             SuppleWarning,
             stacklevel=3,
         )

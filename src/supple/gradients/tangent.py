@@ -7,9 +7,6 @@ With the equations of `supple.gradients.equations`,
 
 whose right side is two central differences of the equations at a fixed end: along ds, and in the scenes of p + e and
 p - e. One factorization serves all parameters.
-
-Areas of contacts belong to states on the way of Newton's method, see `supple.contact.features.contacts`. What these
-states change by is taken from those at both ends of the step, in the ratio of the distances.
 """
 
 from __future__ import annotations
@@ -30,8 +27,6 @@ Floats = NDArray[np.float64]
 
 # The step of differences along ds: of the smallest body, and of the distance over which contact acts.
 _OF_BODY, _OF_CONTACT = 1e-6, 3e-4
-# How often the change of the end is put into what areas of contacts change by.
-_PASSES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,20 +95,18 @@ def step_tangent(
     more = size if contact else 0
     by_scene = side.difference(lambda place, _: equations_at(place, kept))
     pins = by_scene[size + c + more :].reshape(-1, 3)
-    way, by_state, multipliers = pins, np.zeros(size + c + more), np.zeros(c)
-    later = any(there is not kept.before.positions for there in kept.met)
-    for _ in range(_PASSES if later else 1):
-        e = _step_along(kept, workspace, at, way)
-        if e:
-            above, below = (equations_at(workspace, _moved(kept, at, way, sign * e)) for sign in (1.0, -1.0))
-            by_state = ((above - below) / (2.0 * e))[: size + c + more]
-            for friction in replay.frictions:
-                by_start = friction.by_start(replay.x, at.x).ravel()
-                by_state[:size] += by_start
-                by_state[size + c :] += by_start[:more]
-        right = -(by_scene[: size + c + more] + by_state)
-        own, of_multipliers, multipliers = equations.solve(right[:size].reshape(-1, 3), right[size : size + c])
-        way = own + pins
+    by_state = np.zeros(size + c + more)
+    e = _step_along(kept, workspace, at)
+    if e:
+        above, below = (equations_at(workspace, _moved(kept, at, sign * e)) for sign in (1.0, -1.0))
+        by_state = ((above - below) / (2.0 * e))[: size + c + more]
+        for friction in replay.frictions:
+            by_start = friction.by_start(replay.x, at.x).ravel()
+            by_state[:size] += by_start
+            by_state[size + c :] += by_start[:more]
+    right = -(by_scene[: size + c + more] + by_state)
+    own, of_multipliers, multipliers = equations.solve(right[:size].reshape(-1, 3), right[size : size + c])
+    way = own + pins
     of_contact = np.zeros_like(way)
     if contact:
         # Where pins are is a part of the scene, with which the gradient was differentiated.
@@ -150,33 +143,25 @@ def _extended(at: StateTangent, kept: Kept, side: Side) -> StateTangent:
     return replace(at, x=x, v=v)
 
 
-def _moved(kept: Kept, at: StateTangent, way: Floats, e: float) -> Kept:
+def _moved(kept: Kept, at: StateTangent, e: float) -> Kept:
     """The substep from a state that is e times the tangent away."""
     before, memory = kept.before, kept.before.memory
     if isinstance(memory, History) and memory.positions.shape == at.past_x.shape:
         x, v = memory.positions + e * at.past_x, memory.velocities + e * at.past_v
         memory = replace(memory, positions=x, velocities=v)
     x = before.positions + e * at.x
-    met = []
-    for there in kept.met:
-        if there is before.positions:
-            met.append(x)
-            continue
-        from_begin, from_end = (float(np.abs(there - end).max()) for end in (before.positions, kept.x))
-        share = from_begin / max(from_begin + from_end, np.finfo(float).tiny)
-        met.append(there + e * ((1.0 - share) * at.x + share * way))
     internal = before.internal + e * at.internal
     begun = replace(before, positions=x, velocities=before.velocities + e * at.v, memory=memory, internal=internal)
     # What sticks moves with the start of its slip: the difference of both is found in closed form.
-    return replace(kept, before=begun, met=tuple(met), slips_from=before.positions)
+    return replace(kept, before=begun, slips_from=before.positions)
 
 
-def _step_along(kept: Kept, workspace: Workspace, at: StateTangent, way: Floats) -> float:
+def _step_along(kept: Kept, workspace: Workspace, at: StateTangent) -> float:
     """e such that no vertex moves far along e times the tangent; 0 where nothing changes."""
-    moves = (at.x, way, kept.h * at.v, at.past_x, kept.h * at.past_v)
+    moves = (at.x, kept.h * at.v, at.past_x, kept.h * at.past_v)
     fastest = max(float(np.abs(change).max(initial=0.0)) for change in moves)
     most = _OF_BODY * workspace.diagonal
-    if workspace.contact is not None and kept.met:
+    if workspace.contact is not None:
         most = min(most, _OF_CONTACT * workspace.contact.scales.dhat)
     flows = float(np.abs(at.internal).max(initial=0.0))
     steps = [most / fastest] if fastest else []

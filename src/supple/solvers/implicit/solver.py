@@ -292,7 +292,7 @@ class Implicit(Solver):
                 if not worst.can_go_on:
                     break
             if workspace.tape is not None:
-                workspace.tape.append((now, taken, substepping.length))
+                workspace.tape.append(taken.ending)
             now, last = taken.state, taken
             before, parts = parts, [each.parts(now.positions) for each in system.actuators]
             forces = list(taken.actuators)

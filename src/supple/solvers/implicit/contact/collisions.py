@@ -31,7 +31,6 @@ class Collisions:
     Attributes
     ----------
     floor : distance [m] below which steps keep nearly all of it; 0 but in linearizations
-    met : the positions at which contacts got the weights that they keep
     half_spaces : has the points that contacts name, and their owners; finder : of what is near what
     """
 
@@ -45,7 +44,6 @@ class Collisions:
         self._points = np.zeros((0, 3))
         self._found: Found | None = None
         self._known = KnownWeights.none()
-        self.met: list[NDArray[np.float64]] = []
 
     def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """The points, those of half-spaces last, at x (n, 3), which must not change afterwards."""
@@ -63,7 +61,7 @@ class Collisions:
 
     def forget_weights(self) -> None:
         """From now on, contacts have the weights that belong to where they are."""
-        self._known, self._found, self.met = KnownWeights.none(), None, []
+        self._known, self._found = KnownWeights.none(), None
 
     def keep_weights(self, x: NDArray[np.float64]) -> None:
         """Contacts at x (n, 3) keep their weights wherever they go (see `KnownWeights`)."""
@@ -71,10 +69,19 @@ class Collisions:
         known = self._known.with_more(found.new).with_planes(found.planes)
         if known is self._known:
             return
-        self.met.append(x)
         # Weights that were all unknown are those of the contacts that were found; a plane's depends on what is known.
         same = not len(self._known.codes) and not len(found.planes)
         self._known, self._found = known, found._replace(new=KnownWeights.none()) if same else None
+
+    @property
+    def has_areas(self) -> bool:
+        """Whether contacts have areas that depend on where they are: those with half-spaces do not."""
+        return len(self._known.codes) > 0
+
+    def settle_weights(self, x: NDArray[np.float64]) -> None:
+        """Contacts keep the weights that belong to x (n, 3), whatever they had."""
+        self.forget_weights()
+        self.keep_weights(x)
 
     def _at(self, x: NDArray[np.float64]) -> Found:
         points, s = self.points(x), len(self.mesh.points)

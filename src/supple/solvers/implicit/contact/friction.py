@@ -34,12 +34,14 @@ class Press(NamedTuple):
     Attributes
     ----------
     distances : (k,) [m]; weights : (k,) mu kappa a [N]; dhat, soft : of the barrier [m]
+    numbers : (k,) of the contacts among all at that state
     """
 
     distances: NDArray[np.float64]
     weights: NDArray[np.float64]
     dhat: float
     soft: float
+    numbers: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,5 +108,5 @@ class Friction(ContactPotential):
             return self.slips.forces
         s, moved = self.slips, self.points.positions(way)
         changes = np.einsum("ki,kij,kj->k", s.coefficients, moved[s.points], s.normals)
-        distances, weights, dhat, soft = self.press
+        distances, weights, dhat, soft, _ = self.press
         return predicted_forces(distances, changes, weights, dhat, soft)

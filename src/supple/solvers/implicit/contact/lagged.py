@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, kron
+from scipy.sparse import coo_array, csr_array, diags_array
 
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX
-from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.solvers.implicit.contact.areas import Sparse, by_areas, embedding
 from supple.solvers.implicit.contact.friction import Friction, Press
 
 _STEP = 1e-30
-Sparse = Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +43,11 @@ class LaggedFriction:
         positions = friction.points.positions
         return cls(friction, positions(lagged), positions(start))
 
-    def derivative(self, x: NDArray[np.float64]) -> Sparse:
-        """(3 n, 3 n) of the gradient at x (n, 3) by the lagged positions [N/m]."""
+    def derivative(self, x: NDArray[np.float64], weights: NDArray[np.float64], areas: Sparse) -> Sparse:
+        """(3 n, 3 n) of the gradient at x (n, 3) by the lagged positions [N/m].
+
+        weights, areas : (c,) [m^2] of all contacts there, and (c, 3 s) their derivatives by the points [m]
+        """
         friction, slips = self.friction, self.friction.slips
         assert friction.press is not None
         points = np.maximum(slips.points, 0)
@@ -63,13 +65,13 @@ class LaggedFriction:
         s = 3 * len(self.lagged)
         between = coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(s, s))
         W = embedding(friction.points, len(x))
-        return csr_array(W.T @ between @ W)
-
-
-def embedding(points: EmbeddedPoints, n: int) -> Sparse:
-    """(3 s, 3 n) the matrix that takes positions of n vertices to those of the points."""
-    own = csr_array((points.weights, points.vertices, points.start), shape=(len(points), n))
-    return csr_array(kron(own, np.eye(3)))
+        own = csr_array(W.T @ between @ W)
+        if not areas.nnz:
+            return own
+        numbers = friction.press.numbers
+        forces = _forces(slips.kinds, there, way, friction.press, friction.reach)
+        relative = diags_array(1.0 / weights[numbers]) @ areas[numbers]
+        return own + by_areas(slips.points, forces, relative, friction.points, len(x))
 
 
 def _forces(kinds: NDArray[np.int8], there: Any, way: NDArray[np.float64], press: Press, reach: float) -> Any:

@@ -75,7 +75,7 @@ class ContactModel:
         if not len(rough):
             return []
         weights = slips.forces / forces[rough] * barrier.stiffness * contacts.weights[rough]
-        press = Press(contacts.distances[rough], weights, self.scales.dhat, barrier.soft)
+        press = Press(contacts.distances[rough], weights, self.scales.dhat, barrier.soft, rough)
         return [Friction(points.points, slips, self.scales.friction_velocity * duration, press)]
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.model.loads.actuators.laws import Held
 from supple.model.state import State, Status
 from supple.model.system import System
 from supple.solvers.implicit.energies.elasticity import Elasticity
@@ -92,12 +93,34 @@ class StepSettings:
 
 
 @dataclass(frozen=True, eq=False)
+class Ending:
+    """What has led a substep from a state to its end.
+
+    `Workspace.settle`, if any, gives a converged one another outcome, and contact, joints and actuators of that.
+    """
+
+    before: State
+    end: float
+    h: float
+    settings: StepSettings
+    outcome: Outcome
+    contact: ContactStep
+    joints: JointStep | None
+
+    @property
+    def held(self) -> list[Held]:
+        """The laws of actuators with a given coordinate."""
+        laws = (term.law for term in self.contact.objective.terms if isinstance(term, ActuatorPotential))
+        return [law for law in laws if isinstance(law, Held)]
+
+
+@dataclass(frozen=True, eq=False)
 class Substep:
     """The result of a step: the state at its end, the course of Newton's method, contact and joints at the end.
 
     actuators : generalized forces of each actuator, as they acted in the step; works, residual : see `works_of_step`
     time_error : see `ImplicitDetails`
-    settings : those with which it was taken, where it reached its end
+    ending : what led to its end, where it reached that
     """
 
     state: State
@@ -108,7 +131,7 @@ class Substep:
     works: dict[str, float] = field(default_factory=dict)
     residual: float = 0.0
     time_error: float | None = None
-    settings: StepSettings | None = None
+    ending: Ending | None = None
 
 
 def take_substep(
@@ -159,6 +182,10 @@ class Posed:
     joints: JointStep | None
     contact: ContactStep
 
+    def limits(self, workspace: Workspace) -> StepLimits:
+        """Of Newton's steps."""
+        return StepLimits(self.guard, workspace.contact, workspace.tools.clock)
+
 
 def pose(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Posed:
     """The step of h [s] that ends at `end` [s]."""
@@ -197,7 +224,7 @@ def _take(
     onwards = _without_forces(system, plan, targets)
     if divisible and workspace.contact is not None and workspace.contact.passing(state.positions, onwards):
         return None
-    limits = StepLimits(posed.guard, workspace.contact, tools.clock)
+    limits = posed.limits(workspace)
     still = np.array_equal(targets, state.positions[tools.pinned])
     objective = _with_joints(base, joints)
     if not (still and settings.linearized):  # a linearization has the contact of where it begins
@@ -237,6 +264,10 @@ def _take(
             break
         objective = contact.with_contact(_with_joints(base, joints), x)
         problem = replace(problem, objective=objective, projected=ProjectedTerms.RELEASED_LAST)
+    ending = Ending(state, end, h, settings, outcome, contact, joints)
+    if workspace.settle is not None and outcome.status is Status.CONVERGED:
+        outcome = workspace.settle(ending, workspace)
+        x, ending = outcome.end.positions, replace(ending, outcome=outcome)
     outcome = contact.verified(replace(outcome, rows=rows))
     if joints is not None:
         outcome = joints.verified(outcome)
@@ -255,7 +286,7 @@ def _take(
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
     works, residual = works_of_step(contact.objective, outcome, state, internal, plan, middle, end, workspace)
     error = _time_error(system, workspace.bodies_end, settings.integrator.position_error(state, after))
-    return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual, error, settings)
+    return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual, error, ending)
 
 
 def _time_error(system: System, n: int, error: NDArray[np.float64] | None) -> float | None:

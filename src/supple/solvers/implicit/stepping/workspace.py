@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -32,7 +33,8 @@ class Workspace:
     diagonal : of the smallest body's bounding box at rest [m]
     checked : the state that `Implicit.check` has accepted, or that the latest step ended with
     grown : the latest growth, and the elastic energy with it
-    tape : where a list is given, every substep that is taken is appended: where it begins, the substep, its length [s]
+    tape : where a list is given, the `Ending` of every substep that is taken is appended
+    settle : see `Ending`
     """
 
     system: System
@@ -46,7 +48,8 @@ class Workspace:
     joints: JointGeometry | None
     checked: State | None = None
     grown: tuple[Growth, Elasticity] | None = None
-    tape: list[tuple[State, Any, float]] | None = None
+    tape: list[Any] | None = None
+    settle: Callable[[Any, Workspace], Any] | None = None
     conservation: Conservation = field(init=False)
 
     def __post_init__(self) -> None:
