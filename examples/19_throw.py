@@ -30,7 +30,7 @@ def main() -> dict[str, float]:
     goal = (BOWL[0], 0.08, np.nan)
 
     loss = sp.Misfit("center", "ball", goal)
-    solver = sp.Implicit(integrator="bdf2", tolerance=1e-5, contact=sp.IPCContact(dhat=0.01, friction_iterations=1))
+    solver = sp.Implicit(integrator="bdf2", tolerance=1e-5, contact=sp.IPCContact(dhat=0.01))
     aim = sp.Sensitivity(throw, loss, solver, DT, STEPS)
     found = sp.fit_simulation(aim, [2.0, 20.0], bounds=([1, 0], [4, 60]), names=["speed", "angle"], report=print)
     print(found)

@@ -82,6 +82,45 @@ def on_ball(p):
     return sp.Scene([body], obstacles=[sp.obstacles.Sphere((0, -0.1 * p[3], 0), 0.1 * p[3], name="ball")])
 
 
+def landing(p, friction=0.0):
+    low = bar(p[0], p[2], size=(0.2, 0.1, 0.1), cells=(2, 1, 1), friction=friction)
+    rubber = sp.StableNeoHookean(youngs=5e4 * p[1], density=800, poisson=0.3)
+    mesh = sp.shapes.box((0.1, 0.08, 0.08), (1, 1, 1))
+    velocity = (0.1, -0.2 * p[3], 0)
+    top = sp.Body("top", mesh, rubber, position=(0.013, 0.0905, 0.004), velocity=velocity, friction=friction)
+    return sp.Scene([low, top], pins=[sp.Pin("bar", np.flatnonzero(low.mesh.vertices[:, 1] < -0.049))])
+
+
+def landing_roughly(p):
+    return landing(p, 0.5 * p[3])
+
+
+def tilted(p):
+    """A corner, then edges, of a rough block on another."""
+    low = bar(p[0], size=(0.2, 0.1, 0.1), cells=(3, 2, 2), friction=0.3 * p[2])
+    mesh = sp.shapes.box((0.1, 0.08, 0.08), (2, 2, 2))
+    placed = {"position": (0.013, 0.125, 0.004), "rotation": (20, 10, 13), "velocity": (0.1, -0.4 * p[3], 0)}
+    rubber = sp.StableNeoHookean(youngs=5e4 * p[1], density=800, poisson=0.3)
+    top = sp.Body("top", mesh, rubber, friction=0.3 * p[2], **placed)
+    return sp.Scene([low, top], pins=[sp.Pin("bar", np.flatnonzero(low.mesh.vertices[:, 1] < -0.049))])
+
+
+def fork(p):
+    """Two prongs of one body that are pressed together."""
+    whole = sp.shapes.box((0.4, 0.15, 0.1), (4, 3, 1))
+    x, y, _ = whole.vertices[whole.tets].mean(axis=1).T
+    used, tets = np.unique(whole.tets[(x < -0.1) | (np.abs(y) > 0.025)], return_inverse=True)
+    mesh = sp.TetMesh(whole.vertices[used], tets.reshape(-1, 4))
+    rubber = sp.StableNeoHookean(youngs=1e5 * p[0], poisson=0.35, density=1000 * p[1], damping=0.02)
+    body = sp.Body("bar", mesh, rubber, friction=0.3 * p[2])
+    x, y, _ = mesh.vertices.T
+    squeeze = [
+        sp.Force("bar", np.flatnonzero((x > 0.19) & (side * y > 0.05)), (0, -side * 6 * p[3], side), name=name)
+        for side, name in ((1, "upper"), (-1, "lower"))
+    ]
+    return sp.Scene([body], pins=[sp.Pin("bar", np.flatnonzero(x < -0.19))], forces=squeeze, gravity=(0, 0, 0))
+
+
 def quadratic(p):
     mesh = sp.shapes.box((0.4, 0.1, 0.1), (2, 1, 1), order=2)
     rubber = sp.StableNeoHookean(youngs=1e5 * p[0], density=1000 * p[1], poisson=0.48, damping=0.02 * p[2])

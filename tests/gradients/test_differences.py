@@ -48,6 +48,15 @@ SMOOTH = [
 ]
 
 
+IN_CONTACT = [
+    (scenes.landing, 1, 1e-5),
+    (scenes.landing_roughly, None, 1e-4),
+    (scenes.tilted, None, 1e-5),
+    (scenes.tilted, 2, 1e-5),
+    (scenes.fork, None, 1e-5),
+]
+
+
 @pytest.mark.parametrize(("scene_of", "q"), SMOOTH, ids=lambda value: getattr(value, "__name__", ""))
 def test_bdf2(scene_of, q):
     check = sensitivity(scene_of, q, implicit()).check(np.ones(q), 1, step=1e-5)
@@ -75,32 +84,34 @@ def test_contact_with_obstacles(scene_of, integrator):
     assert check.relative <= 1e-5, str(check)
 
 
-def test_areas_of_contacts_that_change_are_told():
-    """A block lands on another one: the gradient is that of constant areas."""
-
-    def landing(p):
-        low = scenes.bar(p[0], size=(0.2, 0.1, 0.1), cells=(2, 1, 1))
-        rubber = sp.StableNeoHookean(youngs=5e4 * p[1], density=800, poisson=0.3)
-        mesh = sp.shapes.box((0.1, 0.08, 0.08), (1, 1, 1))
-        top = sp.Body("top", mesh, rubber, position=(0.013, 0.0905, 0.004), velocity=(0.1, -0.2, 0))
-        return sp.Scene([low, top], pins=[sp.Pin("bar", np.flatnonzero(low.mesh.vertices[:, 1] < -0.049))])
-
-    one = sensitivity(landing, 2, implicit(), 8)
-    with pytest.warns(sp.SuppleWarning, match="areas of contacts change"):
-        check = one.check(np.ones(2), 1, step=1e-6)
-    assert check.relative <= 0.05, str(check)
-    with pytest.warns(sp.SuppleWarning, match="areas of contacts change"):
-        one.residuals_and_jacobian(np.ones(2))
+@pytest.mark.parametrize("integrator", ["bdf2", "backward_euler"])
+@pytest.mark.parametrize(
+    ("scene_of", "friction_iterations", "limit"), IN_CONTACT, ids=lambda v: getattr(v, "__name__", v)
+)
+def test_contact_of_bodies(scene_of, friction_iterations, limit, integrator):
+    """With areas of contacts that change: they belong to the ends of steps, and are differentiated."""
+    solver = implicit(integrator, friction_iterations)
+    one = sensitivity(scene_of, 4, solver, 8)
+    check = one.check(np.ones(4), 2, step=1e-6)
+    assert check.relative <= limit, str(check)
+    residuals, jacobian = one.residuals_and_jacobian(np.ones(4))
+    assert 2.0 * residuals @ jacobian == pytest.approx(one.gradient(np.ones(4)).by_parameters, rel=1e-4, abs=1e-9)
 
 
-def test_friction_with_the_normal_forces_of_the_end():
-    check = sensitivity(scenes.sliding, 4, implicit("backward_euler", 30)).check(np.ones(4), 1, step=1e-5)
+def test_a_step_without_an_end_that_has_its_own_areas_is_told(monkeypatch):
+    monkeypatch.setattr("supple.gradients.settled._MOST", 0)
+    one = sensitivity(scenes.landing, 4, implicit(), 8)
+    with pytest.warns(sp.SuppleWarning, match="areas of contacts and forces of friction"):
+        one.gradient(np.ones(4))
+    with pytest.warns(sp.SuppleWarning, match="areas of contacts and forces of friction"):
+        one.residuals_and_jacobian(np.ones(4))
+
+
+@pytest.mark.parametrize("friction_iterations", [None, 2, 30])
+def test_friction_with_the_normal_forces_of_the_end(friction_iterations):
+    solver = implicit("backward_euler", friction_iterations)
+    check = sensitivity(scenes.sliding, 4, solver).check(np.ones(4), 1, step=1e-5)
     assert check.relative <= 1e-5, str(check)
-
-
-def test_friction_whose_normal_forces_are_neither_is_refused():
-    with pytest.raises(sp.SolverError, match="friction has normal forces"):
-        sensitivity(scenes.sliding, 4, implicit("backward_euler", 2)).gradient(np.ones(4))
 
 
 def test_reactions_and_velocities():

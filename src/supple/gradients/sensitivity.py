@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
@@ -71,7 +71,8 @@ class Sensitivity:
     loss : a `Misfit`, or a function: frame -> None, or the loss's share of that frame and its derivatives by
         `frame.positions`, (n, 3) by name of the body; or several of both, which are added.
     solver : an `Implicit`. Its `tolerance` limits what the gradient is worth: it is that of each step's exact minimum.
-        Where things touch, runs differ a little from those of `simulate`: see `settled`.
+        Where things touch, runs differ a little from those of `simulate`: areas of contacts are those of the end of
+        each step, and without `friction_iterations` normal forces of friction are those of its beginning.
     dt, steps : time from frame to frame [s], and their number.
     scales : (q,) sizes of the parameters, in the unit of each, whose 1e-5 is the step of differences at fixed states;
         None: the parameters, and 1 where one is zero.
@@ -97,7 +98,7 @@ class Sensitivity:
                 "give Implicit(...)"
             )
         self.dt, self.steps = check_timing("Sensitivity", dt, steps)
-        self.scene_of, self.loss, self.solver = scene_of, Loss.of(loss), solver
+        self.scene_of, self.loss, self.solver = scene_of, Loss.of(loss), _with_definite_friction(solver)
         self.scales = None if scales is None else np.asarray(scales, dtype=np.float64)
         for misfit in self.loss.misfits:
             misfit.frames(self.steps)
@@ -294,6 +295,14 @@ class Sensitivity:
         return found
 
 
+def _with_definite_friction(solver: Implicit) -> Implicit:
+    """With normal forces of friction that do not depend on when the solver updates them."""
+    contact = solver.contact
+    if contact is None or contact.friction_iterations is not None:
+        return solver
+    return replace(solver, contact=replace(contact, friction_iterations=1))
+
+
 def _are_alike(one: System, other: System, *, whole: bool = False) -> bool:
     """Whether two systems have the same vertices to solve for, and the same elements."""
     pairs = [(one.tets, other.tets)]
@@ -338,7 +347,7 @@ def _warn_of(imbalance: float) -> None:
         warnings.warn(
             f"gradient: areas of contacts and forces of friction are up to {100.0 * imbalance:.2g} % of contact's "
             "forces away from those at the end of a step, and the gradient is wrong by more than that; give a shorter "
-            "dt, or IPCContact(friction_iterations=1), see docs/theory/gradients.md",
+            "dt, and no friction_iterations but 1, see docs/theory/gradients.md",
             SuppleWarning,
             stacklevel=3,
         )

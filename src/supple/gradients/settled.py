@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 # Of contact's forces: what may be left. Newton's method is quadratic, but where it meets kinks of areas.
 _LEFT = 1e-9
-_MOST, _MOST_CUTS = 25, 14
+_MOST, _MOST_CUTS = 60, 14
 # A step has to take this share of itself from what is left.
 _DECREASE = 0.01
 

@@ -41,7 +41,9 @@ def area_derivatives(collisions: Collisions, x: NDArray[np.float64]) -> Sparse:
             _matched(here, contacts_at(points + e * way, mesh, *near_of, KnownWeights.none(), dhat).contacts)
             for e in (_STEP * dhat, -_STEP * dhat)
         )
-        return (one - other) / (2.0 * _STEP * dhat)
+        # A contact that is none on one side has the slope of the other.
+        one, other = (np.where(np.isnan(a), 2.0 * here.weights - b, a) for a, b in ((one, other), (other, one)))
+        return np.nan_to_num(one - other) / (2.0 * _STEP * dhat)
 
     near_of = near.vertex_triangle, near.edge_edge
     some = np.random.default_rng(0).uniform(-1.0, 1.0, (2, s, 3))
@@ -93,17 +95,17 @@ def embedding(points: EmbeddedPoints, n: int) -> Sparse:
 
 
 def _matched(here: Contacts, there: Contacts) -> NDArray[np.float64]:
-    """(k,) the areas that the contacts `here` have `there`; zero for those that are not contacts there."""
-    own = there.points.shape[0]
-    if own <= len(here.kinds) and np.array_equal(here.points[:own], there.points):
-        return np.append(there.weights, here.weights[own:])
+    """(k,) the areas that the contacts `here` have `there`; NaN for those that are not contacts there."""
+    if np.array_equal(here.points[: len(there.points)], there.points):
+        return np.append(there.weights, np.full(len(here.kinds) - len(there.kinds), np.nan))
     left: dict[Any, list[float]] = {}
     for points, kind, weight in zip(there.points.tolist(), there.kinds.tolist(), there.weights.tolist(), strict=True):
         left.setdefault((kind, *points), []).append(weight)
-    out = np.zeros(len(here.kinds))
+    out = np.full(len(here.kinds), np.nan)
     for k, (points, kind) in enumerate(zip(here.points.tolist(), here.kinds.tolist(), strict=True)):
         found = left.get((kind, *points))
-        out[k] = found.pop(0) if found else 0.0
+        if found:
+            out[k] = found.pop(0)
     return out
 
 
