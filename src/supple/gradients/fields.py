@@ -23,7 +23,6 @@ from supple.solvers.implicit.contact.settings import IPCContact
 from supple.solvers.implicit.energies.damping import Damping
 from supple.solvers.implicit.energies.elasticity import Elasticity, elasticity_of
 from supple.solvers.implicit.energies.quadratic.term import OfQuadraticTets
-from supple.solvers.implicit.newton.objective import Objective
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.implicit.stepping.workspace import Workspace
 
@@ -47,10 +46,11 @@ def by_moduli(replay: Replay, forces: Floats, contact: IPCContact | None) -> Flo
         mu, bodies = replay.workspace.elasticity.material.mu, replay.workspace.system.bodies
         soft = [part for part in bodies if not isinstance(part.body, RigidBody)]
         softest = min(soft, key=lambda part: float(np.mean(mu[part.tets])), default=None)
-        barrier = replay.barrier
-        if barrier is not None and softest is not None and 3.0 * float(np.mean(mu[softest.tets])) == model.scales.stiffness:
-            share = mu[softest.tets] / mu[softest.tets].sum()
-            out[softest.tets] += share * float(np.einsum("ij,ij->", Objective([barrier]).gradient(replay.x), forces))
+        if softest is not None and 3.0 * float(np.mean(mu[softest.tets])) == model.scales.stiffness:
+            share, of_barrier = mu[softest.tets] / mu[softest.tets].sum(), np.zeros_like(forces)
+            if replay.barrier is not None:
+                replay.barrier.add_gradient(replay.x, of_barrier)
+            out[softest.tets] += share * float(np.einsum("ij,ij->", of_barrier, forces))
     return out
 
 

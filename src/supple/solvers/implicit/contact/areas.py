@@ -120,7 +120,7 @@ def _supports(contacts: Contacts, edges: NDArray[np.int32], rows: NDArray[np.int
     first = csr_array((np.ones(len(own), dtype=np.int64), (own, points[own, 0])), shape=(len(points), s))
     joined = np.ones(len(edges), dtype=np.int64)
     next_to = csr_array((joined, (edges[:, 0], edges[:, 1])), shape=(s, s))
-    return (first[rows] @ (first.T @ touched)) @ (next_to + next_to.T + eye_array(s, dtype=np.int64))
+    return (first[rows] @ (first.T @ touched)) @ (next_to + next_to.T + eye_array(s))
 
 
 def _colors(on: Sparse) -> NDArray[np.int64]:
