@@ -61,7 +61,7 @@ def settle(ending: Ending, workspace: Workspace) -> Outcome:
 
 
 def _further(replay: Replay, left: float) -> tuple[Replay, float] | None:
-    """One step of Newton's method, cut until less is left, and what is left; None where there is no such step."""
+    """One step of Newton's method, cut until less is left, and what is left; None where no cut suffices."""
     equations, kept, workspace = Equations.of(replay), replay.kept, replay.workspace
     values = replay.conditions(equations.held)[equations.rows]
     way, multipliers = equations.newton_step(replay.gradient, values)
