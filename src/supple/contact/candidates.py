@@ -74,6 +74,14 @@ class Region(NamedTuple):
     own_margin: float
 
 
+class Latest(NamedTuple):
+    """What a finder has found around its latest place: every pair that is nearer than dhat [m] there, and more."""
+
+    dhat: float
+    near: Candidates
+    around: Region
+
+
 class CandidateFinder:
     """Finds what is near what on a surface that moves.
 
@@ -131,6 +139,18 @@ class CandidateFinder:
         zero = np.zeros_like(points)
         self._around = Region(points.copy(), zero, zero, margin, margin)
         return self._near
+
+    @property
+    def latest(self) -> Latest:
+        """For a finder of the same surface; see `resume`."""
+        return Latest(self.dhat, self._near, self._around)
+
+    def resume(self, latest: Latest) -> None:
+        """Find no pairs again around a place where another finder of the same surface has found them."""
+        less = max(0.0, 0.5 * (self.dhat - latest.dhat))
+        around = latest.around
+        self._near = latest.near
+        self._around = around._replace(margin=around.margin - less, own_margin=around.own_margin - less)
 
     def longest(self, begin: NDArray[np.float64], way: NDArray[np.float64]) -> float:
         """The length [m] of the longest of the ways (s, 3) from `begin`, in which owners that meet nothing do not move

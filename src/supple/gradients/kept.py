@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.candidates import Latest
 from supple.model.loads.actuators.laws import Held
 from supple.model.state import State
 from supple.solvers.implicit.contact.areas import area_derivatives
@@ -42,6 +43,7 @@ class Kept:
     multipliers : of the joints' differences and laws, or None
     held : multipliers of actuators with a given coordinate
     slips_from : (n, 3) where friction's displacements begin, None: where the substep does
+    near : what is near what at the end, if it is known
     """
 
     before: State
@@ -55,6 +57,7 @@ class Kept:
     multipliers: tuple[NDArray[np.float64], NDArray[np.float64]] | None
     held: tuple[float, ...]
     slips_from: NDArray[np.float64] | None = None
+    near: Latest | None = None
 
     @classmethod
     def of(cls, ending: Ending, first: bool) -> Kept:
@@ -118,6 +121,8 @@ class Replay:
         frictions, lags = (), ()
         model = workspace.contact
         if model is not None:
+            if kept.near is not None:
+                model.collisions.finder.resume(kept.near)
             barrier = Barrier(model.collisions, ContactStep.stiffened(posed.contact.stiffness, kept.stiffening))
             lag = x if kept.at_end else before.positions
             begun = before.positions if kept.slips_from is None else kept.slips_from
@@ -134,6 +139,12 @@ class Replay:
     def contact(self) -> Objective:
         """The barrier and friction alone."""
         return Objective([term for term in self.objective.terms if isinstance(term, Barrier | Friction)])
+
+    @property
+    def searched(self) -> Kept:
+        """The substep, with what is near what at its end."""
+        model = self.workspace.contact
+        return self.kept if model is None else replace(self.kept, near=model.collisions.finder.latest)
 
     @property
     def plan(self) -> Plan:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -184,8 +183,8 @@ class Sensitivity:
             seeds.append(at_frame)
             tape.clear()
         workspace.tape = None
-        adjoints, begin = _backwards(kept, seeds, workspace, first.state)
-        steps, system = list(zip(chain.from_iterable(kept), adjoints, strict=True)), first.system
+        steps, begin = _backwards(kept, seeds, workspace, first.state)
+        system = first.system
         starts = by_anchors(system, steps, begin.x)
         by_moduli, by_rest = fields_of(workspace, steps, self.solver, moduli=moduli, rest=rest)
         chosen = range(len(p)) if parameters is None else parameters
@@ -314,8 +313,8 @@ def _are_alike(one: System, other: System, *, whole: bool = False) -> bool:
 
 def _backwards(
     kept: list[list[Kept]], seeds: list[Seeds], workspace: Workspace, start: State
-) -> tuple[list[StepAdjoint], StateAdjoint]:
-    """The adjoints of all substeps, and of the state at the start."""
+) -> tuple[list[tuple[Kept, StepAdjoint]], StateAdjoint]:
+    """All substeps with their adjoints, and the adjoint of the state at the start."""
     n = len(start.positions)
     at, found = StateAdjoint.zeros(n, len(kept[0][0].before.internal) if kept else 0), []
     bodies_end, changes = workspace.bodies_end, [0.0]
@@ -327,7 +326,7 @@ def _backwards(
         for one in reversed(some):
             replay = Replay.of(one, workspace)
             adjoint, at = step_adjoint(replay, at, by_forces)
-            found.append(adjoint)
+            found.append((replay.searched, adjoint))
             changes.append(replay.imbalance())
             by_forces = ForceAdjoint.zeros(whole, len(one.held))
         for values in (at.x, at.v):
