@@ -10,10 +10,12 @@ from supple.app.scene_file.document import scene_file_model as scene_file_model 
 from supple.app.scene_file.entries.kinds import keys_of
 from supple.kinds.kind import Kind, declared, first_paragraph
 from supple.materials.registry import MATERIALS
+from supple.materials.shells.shell_material import ShellMaterial
 from supple.mesh.primitives.shape import SHAPES
 from supple.scene.joints.motors import MOTORS
 from supple.scene.registry import PARTS
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.shell import Shell
 from supple.solvers.registry import SOLVERS
 
 HEAD = """\
@@ -41,9 +43,11 @@ def kinds_page() -> str:
             continue
         for kind in kinds:
             title = f"`kind: {kind.kind}` (`{kind.__name__}`)" if len(kinds) > 1 else f"`{kind.__name__}`"
-            rows = [row for field in declared(kind).items() for row in _rows(*field)]
+            fields = declared(ShellMaterial if kind is Shell else kind)  # the others are those of all bodies
+            rows = [row for field in fields.items() for row in _rows(*field)]
             if name == "bodies":
-                title = f"`{kind.__name__}`" + ": its own keys are below `rigid`" * (kind is RigidBody)
+                below = {RigidBody: ": its own keys are below `rigid`", Shell: ": its own keys, below `shell`"}
+                title = f"`{kind.__name__}`{below.get(kind, '')}"
             table = "\n".join(["| key | default | meaning |", "|---|---|---|", *rows])
             parts.append(f"### {title}\n\n{first_paragraph(kind)}\n\n{table}\n")
     return "\n".join(parts)

@@ -230,11 +230,13 @@ def _momentum(axis, t: NDArray[np.float64], values: NDArray[np.float64], label: 
 
 
 def volume_ratios(recording: Recording) -> NDArray[np.float64]:
-    """Volume of each body over its volume at rest, (frames, bodies): the mean of J, weighted by rest volume."""
-    ratios = np.empty((len(recording), len(recording.bodies)))
+    """Volume of each body over its volume at rest, (frames, bodies): the mean of J, weighted by rest volume; NaN of
+    shells."""
+    ratios = np.full((len(recording), len(recording.bodies)), np.nan)
     for k, frame in enumerate(recording):
         J = frame.det_F
         for i, body in enumerate(recording.bodies):
             V = recording.rest_volumes[body.tets]
-            ratios[k, i] = (J[body.tets] @ V) / V.sum()
+            if len(V):
+                ratios[k, i] = (J[body.tets] @ V) / V.sum()
     return ratios

@@ -132,6 +132,41 @@ def test_regions_and_quadratic_tets(tmp_path):
     same(scene.bodies, saved(scene, tmp_path).bodies)
 
 
+def test_shells(tmp_path):
+    """An open sheet and a balloon, with a start and a look."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1], [0.5, 0.1, 0.5]], dtype=np.float64)
+    sheet = sp.SurfaceMesh(corners, np.array([[0, 4, 1], [1, 4, 2], [2, 4, 3], [3, 4, 0]]))
+    cloth = sp.ShellMaterial(youngs=1e5, poisson=0.3, thickness=1e-3, bending=1e-7, membrane="st_venant_kirchhoff")
+    rubber = sp.ShellMaterial(youngs=1e6, poisson=0.5, thickness=2e-4, damping=0.01)
+    balloon = sp.shapes.sphere(radius=0.1, edge_length=0.08).surface.compact()
+    bodies = [
+        sp.Shell("cloth", sheet, cloth, position=(0, 1, 0), rotation=(0.1, 0, 0), velocity=(1, 0, 0)),
+        sp.Shell("balloon", balloon, rubber),
+    ]
+    scene = sp.Scene(bodies, pins=[sp.Pin("cloth", [0, 1])])
+    saved(scene, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ("mesh: {file: bar.vtu}, shell: {youngs: 1, poisson: 0.3, thickness: 1}", "a shell needs a surface"),
+        ("mesh: {file: bar.vtu}, shell: {youngs: 1, poisson: 0.3}", "the key `thickness` is missing"),
+        ("mesh: {file: bar.vtu}, order: 2, shell: {youngs: 1, poisson: 0.3, thickness: 1}", "a shell has no `order`"),
+        ("mesh: {file: bar.vtu}, rigid: {mass: 1}, shell: {youngs: 1, poisson: 0.3, thickness: 1}", "give one of them"),
+        (
+            "mesh: {file: bar.vtu}, shell: {youngs: 1, poisson: 0.3, thickness: -1}",
+            "thickness: is -1; it must be above 0",
+        ),
+    ],
+)
+def test_shells_that_are_none(tmp_path, keys, words):
+    sp.shapes.box((1, 1, 1), (1, 1, 1)).save(tmp_path / "bar.vtu")
+    (tmp_path / "scene.yaml").write_text(f"bodies: [{{name: cloth, {keys}}}]\n")
+    with pytest.raises(sp.SceneError, match=words):
+        sp.load_scene(tmp_path / "scene.yaml")
+
+
 def test_values_of_every_shape(tmp_path):
     """One number, lists in the text and files, of everything that may have them."""
     rng = np.random.default_rng(5)

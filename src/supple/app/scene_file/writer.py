@@ -44,6 +44,7 @@ from supple.scene.registry import PARTS
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox, Vertices
+from supple.scene.shell import Shell
 
 _INLINE = 64  # numbers of an array that a reader can still survey in the text
 
@@ -154,6 +155,9 @@ def _body(body: Any, files: Files) -> dict[str, Any]:
         shape = files.mesh(body.shape, body.name)
         data |= {"mesh": shape} if isinstance(body.shape, TetMesh) else {"surfaces": [shape]}
         return data | {"rigid": _fields(body, files, body.name, RIGID)}
+    if isinstance(body, Shell):
+        shell = _fields(body.material, files, body.name)
+        return data | {"surfaces": [files.mesh(body.surface, body.name)], "shell": shell}
     material = body.material
     materials = material.materials if isinstance(material, Regions) else (material,)
     described = [

@@ -1,4 +1,4 @@
-"""Bodies of a scene file: the declared fields of `Body` and `RigidBody`, where meshes come from, regions and copies."""
+"""Bodies of a scene file: the declared fields of all kinds of bodies, where meshes come from, regions and copies."""
 
 from __future__ import annotations
 
@@ -16,17 +16,22 @@ from supple.app.scene_file.entries.kinds import built, entry_of, typed_keys, val
 from supple.app.scene_file.entries.mesh_sources import MeshFileModel, MeshStore
 from supple.app.scene_file.entries.regions import Region, with_regions
 from supple.app.scene_file.model import Extents, Model, Name
+from supple.errors import SceneError
 from supple.kinds.kind import declared
 from supple.materials.material import Hyperelastic
 from supple.materials.registry import MATERIALS
+from supple.materials.shells.shell_material import ShellMaterial
+from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body, PlacedBody
 from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.shell import Shell
 
-# What both kinds of bodies have, and what each has of its own beside the mesh or shape.
+# What all kinds of bodies have, and what each has of its own beside the mesh, shape or surface.
 SHARED = declared(PlacedBody)
 SOFT = {key: one for key, one in declared(Body).items() if key not in (*SHARED, "mesh", "material")}
 RIGID = {key: one for key, one in declared(RigidBody).items() if key not in (*SHARED, "shape")}
+SHELL = declared(ShellMaterial)
 
 
 class InitialModel(Model):
@@ -46,7 +51,7 @@ class BuiltBody:
 
 
 class BodyEntry(Model):
-    """One body. Give `mesh` (a file), `shape` or `surfaces`; and `material`, or `rigid` for a rigid one."""
+    """One body. Give `mesh` (a file), `shape` or `surfaces`; and `material`, or `rigid` or `shell` for such a one."""
 
     alternatives = ("mesh", "shape", "surfaces", "a body needs either `mesh` or `shape`; give one of them")
     # Of this class alone: the other keys are those of `body_model`.
@@ -65,21 +70,22 @@ class BodyEntry(Model):
     @model_validator(mode="after")
     def _soft_or_rigid(self) -> BodyEntry:
         this: Any = self
-        if (this.material is None) == (this.rigid is None):
-            raise ValueError("a body needs either `material` or `rigid`; give one of them")
-        if this.surfaces is not None and this.rigid is None:
-            raise ValueError("`surfaces` are of rigid bodies; give a soft one a `mesh` or a `shape`")
-        if this.rigid is not None:
+        if sum(one is not None for one in (this.material, this.rigid, this.shell)) != 1:
+            raise ValueError("a body needs either `material`, `rigid` or `shell`; give one of them")
+        if this.surfaces is not None and this.material is not None:
+            raise ValueError("`surfaces` are of rigid bodies and shells; give a soft one a `mesh` or a `shape`")
+        if this.material is None:
             for key in (*self.others, *SOFT):
                 if getattr(self, key) is not None:
-                    raise ValueError(f"a rigid body has no `{key}`; remove it")
+                    raise ValueError(f"a {'shell' if this.rigid is None else 'rigid body'} has no `{key}`; remove it")
         return self
 
     def build(self, meshes: MeshStore) -> list[BuiltBody]:
         """The body, or all its copies."""
         this: Any = self
         shared = values_of(self, SHARED, meshes)
-        alone = self._soft(shared, meshes) if this.rigid is None else self._rigid(shared, meshes)
+        kinds = (this.rigid, self._rigid), (this.shell, self._shell), (this.material, self._soft)
+        alone = next(make for given, make in kinds if given is not None)(shared, meshes)
         copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
         digits = max(2, len(str(len(copies))))
         made = []
@@ -98,6 +104,16 @@ class BodyEntry(Model):
         shape = self._shape(meshes.solid, meshes.solid_shape, meshes.joined)
         with at("rigid"):
             return RigidBody(shape=shape, **shared, **values_of(this.rigid, RIGID, meshes))
+
+    def _shell(self, shared: dict[str, Any], meshes: MeshStore) -> Shell:
+        """Without copies."""
+        this: Any = self
+        surface = self._shape(meshes.solid, meshes.solid_shape, meshes.joined)
+        if isinstance(surface, TetMesh):
+            raise SceneError("a shell needs a surface, and this is a mesh of tets; give a file of triangles")
+        with at("shell"):
+            material = ShellMaterial(**values_of(this.shell, SHELL, meshes))
+        return Shell(surface=surface, material=material, **shared)
 
     def _soft(self, shared: dict[str, Any], meshes: MeshStore) -> Body:
         """Without copies."""
@@ -126,7 +142,7 @@ class BodyEntry(Model):
 
 @cache
 def body_model() -> type[BodyEntry]:
-    """The keys of a body: those of `BodyEntry`, and the declared fields of `Body` and `RigidBody`."""
+    """The keys of a body: those of `BodyEntry`, and the declared fields of all kinds of bodies."""
     elastic = entry_of([kind for kind in MATERIALS if issubclass(kind, Hyperelastic)])
     region: Any = create_model("RegionModel", __base__=Region, __doc__=Region.__doc__, material=(elastic, ...))
     own: dict[str, Any] = typed_keys(RigidBody, RIGID)
@@ -140,6 +156,13 @@ def body_model() -> type[BodyEntry]:
     keys: dict[str, Any] = typed_keys(RigidBody, (*SHARED, "shape")) | typed_keys(Body, SOFT, null=True)
     keys["material"] = entry_of(MATERIALS) | None, Field(default=None, description="of a soft body")
     keys["rigid"] = rigid | None, Field(default=None, description="instead of `material`: the body is rigid")
+    sheet: Any = create_model(
+        "ShellModel",
+        __base__=Model,
+        __doc__="What makes a body a shell, whose surface is its middle one, open or closed.",
+        **typed_keys(ShellMaterial, SHELL),
+    )
+    keys["shell"] = sheet | None, Field(default=None, description="instead of `material`: the body is a thin sheet")
     keys["regions"] = (
         list[region] | None,
         Field(default=None, min_length=1, max_length=1000, description=text),
