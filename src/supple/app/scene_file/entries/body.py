@@ -156,11 +156,12 @@ def body_model() -> type[BodyEntry]:
     keys: dict[str, Any] = typed_keys(RigidBody, (*SHARED, "shape")) | typed_keys(Body, SOFT, null=True)
     keys["material"] = entry_of(MATERIALS) | None, Field(default=None, description="of a soft body")
     keys["rigid"] = rigid | None, Field(default=None, description="instead of `material`: the body is rigid")
+    of_sheet: dict[str, Any] = typed_keys(ShellMaterial, SHELL)
     sheet: Any = create_model(
         "ShellModel",
         __base__=Model,
         __doc__="What makes a body a shell, whose surface is its middle one, open or closed.",
-        **typed_keys(ShellMaterial, SHELL),
+        **of_sheet,
     )
     keys["shell"] = sheet | None, Field(default=None, description="instead of `material`: the body is a thin sheet")
     keys["regions"] = (
