@@ -198,7 +198,7 @@ def test_a_picture_is_drawn_again_only_where_something_has_moved(recording, monk
     first, later = (render_frame_of(model, recording[k]) for k in (0, 9))
     studio = object.__new__(Studio)
     vars(studio).update(_meshes=[(None, one) for one in surfaces_of(model)], _bodies=2, _field=None)
-    vars(studio).update(_image=None, _seen=[], _lines=[])
+    vars(studio).update(_image=None, _seen=[], _lines=[], _legend=None)
     monkeypatch.setattr(Studio, "_aim", lambda self, points, share: np.array([share]))
     monkeypatch.setattr(Studio, "_drawn", lambda self, points, nodal: np.zeros((1, 1, 3), np.uint8))
     shown = [studio.picture(*one) for one in ((first, 0.0), (first, 0.0), (later, 0.0), (later, 0.5))]

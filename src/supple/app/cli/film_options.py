@@ -37,6 +37,13 @@ class PictureOptions:
     connections: Annotated[bool | None, Parameter(help="Stitches and joints as lines: yes without it.")] = None
     shadows: Annotated[bool | None, Parameter(help="Soft shadows: yes without it.")] = None
     dark: Annotated[bool | None, Parameter(negative="", help="A dark background.")] = None
+    render: Annotated[
+        bool | None,
+        Parameter(negative="", help="Trace light: translucent bodies, soft shadows, depth; slow (extra: render)."),
+    ] = None
+    samples: Annotated[
+        int | None, Parameter(help="Paths of light of each pixel, with --render: 64 without it; more have less grain.")
+    ] = None
 
     def given(self) -> dict[str, Any]:
         """What was given, for `export`."""

@@ -46,9 +46,11 @@ FORMATS = {
     "vtu": Format("export.vtu:write_last_vtu", (".vtu",)),  # the last frame as a VTK unstructured grid
     "vtkhdf": Format("export.vtkhdf:write_vtkhdf", RECORDING_SUFFIXES),  # a recording again, compressed and repaired
     "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
-    "gif": Format("export.video:write_video", (".gif",), {"size": (640, 360), "rate": 20.0}),  # (extra: video)
-    "mp4": Format("export.video:write_video", (".mp4",), {}),  # (extra: video)
-    "png": Format("export.video:write_video", (".png",), {}),  # one instant (extra: video)
+    "gif": Format(
+        "export.video:write_video", (".gif",), {"size": (640, 360), "rate": 20.0}
+    ),  # (extra: video, or render)
+    "mp4": Format("export.video:write_video", (".mp4",), {}),  # (extra: video, or render)
+    "png": Format("export.video:write_video", (".png",), {}),  # one instant (extra: video, or render)
     "csv": Format("export.table:write_csv", (".csv",)),  # the reports of all frames
     "html": Format("page.page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }

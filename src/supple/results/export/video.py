@@ -48,6 +48,8 @@ class Film:
     shadows : whether bodies and obstacles cast soft shadows
     dark : whether the background is dark
     time : of a picture [s]; None: the end
+    render : whether light is traced (extra: render): slow, with translucent bodies, soft shadows and depth of field
+    samples : paths of light of each pixel, with `render`: more have less grain and take longer; None: 64
 
     Raises
     ------
@@ -68,6 +70,8 @@ class Film:
     shadows: bool = True
     dark: bool = False
     time: float | None = None
+    render: bool = False
+    samples: int | None = None
 
     def __post_init__(self) -> None:
         choices = {"camera": CAMERAS, "view": PRESETS, "surface": DRAWN, "color": (COLOR_BY_BODY, *COLORS)}
@@ -85,6 +89,13 @@ class Film:
                 raise OutputError(f"export: {key} is {value!r}; give a number above zero, at most {most:g}")
         if self.time is not None and not isinstance(self.time, (int, float)):
             raise OutputError(f"export: time is {self.time!r}; give seconds")
+        if self.samples is not None:
+            if isinstance(self.samples, bool) or not isinstance(self.samples, int) or not 1 <= self.samples <= 65_536:
+                raise OutputError(f"export: samples is {self.samples!r}; give a whole number from 1 to 65536")
+            if not self.render:
+                raise OutputError("export: samples are those of traced light; give render too")
+        if self.render and not self.shadows:
+            raise OutputError("export: traced light casts shadows; leave out render, or the wish for no shadows")
         if self.range is not None:
             self._require_range()
         if self.eye is not None or self.target is not None:
@@ -117,19 +128,25 @@ class Film:
         object.__setattr__(self, "target", tuple(target.tolist()))
 
 
-_NEEDED = {"png": ("pyvista", "PIL"), "gif": ("pyvista", "PIL"), "mp4": ("pyvista", "PIL", "imageio_ffmpeg")}
+# Without and with traced light: the extra, what it must have, and the program.
+_RENDERERS = {False: ("video", "pyvista", "video_worker"), True: ("render", "mitsuba", "render_worker")}
+_ENCODERS = {"mp4": ("imageio_ffmpeg",)}
 
 
 def write_video(recording: Recording, output: Path, film: Film) -> None:
     """Write a film (.mp4, which is H.264, or .gif), or a picture of one instant (.png)."""
     kind = output.suffix[1:].lower()
-    missing = [name for name in _NEEDED[kind] if find_spec(name) is None]
+    extra, library, worker = _RENDERERS[film.render]
+    missing = [name for name in (library, "PIL", *_ENCODERS.get(kind, ())) if find_spec(name) is None]
     if missing:
-        raise OutputError(f"export to {kind} needs {missing[0]}, which is not installed; pip install 'supple[video]'")
+        raise OutputError(f"export to {kind} needs {missing[0]}, which is not installed; pip install 'supple[{extra}]'")
     with whole_file(output) as fresh:
-        command = [sys.executable, "-m", "supple.results.export.video_worker", str(recording.path), str(fresh)]
+        command = [sys.executable, "-m", f"supple.results.export.{worker}", str(recording.path), str(fresh)]
         command.append(json.dumps(asdict(film)))
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        # What takes minutes shows a bar, on standard output of the child: that of errors has the reason of its end.
+        shown = film.render and sys.__stderr__ is not None and sys.__stderr__.isatty()
+        bar = sys.__stderr__ if shown else subprocess.DEVNULL
+        done = subprocess.run(command, stdout=bar, stderr=subprocess.PIPE, text=True, check=False)
         if done.returncode != 0 or not fresh.exists():
             raise OutputError(f"{output}: {_reason(done)}")
 

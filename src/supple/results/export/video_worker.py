@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,80 +29,47 @@ from supple.results.view.model import Model, RenderFrame
 from supple.results.view.occlusion import occlusion
 from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
 
-_ANGLE = 30.0  # of the camera, upwards [degrees]
+ANGLE = 30.0  # of the camera, upwards [degrees]
 _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
 # Direction [share of the radius of the scene, across, up, ahead], color and strength of each light.
-_LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4), ((0.5, 1.0, -4.0), "#ffffff", 0.25))
+LIGHTS = (((2.0, 5.0, 3.0), "#fff3e2", 0.75), ((-4.0, 2.0, 2.0), "#dbe7ff", 0.4), ((0.5, 1.0, -4.0), "#ffffff", 0.25))
 # Colors of a field must be found again in the legend: they have little shading.
 _FIELD: Any = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}
 _SHADOW_CELLS, _FLOOR_CELLS = 256, 512
 _SAMPLED = 24  # frames from which the ends of a color scale are found
 
 
-class Studio:
-    """A scene of VTK with all surfaces of a recording, and its camera."""
+class Pictures(ABC):
+    """What the pictures of a recording show, and from where; how they are drawn is of a renderer.
+
+    Parameters
+    ----------
+    render_frames : those that will be drawn, at least one
+    """
 
     def __init__(self, model: Model, render_frames: list[RenderFrame], film: Film) -> None:
-        import pyvista
-
         self._film, self._view, self._distance = film, model.view, 0.0
         self._image: NDArray[np.uint8] | None = None
         self._drawn_from: list[NDArray[np.float64]] = []
-        self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
-        shown = theme(film.dark)
-        plotter.set_background(_share(shown.bottom), top=_share(shown.top))  # pyright: ignore[reportArgumentType]
-        plotter.enable_anti_aliasing("msaa", multi_samples=4)
-        self._add_lights(pyvista)
+        self._bodies = len(model.bodies)
         self._field = COLORS.get(film.color)
+        self._limits = self._ends(render_frames)
+        self._legend = None
+        if self._field is not None and self._limits is not None:
+            self._legend = legend(self._field, self._limits, film.size, theme(film.dark))
+        # What a renderer keeps of each surface and of each set of lines (its `points` are set), and where they are.
         self._meshes: list[tuple[Any, SoftSurface | RigidSurface]] = []
-        self._shaded = film.shadows
-        ends = self._ends(render_frames)
-        self._legend = None if self._field is None or ends is None else legend(self._field, ends, film.size, shown)
-        for number, flat in enumerate(surfaces_of(model, skins=film.surface == "skin", dark=film.dark)):
+        self._lines: list[tuple[Any, Callable[[RenderFrame], NDArray[np.float64]]]] = []
+
+    def _surfaces(self, model: Model) -> Iterator[tuple[bool, SoftSurface | RigidSurface]]:
+        """Each surface that is drawn but for floors, and whether its backs cannot be seen."""
+        for number, flat in enumerate(surfaces_of(model, skins=self._film.surface == "skin", dark=self._film.dark)):
             if flat.is_floor:
                 continue
             surface = flat.creased(model)
             if self._field is not None and number < len(model.bodies) and isinstance(surface, RigidSurface):
                 surface = replace(surface, color=NOT_KNOWN_COLOR)  # it has no such values
-            mesh = pyvista.PolyData.from_regular_faces(surface.at(render_frames[0]), surface.triangles)
-            look: dict[str, Any] = _phong(surface.look) | {"color": _share(surface.color)}
-            if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
-                mesh.point_data["field"] = np.zeros(mesh.n_points)
-                colors = {"cmap": color_map(self._field), "clim": ends, "show_scalar_bar": False}
-                look = _FIELD | {"scalars": "field"} | colors
-            elif self._shaded:
-                mesh.point_data["color"] = np.tile(np.array(surface.color, dtype=np.uint8), (mesh.n_points, 1))
-                look = _phong(surface.look) | {"scalars": "color", "rgb": True}
-            inner = surface.container
-            opacity = 1.0 if inner else surface.opacity
-            # Sides that cannot be seen are not drawn: a third of the time of a renderer on a processor.
-            hidden = "front" if inner else "back" if flat.hides_its_backs(model) else None
-            actor = plotter.add_mesh(mesh, opacity=opacity, culling=hidden, **look)
-            actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
-            self._meshes.append((mesh, surface))
-        self._lines = [
-            (self._add_lines(pyvista, segments(render_frames[0]), color), segments)
-            for segments, color in (connections(model) if film.connections else [])
-        ]
-        self._bodies = len(model.bodies)
-        floor = floor_shadow(model, _SHADOW_CELLS)
-        self._shadow = floor if film.shadows else None
-        if floor is not None:
-            self._add_picture(pyvista, floor.disc, floor_disc(film.dark, _FLOOR_CELLS))
-        self._floor: Any = None if floor is None else self._add_picture(pyvista, floor.corners, floor.picture([]))
-        plotter.show(auto_close=False, interactive=False)  # pyvista renders nothing before
-
-    def _add_lights(self, pyvista: Any) -> None:
-        center, radius, up = self._view.center, self._view.radius, self._view.up
-        ahead = direction_of("corner", self._view)
-        ahead -= float(ahead @ up) * up
-        ahead /= np.linalg.norm(ahead)
-        axes = np.stack([np.cross(up, ahead), up, ahead])
-        for direction, color, strength in _LIGHTS:
-            place = center + radius * np.array(direction) @ axes
-            self._plotter.add_light(
-                pyvista.Light(position=tuple(place), focal_point=tuple(center), color=color, intensity=strength)
-            )
+            yield flat.hides_its_backs(model), surface
 
     def _ends(self, render_frames: list[RenderFrame]) -> tuple[float, float] | None:
         """Of the color scale, for the whole film."""
@@ -111,18 +79,6 @@ class Studio:
         return Limits(self._field, Range(fixed=self._film.range)).follow(
             np.concatenate([self._field.values(render_frame) for render_frame in chosen])
         )
-
-    def _add_picture(self, pyvista: Any, corners: NDArray[np.float64], image: NDArray[np.uint8]) -> Any:
-        mesh = pyvista.PolyData(corners, np.array([4, 0, 1, 2, 3]))
-        mesh.active_texture_coordinates = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
-        return self._plotter.add_mesh(mesh, texture=_texture(image), lighting=False)
-
-    def _add_lines(self, pyvista: Any, segments: NDArray[np.float64], color: Color) -> Any:
-        ends = np.column_stack([np.full(len(segments), 2), np.arange(2 * len(segments)).reshape(-1, 2)])
-        mesh = pyvista.PolyData(segments.reshape(-1, 3), lines=ends.ravel())
-        width = max(1.0, self._film.size[1] / 240.0)
-        self._plotter.add_mesh(mesh, color=_share(color), line_width=width, lighting=False)
-        return mesh
 
     def picture(self, render_frame: RenderFrame, share: float) -> NDArray[np.uint8]:
         """(height, width, 3) of a frame, at a share of the film's length."""
@@ -135,8 +91,92 @@ class Studio:
         if self._image is None or not all(map(np.array_equal, inputs, self._drawn_from)):
             for (mesh, _), x in zip(self._lines, lines, strict=True):
                 mesh.points = x.astype(np.float32)
-            self._drawn_from, self._image = inputs, self._drawn(points, nodal)
+            self._drawn_from, self._image = inputs, self._with_legend(self._drawn(points, nodal))
         return self._image
+
+    def _with_legend(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        if self._legend is None:
+            return image
+        colors, opaque = self._legend
+        return np.round(image * (1.0 - opaque) + colors * opaque).astype(np.uint8)
+
+    def _aim(self, points: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+        """Place the camera; what determines its place."""
+        center, away, distance = placed(self._film, self._view, points, share)
+        # The largest so far, so that the size of the picture does not vary.
+        self._distance = max(self._distance, distance)
+        self._look(center + self._distance * away, center, upright(self._view.up, away))
+        return np.array([*center, *away, self._distance])
+
+    @abstractmethod
+    def _look(self, eye: NDArray[np.float64], target: NDArray[np.float64], up: NDArray[np.float64]) -> None:
+        """Place the camera at a point (3,), towards another one [m]."""
+
+    @abstractmethod
+    def _drawn(self, points: list[NDArray[np.float64]], nodal: NDArray[np.float64] | None) -> NDArray[np.uint8]:
+        """(height, width, 3) with these points of the surfaces and values of vertices, without the legend."""
+
+
+class Studio(Pictures):
+    """A scene of VTK with all surfaces of a recording, and its camera."""
+
+    def __init__(self, model: Model, render_frames: list[RenderFrame], film: Film) -> None:
+        import pyvista
+
+        super().__init__(model, render_frames, film)
+        self._plotter = plotter = pyvista.Plotter(off_screen=True, window_size=list(film.size), lighting="none")
+        shown = theme(film.dark)
+        plotter.set_background(_share(shown.bottom), top=_share(shown.top))  # pyright: ignore[reportArgumentType]
+        plotter.enable_anti_aliasing("msaa", multi_samples=4)
+        self._add_lights(pyvista)
+        self._shaded, ends = film.shadows, self._limits
+        for closed, surface in self._surfaces(model):
+            mesh = pyvista.PolyData.from_regular_faces(surface.at(render_frames[0]), surface.triangles)
+            look: dict[str, Any] = _phong(surface.look) | {"color": _share(surface.color)}
+            if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
+                mesh.point_data["field"] = np.zeros(mesh.n_points)
+                colors = {"cmap": color_map(self._field), "clim": ends, "show_scalar_bar": False}
+                look = _FIELD | {"scalars": "field"} | colors
+            elif self._shaded:
+                mesh.point_data["color"] = np.tile(np.array(surface.color, dtype=np.uint8), (mesh.n_points, 1))
+                look = _phong(surface.look) | {"scalars": "color", "rgb": True}
+            inner = surface.container
+            opacity = 1.0 if inner else surface.opacity
+            # Sides that cannot be seen are not drawn: a third of the time of a renderer on a processor.
+            hidden = "front" if inner else "back" if closed else None
+            actor = plotter.add_mesh(mesh, opacity=opacity, culling=hidden, **look)
+            actor.prop.interpolation = "phong"  # uses the normals that are set for each frame
+            self._meshes.append((mesh, surface))
+        self._lines = [
+            (self._add_lines(pyvista, segments(render_frames[0]), color), segments)
+            for segments, color in (connections(model) if film.connections else [])
+        ]
+        floor = floor_shadow(model, _SHADOW_CELLS)
+        self._shadow = floor if film.shadows else None
+        if floor is not None:
+            self._add_picture(pyvista, floor.disc, floor_disc(film.dark, _FLOOR_CELLS))
+        self._floor: Any = None if floor is None else self._add_picture(pyvista, floor.corners, floor.picture([]))
+        plotter.show(auto_close=False, interactive=False)  # pyvista renders nothing before
+
+    def _add_lights(self, pyvista: Any) -> None:
+        center, radius, axes = self._view.center, self._view.radius, axes_of(self._view)
+        for direction, color, strength in LIGHTS:
+            place = center + radius * np.array(direction) @ axes
+            self._plotter.add_light(
+                pyvista.Light(position=tuple(place), focal_point=tuple(center), color=color, intensity=strength)
+            )
+
+    def _add_picture(self, pyvista: Any, corners: NDArray[np.float64], image: NDArray[np.uint8]) -> Any:
+        mesh = pyvista.PolyData(corners, np.array([4, 0, 1, 2, 3]))
+        mesh.active_texture_coordinates = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
+        return self._plotter.add_mesh(mesh, texture=_texture(image), lighting=False)
+
+    def _add_lines(self, pyvista: Any, segments: NDArray[np.float64], color: Color) -> Any:
+        ends = np.column_stack([np.full(len(segments), 2), np.arange(2 * len(segments)).reshape(-1, 2)])
+        mesh = pyvista.PolyData(segments.reshape(-1, 3), lines=ends.ravel())
+        width = max(1.0, self._film.size[1] / 240.0)
+        self._plotter.add_mesh(mesh, color=_share(color), line_width=width, lighting=False)
+        return mesh
 
     def _drawn(self, points: list[NDArray[np.float64]], nodal: NDArray[np.float64] | None) -> NDArray[np.uint8]:
         """(height, width, 3) with these points of the surfaces and values of vertices."""
@@ -156,11 +196,7 @@ class Studio:
             self._floor.texture = _texture(self._shadow.picture(cast))
         self._plotter.reset_camera_clipping_range()
         self._plotter.render()
-        image = np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
-        if self._legend is None:
-            return image
-        colors, opaque = self._legend
-        return np.round(image * (1.0 - opaque) + colors * opaque).astype(np.uint8)
+        return np.ascontiguousarray(self._plotter.image[..., :3])  # `screenshot` would render it once more
 
     def _shade(self, points: list[NDArray[np.float64]], normals: list[NDArray[np.float64]]) -> None:
         """Darken what little light reaches."""
@@ -172,15 +208,18 @@ class Studio:
                 light = (1.0 - dark)[:, None] * np.array(surface.color)
                 mesh.point_data["color"] = light.astype(np.uint8)
 
-    def _aim(self, points: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-        """Place the camera; what determines its place."""
-        center, away, distance = placed(self._film, self._view, points, share)
-        # The largest so far, so that the size of the picture does not vary.
-        self._distance = max(self._distance, distance)
+    def _look(self, eye: NDArray[np.float64], target: NDArray[np.float64], up: NDArray[np.float64]) -> None:
         camera = self._plotter.camera
-        camera.position, camera.focal_point = tuple(center + self._distance * away), tuple(center)
-        camera.up, camera.view_angle = tuple(upright(self._view.up, away)), _ANGLE
-        return np.array([*center, *away, self._distance])
+        camera.position, camera.focal_point, camera.up = tuple(eye), tuple(target), tuple(up)
+        camera.view_angle = ANGLE
+
+
+def axes_of(view: View) -> NDArray[np.float64]:
+    """(3, 3) rows: across, up, and ahead to the camera of the usual view. Lights do not move with the camera."""
+    ahead = direction_of("corner", view)
+    ahead -= float(ahead @ view.up) * view.up
+    ahead /= np.linalg.norm(ahead)
+    return np.stack([np.cross(view.up, ahead), view.up, ahead])
 
 
 def connections(model: Model) -> list[tuple[Callable[[RenderFrame], NDArray[np.float64]], Color]]:
@@ -217,7 +256,7 @@ def placed(film: Film, view: View, points: _Vector, share: float) -> tuple[_Vect
     visible = view.outline
     if film.camera == "follow":
         visible = box_corners(points.min(axis=0), points.max(axis=0))
-    slope = float(np.tan(np.radians(0.5 * _ANGLE)))
+    slope = float(np.tan(np.radians(0.5 * ANGLE)))
     slopes = (slope * film.size[0] / film.size[1], slope)
     center, distance = fitted(visible, away, u, slopes, centered=film.camera == "fit")
     return center, away, max(distance, view.radius * 1e-3)
@@ -239,14 +278,17 @@ def _texture(image: NDArray[np.uint8]) -> Any:
     return texture
 
 
-def write(source: Path, output: Path, film: Film) -> None:
+Renderer = Callable[[Model, list[RenderFrame], Film], Pictures]
+
+
+def write(source: Path, output: Path, film: Film, renderer: Renderer) -> None:
     """Draw a recording to a file: .gif, .mp4, or .png of one instant."""
     kind = output.suffix[1:].lower()
     with read_recording(source) as recording:
         numbers, rate = _chosen(recording, film, kind)
         model = model_of_recording(recording)
         render_frames = [render_frame_of(model, recording[k]) for k in numbers]
-        studio = Studio(model, render_frames, film)
+        studio = renderer(model, render_frames, film)
         images = (
             studio.picture(render_frame, k / max(1, len(render_frames) - 1))
             for k, render_frame in enumerate(render_frames)
@@ -335,10 +377,10 @@ def _write_mp4(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, s
         raise OSError(errno.EIO, f"ffmpeg wrote {written} of {sent} frames; is there room?")
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: list[str], renderer: Renderer = Studio) -> int:
     source, output, film = arguments
     try:
-        write(Path(source), Path(output), Film(**json.loads(film)))
+        write(Path(source), Path(output), Film(**json.loads(film)), renderer)
         return 0
     except SuppleError as error:
         reason = str(error)
