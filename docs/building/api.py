@@ -19,7 +19,7 @@ API = (
     ("meshes", "Meshes", ("mesh",)),
     ("simulation", "Solvers and simulation", ("simulate", "model", "solvers", "results.readings", "gradients")),
     ("recordings", "Recordings, checks and exports", ("results",)),
-    ("runs", "Scene files and runs", ("app.scene_file", "app.runs")),
+    ("runs", "Scene files, runs and the live page", ("app.scene_file", "app.runs", "app.viewer")),
     ("studies", "Studies", ("app.studies",)),
     ("numerics", "Numerics", ("numerics",)),
     ("errors", "Errors", ("errors",)),
