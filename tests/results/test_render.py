@@ -40,7 +40,7 @@ def test_grain_goes_and_edges_stay():
     """Two areas of different light and features, with noise, and a bright point in one pass."""
     light = np.full((32, 48, 3), 0.2)
     light[:, 24:] = 0.7
-    features = np.zeros((32, 48, 7))
+    features = np.zeros((32, 48, 5))
     features[:, 24:, 0] = 1.0
     passes = (light * np.random.default_rng(1).gamma(16.0, 1 / 16, (8, 32, 48, 1))).astype(np.float32)
     passes[3, 10, 10] = 500.0

@@ -28,11 +28,11 @@ _ROWS, _DISCS = 128, (16.0, 24.0, 20.0)
 _LOWEST = 32.0  # elevation of lights [degrees]: lower ones would be seen behind the bodies
 _HORIZON = 12.0  # elevation of the end of the background [degrees]
 _SKY = 0.18  # radiance above, of the light that a white floor reflects
-_FEATURE_SAMPLES = 8
+_FEATURE_SAMPLES = 2
 _STEPS, _SPLINE = (1, 2, 4), (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)  # of the filter against grain [pixels]
-# Differences that part what is shown: of colors, normals, and depths in radii; and how many variances light may differ.
-_WIDTHS = np.array([0.1, 0.1, 0.1, 0.25, 0.25, 0.25, 0.05])
-_TOLERANCE = 4.0
+# Differences that part what is shown: of the numbers of surfaces, of normals, and of depths in radii.
+_WIDTHS = np.array([0.3, 0.25, 0.25, 0.25, 0.25])
+_TOLERANCE = 16.0  # variances by which light may differ; with 4, a floor of 24 samples keeps spots
 _APERTURE = 0.02  # radius of the lens, as a share of that of the scene
 
 
@@ -170,10 +170,10 @@ class Tracer(Pictures):
         return _developed(_without_grain(np.stack(passes), self._features(loaded)))
 
     def _features(self, scene: Any) -> NDArray[Any]:
-        """(height, width, 7) what each pixel shows, without light: color, normal, and depth in radii of the scene."""
-        aovs = self._mitsuba.load_dict({"type": "aov", "aovs": "color:albedo,normal:sh_normal,depth:depth"})
-        found = np.array(self._mitsuba.render(scene, integrator=aovs, spp=_FEATURE_SAMPLES), dtype=np.float32)[..., -7:]
-        found[..., 6] = np.minimum(found[..., 6] / self._view.radius, 20.0)
+        """(height, width, 5) what each pixel shows, without light: surface, normal, and depth in radii of the scene."""
+        aovs = self._mitsuba.load_dict({"type": "aov", "aovs": "surface:shape_index,normal:sh_normal,depth:depth"})
+        found = np.array(self._mitsuba.render(scene, integrator=aovs, spp=_FEATURE_SAMPLES), dtype=np.float32)[..., -5:]
+        found[..., 4] = np.minimum(found[..., 4] / self._view.radius, 20.0)
         return found
 
     def _mesh(
@@ -231,7 +231,7 @@ def _linear(color: Any) -> NDArray[np.float64]:
 
 
 def _without_grain(passes: NDArray[Any], features: NDArray[Any]) -> NDArray[Any]:
-    """Light (height, width, 3) of passes (p, height, width, 3) and features (height, width, 7) of its pixels.
+    """Light (height, width, 3) of passes (p, height, width, 3) and features (height, width, 5) of its pixels.
 
     A rare path of much light is a bright point in one pass: a pass counts with at most four times the mean of the
     others. Then each pixel is a mean over neighbours that show the same and differ by no more than their passes do: an
