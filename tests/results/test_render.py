@@ -1,5 +1,7 @@
 """Pictures with traced light show what the others show; what they need is named."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,18 @@ def test_a_missing_renderer_is_named(tmp_path, tools, capsys, monkeypatch):
         error = capsys.readouterr().err
         assert "needs mitsuba, which is not installed; pip install 'supple[render]'" in error
         assert error.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["r.vtkhdf"]
+
+
+def test_a_killed_renderer_is_not_the_fault_of_opengl(tmp_path, tools, capsys, monkeypatch):
+    tools.record(tmp_path / "r.vtkhdf", 2)
+    killed = SimpleNamespace(returncode=-9, stderr="")
+    monkeypatch.setattr(video, "find_spec", lambda name: name)
+    monkeypatch.setattr(video, "subprocess", SimpleNamespace(run=lambda *_, **__: killed, PIPE=-1, DEVNULL=-3))
+    assert main(["picture", str(tmp_path / "r.vtkhdf"), "--render"]) == 2
+    error = capsys.readouterr().err
+    assert "the drawing process ended with code -9" in error
+    assert "OpenGL" not in error
     assert [path.name for path in tmp_path.iterdir()] == ["r.vtkhdf"]
 
 

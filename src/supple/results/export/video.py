@@ -148,16 +148,16 @@ def write_video(recording: Recording, output: Path, film: Film) -> None:
         bar = sys.__stderr__ if shown else subprocess.DEVNULL
         done = subprocess.run(command, stdout=bar, stderr=subprocess.PIPE, text=True, check=False)
         if done.returncode != 0 or not fresh.exists():
-            raise OutputError(f"{output}: {_reason(done)}")
+            raise OutputError(f"{output}: {_reason(done, film.render)}")
 
 
-def _reason(done: subprocess.CompletedProcess[str]) -> str:
+def _reason(done: subprocess.CompletedProcess[str], render: bool) -> str:
     lines = [line for line in done.stderr.splitlines() if line.strip()]
     last = lines[-1] if lines else ""
     if last.startswith("video: "):
         return last.removeprefix("video: ")
     signs = ("EGL", "OpenGL", "GLX", "X server", "OSMesa", "render window")
-    if done.returncode < 0 or any(sign in done.stderr for sign in signs):
+    if not render and (done.returncode < 0 or any(sign in done.stderr for sign in signs)):
         return (
             "drawing needs OpenGL, which does not work here; on Debian and Ubuntu: apt install libegl1 libgl1 "
             f"(the drawing process ended with code {done.returncode})"
