@@ -87,15 +87,16 @@ class CandidateFinder:
 
     Parameters
     ----------
-    dhat : [m] candidates are pairs that may be nearer than this
+    dhat : [m] candidates are pairs whose distances, less the offsets of `ContactMesh`, may be below this
 
     Attributes
     ----------
-    mesh : the surface; searches : how many have been made
+    mesh : the surface; searches : how many have been made; reach : dhat and the largest offsets of two sides [m]
     """
 
     def __init__(self, mesh: ContactMesh, dhat: float) -> None:
         self.mesh, self.dhat, self.searches = mesh, dhat, 0
+        self.reach = dhat + 2.0 * float(mesh.offsets.max(initial=0.0))
         self._patches = PatchSearch(mesh.parts, mesh.patches)
         edge = float(mesh.edge_lengths.mean()) if len(mesh.edge_lengths) else 0.0
         self._margins = _LEAST * dhat, max(_LEAST * dhat, _MOST * edge)
@@ -122,7 +123,7 @@ class CandidateFinder:
             return self._near
         if min(self._left(begin, self._region), self._left(end, self._region)) < 0.0:
             self._search(begin, end - begin)
-        return self._possible((begin, end), self.dhat)
+        return self._possible((begin, end), self.reach)
 
     def at(self, points: NDArray[np.float64]) -> Candidates:
         """Every pair that is nearer than dhat at `points` (s, 3), and more; see `find`."""
@@ -133,7 +134,7 @@ class CandidateFinder:
             self._search(points, np.zeros_like(points))
             left = min(self._region.margin, self._region.own_margin)
         margin = min(left, self._most_near)
-        reach = self.dhat + 2.0 * margin
+        reach = self.reach + 2.0 * margin
         possible = self._possible((points,), reach)
         self._near = possible.where(*(found < reach for found in possible.distances(self.mesh, points)))
         zero = np.zeros_like(points)
@@ -155,7 +156,7 @@ class CandidateFinder:
     def longest(self, begin: NDArray[np.float64], way: NDArray[np.float64]) -> float:
         """The length [m] of the longest of the ways (s, 3) from `begin`, in which owners that meet nothing do not move
         as a whole."""
-        meeting = np.asarray(self._meeting(begin, way, self.dhat).any(axis=1))[self.mesh.owner]
+        meeting = np.asarray(self._meeting(begin, way, self.reach).any(axis=1))[self.mesh.owner]
         return _largest(np.where(meeting[:, None], way, self._without_mean(way)))
 
     def _search(self, begin: NDArray[np.float64], way: NDArray[np.float64]) -> None:
@@ -163,7 +164,7 @@ class CandidateFinder:
         self.searches += 1
         own, (least, most) = self._without_mean(way), self._margins
         own_margin, margin = (min(max(_SHARE * _largest(ways), least), most) for ways in (own, way))
-        reach, own_reach = self.dhat + 2.0 * margin, self.dhat + 2.0 * own_margin
+        reach, own_reach = self.reach + 2.0 * margin, self.reach + 2.0 * own_margin
         kinds = (own, own_reach, self._self), (way, reach, self._meeting(begin, way, reach))
         kinds = [kind for kind in kinds if kind[2].any()]
         found = [self._patches.find(begin, *kind[:2], collide=kind[2], apart=True) for kind in kinds]

@@ -116,11 +116,12 @@ def _normal(u, v, n):
 
 
 class Kept(NamedTuple):
-    """What remains of the distance of two parts: a tenth of it or `near`, whichever is less, and at least `floor`.
+    """What remains of the gap of two parts (distance less offsets): a tenth of it or `near`, whichever is less, and at
+    least `floor`.
 
     Attributes
     ----------
-    floor : [m], of distances above it; those below stay nearly as they are
+    floor : [m], of gaps above it; those below stay nearly as they are
     near : [m] parts that come no nearer than this limit no motion, so that candidates that do not are not missed
     """
 
@@ -137,14 +138,14 @@ def _remainder(gap, kept):
 
 
 @njit
-def collision_time(x, way, kind, points, limit, kept):
+def collision_time(x, way, kind, points, limit, kept, offset):
     """How long, up to `limit`, the parts of the four `points` may move along `way` (s, 3) from x (s, 3).
 
     Until then they keep what `Kept` says. Larger than `limit` where they may move longer than that.
 
     Parameters
     ----------
-    kind : VERTEX_TRIANGLE or EDGE_EDGE
+    kind : VERTEX_TRIANGLE or EDGE_EDGE; offset : of both parts together [m]
     """
     o, shift = row(x, points[0]), row(way, points[0])
     a0, b0, c0 = subtract(row(x, points[1]), o), subtract(row(x, points[2]), o), subtract(row(x, points[3]), o)
@@ -157,8 +158,8 @@ def collision_time(x, way, kind, points, limit, kept):
     for _ in range(_MOST_STEPS):
         n, gap = _direction(_between(kind, a, b, c))
         if keep < 0.0:
-            keep = _remainder(gap, kept) + error
-        elif gap <= _CLOSE_ENOUGH * keep:
+            keep = offset + (_remainder(gap - offset, kept) + error)
+        elif gap - offset <= _CLOSE_ENOUGH * (keep - offset):
             return time
         step, least = _bound(kind, n, a, b, c, p, q, r, keep)
         if not least > _PRECISE * gap:
@@ -213,7 +214,7 @@ def largest_step(
     """
     limit = Limit(1.0)
     for kind, pairs in ((VERTEX_TRIANGLE, candidates.vertex_triangle), (EDGE_EDGE, candidates.edge_edge)):
-        step, k = _first(points, way, kind, mesh.triangles, mesh.edges, pairs, limit.step, kept)
+        step, k = _first(points, way, kind, mesh.triangles, mesh.edges, pairs, limit.step, kept, mesh.offsets)
         if k >= 0:
             limit = Limit(step, kind, tuple(map(int, corners(kind, mesh.triangles, mesh.edges, *pairs[k]))))
     return limit
@@ -263,8 +264,8 @@ class Along:
 
 
 @njit
-def is_clear(x, way, kind, points):
-    """Whether the boxes of two parts, of four points, stay so far apart along one axis that the distance is kept."""
+def is_clear(x, way, kind, points, offset):
+    """Whether the boxes of two parts, of four points, stay so far apart along one axis that the gap is kept."""
     a, b, c, d = points
     square = 0.0
     for m in range(3):
@@ -279,7 +280,7 @@ def is_clear(x, way, kind, points):
         else:
             low0, high0, low1, high1 = min(a0, b0), max(a0, b0), min(a1, b1), max(a1, b1)
             low2, high2, low3, high3 = min(c0, d0), max(c0, d0), min(c1, d1), max(c1, d1)
-        gap = max(min(low0 - high2, low1 - high3), min(low2 - high0, low3 - high1))
+        gap = max(min(low0 - high2, low1 - high3), min(low2 - high0, low3 - high1)) - offset
         if gap > 0.0 and gap * gap > _CLEAR * _CLEAR * square:
             size = max(abs(low0), abs(low1), abs(low2), abs(low3), abs(high0), abs(high1), abs(high2), abs(high3))
             return gap > ROUND_OFF * size
@@ -287,7 +288,7 @@ def is_clear(x, way, kind, points):
 
 
 @njit(cache=True, parallel=True)
-def _first(x, way, kind, triangles, edges, pairs, limit, kept):
+def _first(x, way, kind, triangles, edges, pairs, limit, kept, offsets):
     """The least step below `limit` of pairs (k, 2) of a kind, and the first row with it; `limit` and -1 for none."""
     steps, rows = np.full(_RUNS, limit), np.full(_RUNS, -1, dtype=np.int64)
     floor, near = kept  # Numba takes no tuples into a parallel loop
@@ -296,8 +297,9 @@ def _first(x, way, kind, triangles, edges, pairs, limit, kept):
         least, at = limit, np.int64(-1)
         for k in range(r, len(pairs), _RUNS):
             points = corners(kind, triangles, edges, pairs[k, 0], pairs[k, 1])
-            if not is_clear(x, way, kind, points):
-                step = collision_time(x, way, kind, points, least, its_kept)
+            offset = offsets[points[0]] + offsets[points[2]]
+            if not is_clear(x, way, kind, points, offset):
+                step = collision_time(x, way, kind, points, least, its_kept, offset)
                 if step < least:
                     least, at = step, k
         steps[r], rows[r] = least, at

@@ -55,7 +55,7 @@ class Passing:
 
     @cached_property
     def _thickness(self) -> NDArray[np.float64]:
-        """(p,) mean thickness 2 V / A of bodies, infinite for obstacles [m]."""
+        """(p,) thickness of shells, mean thickness 2 V / A of other bodies, infinite for obstacles [m]."""
         mesh = self.mesh
         of_triangle = mesh.owner[mesh.triangles[:, 0]]
         a, b, c = self._rest[mesh.triangles].transpose(1, 0, 2)
@@ -63,6 +63,7 @@ class Passing:
         volumes = np.bincount(of_triangle, np.einsum("ij,ij->i", a, areas) / 3.0, self._owners)
         surfaces = np.bincount(of_triangle, np.linalg.norm(areas, axis=1), self._owners)
         out = 2.0 * np.abs(volumes) / np.maximum(surfaces, np.finfo(np.float64).tiny)
+        out[mesh.owner] = np.where(mesh.offsets > 0.0, 2.0 * mesh.offsets, out[mesh.owner])  # shells contain no volume
         out[mesh.body_count :] = np.inf
         return out
 
@@ -194,14 +195,14 @@ def _write_meetings(x, way, end, kind, triangles, edges, pairs, met):
     y, w, four = np.empty((4, 3)), np.empty((4, 3)), (0, 1, 2, 3)
     for k in range(len(pairs)):
         points = corners(kind, triangles, edges, pairs[k, 0], pairs[k, 1])
-        if is_clear(x, way, kind, points):
+        if is_clear(x, way, kind, points, 0.0):
             continue
         for i in range(4):
             for m in range(3):
                 y[i, m], w[i, m] = x[points[i], m], way[points[i], m]
         now = 0.0
         for _ in range(_ROUNDS):
-            time = collision_time(y, w, kind, four, 1.0 - now, NO_FLOOR)
+            time = collision_time(y, w, kind, four, 1.0 - now, NO_FLOOR, 0.0)
             now += time
             if now > 1.0:
                 break

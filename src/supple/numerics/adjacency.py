@@ -43,6 +43,13 @@ def no_lists(count: int) -> Adjacency:
     return Adjacency(np.zeros(count + 1, dtype=np.int32), np.zeros(0, dtype=np.int32))
 
 
+def joined_lists(one: Adjacency, other: Adjacency) -> Adjacency:
+    """The items of two lists of each thing."""
+    count = len(one.start) - 1
+    rows = [np.repeat(np.arange(count), np.diff(lists.start)) for lists in (one, other)]
+    return adjacency(np.concatenate(rows), np.concatenate([one.items, other.items]), count)
+
+
 @njit
 def in_list(lists, k, item):
     """Whether an item is in the list of thing k; `lists` are an `Adjacency` or its two arrays."""

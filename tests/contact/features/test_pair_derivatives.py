@@ -76,14 +76,14 @@ def pairs_of(kind, count, seed):
     return x, c, d
 
 
-def as_contacts(kind, x, c):
+def as_contacts(kind, x, c, offset=0.0):
     count = len(x)
     points = np.arange(4 * count, dtype=np.int32).reshape(count, 4)
     points[:, min(kind + 2, 4) :] = -1
     vectors = np.einsum("ki,kij->kj", c, x)
-    return Contacts(
-        np.full(count, kind, dtype=np.int8), points, c, vectors, np.linalg.norm(vectors, axis=1), np.ones(count)
-    )
+    distances = np.linalg.norm(vectors, axis=1)
+    kinds = np.full(count, kind, dtype=np.int8)
+    return Contacts(kinds, points, c, vectors, distances, np.ones(count), distances - offset)
 
 
 def single(contacts, k):
@@ -186,6 +186,55 @@ def test_pairs_keep_both_momenta(kind):
     assert (moments < 1e-12 * size * np.abs(x).max(axis=(1, 2))).all()
     shifts = np.tile(np.eye(3), (4, 1))
     assert (np.abs(hessians @ shifts).max(axis=(1, 2)) < 1e-12 * np.abs(hessians).max(axis=(1, 2))).all()
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_derivatives_with_offsets_have_order_two(kind):
+    """The energy is that of the distance less the offset; directions are those of the distance."""
+    x, _, d = pairs_of(kind, 40, 61 + kind)
+    size = min(kind + 2, 4)
+    rng = np.random.default_rng(8)
+    for k in range(len(d)):
+        x[k] /= d[k]  # a distance of 1
+        offset, way = rng.uniform(0.3, 0.95), np.zeros((4, 3))
+        dhat = (1.0 - offset) * rng.uniform(1.2, 3.0)
+        way[:size] = rng.normal(size=(size, 3))
+
+        def at(h, k=k, way=way, offset=offset):
+            return as_contacts(kind, x[k : k + 1] + h * way, closest(kind, x[k] + h * way)[None], offset)
+
+        def gradient(h, at=at, dhat=dhat):
+            out = np.zeros((4, 3))
+            add_barrier_gradient(at(h), dhat, STIFFNESS, out)
+            return out
+
+        exact = dense(barrier_hessian(x[k], at(0.0), dhat, STIFFNESS, False), 1)[0] @ way.ravel()
+        slope = (gradient(0.0) * way).sum()
+        steps = (1.0 - offset) * 0.002 / np.linalg.norm(way) * 2.0 ** -np.arange(4)
+        first = [
+            abs((barrier_energy(at(h), dhat, STIFFNESS) - barrier_energy(at(-h), dhat, STIFFNESS)) / (2 * h) - slope)
+            for h in steps
+        ]
+        second = [np.abs((gradient(h) - gradient(-h)).ravel() / (2 * h) - exact).max() for h in steps]
+        for errors, scale in ((first, abs(slope)), (second, np.abs(exact).max())):
+            if errors[-1] > 1e-6 * scale:
+                assert 1.7 < np.log2(errors[-2] / errors[-1]) < 2.3
+        assert second[-1] < 0.02 * np.abs(exact).max()
+
+
+def closest(kind, x):
+    """(4,) the coefficients of the closest points of lines and planes through x (4, 3)."""
+    basis = {
+        VERTEX_VERTEX: [],
+        VERTEX_EDGE: [[0, 1, -1, 0]],
+        VERTEX_TRIANGLE: [[0, 1, -1, 0], [0, 1, 0, -1]],
+        EDGE_EDGE: [[-1, 1, 0, 0], [0, 0, 1, -1]],
+    }[kind]
+    c = np.array([1.0, 0.0, -1.0, 0.0] if kind == EDGE_EDGE else [1.0, -1.0, 0.0, 0.0])
+    if basis:
+        D = np.array(basis, dtype=np.float64)
+        c = c + np.linalg.lstsq((D @ x).T, -(c @ x), rcond=None)[0] @ D
+    return c
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)

@@ -2,8 +2,8 @@
 
     E = kappa sum_k a_k e(d_k)
 
-with the areas a_k, which are not differentiated, and the barrier of one distance, an energy per area and pressure that
-grows without bound as the distance goes to zero:
+with the gaps d_k (distances less offsets), the areas a_k, which are not differentiated, and the barrier of one gap, an
+energy per area and pressure that grows without bound as the gap goes to zero:
 
     e(d) = dhat b(d^2 / dhat^2),  b(s) = -(s - 1)^2 ln s  for s < 1, else 0
 
@@ -74,22 +74,22 @@ def barrier_slopes(d, dhat, soft=0.0):
 @njit(cache=True)
 def barrier_energy(contacts, dhat, stiffness, soft=0.0):
     """E [J], infinite where a point is on a plane or behind it; stiffness : kappa [Pa]."""
-    _, _, _, _, distances, weights = contacts
+    _, _, _, _, _, weights, gaps = contacts
     total = 0.0
-    for k in range(len(distances)):
-        if distances[k] <= 0.0:
+    for k in range(len(gaps)):
+        if gaps[k] <= 0.0:
             return np.inf
-        total += weights[k] * barrier_value(distances[k], dhat, soft)
+        total += weights[k] * barrier_value(gaps[k], dhat, soft)
     return stiffness * total
 
 
 @njit(cache=True)
 def barrier_forces(contacts, dhat, stiffness, soft=0.0):
     """(k,) normal forces -dE/dd [N], zero or more."""
-    _, _, _, _, distances, weights = contacts
-    out = np.empty(len(distances))
-    for k in range(len(distances)):
-        out[k] = -stiffness * weights[k] * barrier_slopes(distances[k], dhat, soft)[0]
+    _, _, _, _, _, weights, gaps = contacts
+    out = np.empty(len(gaps))
+    for k in range(len(gaps)):
+        out[k] = -stiffness * weights[k] * barrier_slopes(gaps[k], dhat, soft)[0]
     return out
 
 
@@ -125,7 +125,7 @@ def barrier_hessian(
 
 @njit(cache=True, parallel=True)
 def _write_hessians(x, contacts, start, dhat, stiffness, soft, project, out):
-    kinds, _, _, _, _, weights = contacts
+    kinds, _, _, _, _, weights, _ = contacts
     for k in prange(len(kinds)):
         follows = k > 0 and kinds[k - 1] == EDGE_EDGE and weights[k] < 0.0
         followed = k + 1 < len(kinds) and kinds[k] == EDGE_EDGE and weights[k + 1] < 0.0
@@ -140,11 +140,11 @@ def _write_hessians(x, contacts, start, dhat, stiffness, soft, project, out):
 @njit
 def _write_hessian(x, contacts, k, dhat, stiffness, soft, project, out, first):
     """The blocks (i, j), i <= j, of contact k."""
-    kinds, points, coefficients, vectors, distances, weights = contacts
+    kinds, points, coefficients, vectors, distances, weights, gaps = contacts
     c = (coefficients[k, 0], coefficients[k, 1], coefficients[k, 2], coefficients[k, 3])
     # Points that the kind does not have are ignored; any row may stand for them.
     stencil = (row(x, points[k, 0]), row(x, points[k, 1]), row(x, points[k, 2]), row(x, points[k, 3]))
-    slope, curvature = barrier_slopes(distances[k], dhat, soft)
+    slope, curvature = barrier_slopes(gaps[k], dhat, soft)
     size = stiffness * weights[k]
     slopes = (size * slope, size * curvature)
     write_pair_hessian(kinds[k], c, row(vectors, k), distances[k], stencil, slopes, project, out, first)
@@ -157,7 +157,7 @@ def _write_joint_hessian(x, contacts, k, dhat, stiffness, soft, out):
     Most of both cancels where the closest points are near that end. The positive parts of each would remain, and be
     many times too stiff.
     """
-    kinds, points, _, _, _, _ = contacts
+    kinds, points, _, _, _, _, _ = contacts
     blocks = np.empty((10, 3, 3))
     dense = np.zeros((12, 12))
     for m in range(k, k + 2):

@@ -1,7 +1,7 @@
 """Collisions along a way, as linear rows: for pairs that would meet, the gap along the normal where they do.
 
-With the closest points and the unit normal n at the time of a collision, the gap of a pair is n . sum_i c_i x_i, linear
-in the positions. A row keeps it at `target`, with the energy stiffness / 2 (gap - target)^2.
+With the closest points and the unit normal n at the time of a collision, the gap of a pair is n . sum_i c_i x_i less
+its offsets, linear in the positions. A row keeps it at `target`, with the energy stiffness / 2 (gap - target)^2.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def _off(x, p, q):
 
 
 @njit
-def _write(x, way, time, kind, points, rows, k):
+def _write(x, way, time, kind, points, offset, rows, k):
     """Write the row of a pair at `time` of its collision; all is relative to the first point, as round-off is."""
     p, q, r, s = points
     a, b, c = _off(x, p, q), _off(x, p, r), _off(x, p, s)
@@ -81,7 +81,7 @@ def _write(x, way, time, kind, points, rows, k):
     length = max(math.sqrt(dot(n, n)), 1e-300)
     n = (n[0] / length, n[1] / length, n[2] / length)
     rows.kinds[k] = kind
-    rows.gaps[k] = dot(n, combine(weights, a, b, c))
+    rows.gaps[k] = dot(n, combine(weights, a, b, c)) - offset
     rows.ends[k] = rows.gaps[k] + dot(n, combine(weights, u, v, w))
     rows.coefficients[k, 0] = -(weights[0] + weights[1] + weights[2])
     for i in range(4):
@@ -97,22 +97,23 @@ def _along(a, u, time):
 
 
 @njit(cache=True)
-def write_collisions(x, way, triangles, edges, point_pairs, edge_pairs, kept, rows):
+def write_collisions(x, way, triangles, edges, offsets, point_pairs, edge_pairs, kept, rows):
     """Write the rows of all pairs that collide while points go from x (s, 3) along `way` (s, 3); returns their number.
 
-    kept : see `Kept`. Where `rows` has no room, only the first ones are written.
+    offsets : (s,), see `ContactMesh`; kept : see `Kept`. Where `rows` has no room, only the first ones are written.
     """
     count = 0
     for kind in (VERTEX_TRIANGLE, EDGE_EDGE):
         pairs = point_pairs if kind == VERTEX_TRIANGLE else edge_pairs
         for k in range(len(pairs)):
             points = corners(kind, triangles, edges, pairs[k, 0], pairs[k, 1])
-            if is_clear(x, way, kind, points):
+            offset = offsets[points[0]] + offsets[points[2]]
+            if is_clear(x, way, kind, points, offset):
                 continue
-            time = collision_time(x, way, kind, points, 1.0, kept)
+            time = collision_time(x, way, kind, points, 1.0, kept, offset)
             if time <= 1.0:
                 if count < len(rows.kinds):
-                    _write(x, way, time, kind, points, rows, count)
+                    _write(x, way, time, kind, points, offset, rows, count)
                 count += 1
     return count
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ class Found(NamedTuple):
     Attributes
     ----------
     contacts : those with a weight
-    least : the smallest distance of the pairs, infinite where none is below `REACH` dhat [m]
+    least : the smallest gap of the pairs, infinite where none is below `REACH` dhat [m]
     new : what is to be known where the search goes on, in any order
     planes : codes of the pairs that may count with a plane, for `KnownWeights`
     """
@@ -39,20 +40,22 @@ def contacts_at(
     known: KnownWeights,
     dhat: float,
 ) -> Found:
-    """The contacts of a mesh at x (s, 3), nearer than dhat [m].
+    """The contacts of a mesh at x (s, 3) with gaps below dhat [m].
 
     Parameters
     ----------
-    vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than `REACH` dhat
+    vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs whose gaps may be below `REACH` dhat
     known : the weights that do not depend on x
     """
     if not len(vertex_triangle) and not len(edge_edge):
         return _NOTHING
     triangles, edges, reach = mesh.triangles, mesh.edges, REACH * dhat
-    of_sums = triangles, edges, mesh.triangle_edges, *mesh.vertex_triangles, mesh.owner
-    features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
+    of_sums = triangles, edges, mesh.triangle_edges, *mesh.vertex_triangles, mesh.owner, mesh.offsets
+    features, squares = near_features(
+        x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach, mesh.offsets
+    )
     areas, edge_squares, edge_keys, edges_grown = edge_weights(
-        x, edge_edge, (triangles, edges, *mesh.edge_triangles), mesh.edge_areas, dhat, known
+        x, edge_edge, (triangles, edges, *mesh.edge_triangles, mesh.offsets), mesh.edge_areas, dhat, known
     )
     rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
     codes, signs, counts, shares = alternating_sums(
@@ -62,19 +65,19 @@ def contacts_at(
     count = int(starts[-1, 1])
     crossing = np.flatnonzero(areas)
     out = Contacts.room(count + 2 * len(crossing))
-    saddles = write_edge_contacts(x, edge_edge, crossing, areas, edges, count, out)
+    saddles = write_edge_contacts(x, edge_edge, crossing, areas, edges, mesh.offsets, count, out)
     new = KnownWeights(np.empty(count, np.int64), np.empty(count), np.empty(count, np.int32))
     groups, around = (rows, starts, codes, signs, shares), (triangles, edges, *mesh.neighbors)
-    surface = mesh.owner, mesh.areas, saddles
+    surface = mesh.owner, mesh.areas, mesh.offsets, saddles
     write_vertex_contacts(x, vertex_triangle, groups, around, surface, dhat, known, out, new)
     least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
     planes = new.codes[new.triangles >= 0]
     of_edges = KnownWeights(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32))
     new = new.with_weights().with_more(of_edges.with_weights())
-    counted = (out.weights != 0.0) & (out.distances < dhat)
+    counted = (out.weights != 0.0) & (out.gaps < dhat)
     if not counted.all():
         out = out.where(counted)
-    return Found(out, float(np.sqrt(least)), new, planes)
+    return Found(out, math.copysign(math.sqrt(abs(least)), least), new, planes)
 
 
 _NOTHING = Found(Contacts.room(0), np.inf, KnownWeights.none(), np.zeros(0, dtype=np.int64))

@@ -29,6 +29,7 @@ class Contacts(NamedTuple):
     coefficients : (k, 4), positive on the first side and negative on the second, but on planes of any sign; sum 0
     vectors : (k, 3) from the second side's closest point to the first side's [m]; distances : (k,) their lengths
     weights : (k,) areas [m^2]
+    gaps : (k,) distances less the offsets of both sides, see `ContactMesh` [m]
     """
 
     kinds: NDArray[np.int8]
@@ -37,12 +38,13 @@ class Contacts(NamedTuple):
     vectors: NDArray[np.float64]
     distances: NDArray[np.float64]
     weights: NDArray[np.float64]
+    gaps: NDArray[np.float64]
 
     @classmethod
     def room(cls, k: int) -> Contacts:
         """Contacts to be written."""
         flat = np.empty(k, dtype=np.int8), np.empty((k, 4), dtype=np.int32)
-        return cls(*flat, np.empty((k, 4)), np.empty((k, 3)), np.empty(k), np.empty(k))
+        return cls(*flat, np.empty((k, 4)), np.empty((k, 3)), np.empty(k), np.empty(k), np.empty(k))
 
     def where(self, chosen: NDArray[np.bool_]) -> Contacts:
         """The chosen ones (k,)."""
@@ -54,14 +56,15 @@ class Contacts(NamedTuple):
 
 
 @njit
-def put(out, k, kind, points, coefficients, r):
-    """Write contact k of `out`, a `Contacts`, with the vector r and its length; the weight is left."""
+def put(out, k, kind, points, coefficients, r, offset):
+    """Write contact k of `out`, a `Contacts`, with the vector r and the offset of both sides; the weight is left."""
     out.kinds[k] = kind
     out.points[k, 0], out.points[k, 1], out.points[k, 2], out.points[k, 3] = points
     for i in range(4):
         out.coefficients[k, i] = coefficients[i]
     out.vectors[k, 0], out.vectors[k, 1], out.vectors[k, 2] = r
     out.distances[k] = math.sqrt(dot(r, r))
+    out.gaps[k] = out.distances[k] - offset
 
 
 # A weight grows by at least this share of the largest one.

@@ -15,7 +15,7 @@ import numpy as np
 from supple.contact.features.contacts import has_grown, known_weight, put
 from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX, unit
 from supple.contact.features.vertex_contacts import NEARER_SHARE
-from supple.contact.features.vertex_features import nearest_of_edge
+from supple.contact.features.vertex_features import nearest_of_edge, square_of_gap
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.runtime.kernel_cache import njit, prange
 
@@ -32,18 +32,20 @@ def edge_weights(x, pairs, mesh, areas, dhat, known):
 
     Parameters
     ----------
-    x : (s, 3) [m]; pairs : (l, 2); mesh : triangles, edges, start and items of edge_triangles (see `ContactMesh`)
+    x : (s, 3) [m]; pairs : (l, 2)
+    mesh : triangles, edges, start and items of edge_triangles, offsets (see `ContactMesh`)
     areas : (e,) a third of each edge's triangles at rest [m^2]
     known : the weights that do not depend on x, a `KnownWeights`
 
     Returns
     -------
     weights : (l,) [m^2], zero without a contact
-    squares : (l,) squared distances, infinite where the edges do not cross, or not below dhat [m^2]
+    squares : (l,) squared gaps, below zero where gaps are; infinite where the edges do not cross, or not below dhat
+        [m^2]
     keys : (l,) codes of the pairs, for `KnownWeights`
     grown : (l,) weights that are to be known [m^2], -1 where they do not change
     """
-    triangles, edges, edge_start, edge_items = mesh
+    triangles, edges, edge_start, edge_items, offsets = mesh
     weights, squares = np.zeros(len(pairs)), np.full(len(pairs), np.inf)
     keys, grown = np.empty(len(pairs), dtype=np.int64), np.full(len(pairs), -1.0)
     h = NEARER_SHARE * dhat
@@ -51,10 +53,11 @@ def edge_weights(x, pairs, mesh, areas, dhat, known):
         e, f = pairs[k, 0], pairs[k, 1]
         a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
         s, t, r, crossing = crossing_point(a, b, c, d)
-        square = dot(r, r)
-        if not (crossing > 0.0 and 0.0 < s < 1.0 and 0.0 < t < 1.0 and square < dhat * dhat):
+        square, offset = dot(r, r), offsets[edges[e, 0]] + offsets[edges[f, 0]]
+        far = dhat + offset
+        if not (crossing > 0.0 and 0.0 < s < 1.0 and 0.0 < t < 1.0 and square < far * far):
             continue
-        squares[k] = square
+        squares[k] = square_of_gap(square, offset)
         one = _height(x, triangles, edges, edge_start, edge_items, e, f, r, -1.0)
         other = _height(x, triangles, edges, edge_start, edge_items, f, e, r, 1.0)
         protruding = min(1.0, max(0.0, max(one, other) / h))
@@ -122,7 +125,7 @@ def _inward(x, triangles, t, a, b):
 
 
 @njit(cache=True)
-def write_edge_contacts(x, pairs, rows, weights, edges, first, out):
+def write_edge_contacts(x, pairs, rows, weights, edges, offsets, first, out):
     """Write two contacts for each of the rows (m,) of pairs with a weight into `out`, a `Contacts`, from `first` on.
 
     Returns
@@ -138,7 +141,8 @@ def write_edge_contacts(x, pairs, rows, weights, edges, first, out):
         e, f = pairs[k, 0], pairs[k, 1]
         ids = (edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1])
         s, t, r, _ = crossing_point(row(x, ids[0]), row(x, ids[1]), row(x, ids[2]), row(x, ids[3]))
-        put(out, n, EDGE_EDGE, ids, (1.0 - s, s, t - 1.0, -t), r)
+        offset = offsets[ids[0]] + offsets[ids[2]]
+        put(out, n, EDGE_EDGE, ids, (1.0 - s, s, t - 1.0, -t), r, offset)
         least, nearest = np.inf, 0
         for end in range(4):
             vertex, one, other = _end(ids, end)
@@ -149,9 +153,10 @@ def write_edge_contacts(x, pairs, rows, weights, edges, first, out):
         end, one, other = _end(ids, nearest)
         w, r = nearest_of_edge(row(x, end), row(x, one), row(x, other))
         if 0.0 < w < 1.0:
-            put(out, n + 1, VERTEX_EDGE, (end, one, other, -1), (1.0, w - 1.0, -w, 0.0), r)
+            put(out, n + 1, VERTEX_EDGE, (end, one, other, -1), (1.0, w - 1.0, -w, 0.0), r, offset)
         else:
-            put(out, n + 1, VERTEX_VERTEX, (end, one if w == 0.0 else other, -1, -1), (1.0, -1.0, 0.0, 0.0), r)
+            points = (end, one if w == 0.0 else other, -1, -1)
+            put(out, n + 1, VERTEX_VERTEX, points, (1.0, -1.0, 0.0, 0.0), r, offset)
         out.weights[n], out.weights[n + 1] = weights[k], -weights[k]
         codes[m] = np.int64(end) * len(edges) + (f if nearest < 2 else e)
     saddles, order = np.zeros(len(x)), np.argsort(codes, kind="mergesort")

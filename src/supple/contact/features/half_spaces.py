@@ -33,7 +33,7 @@ class HalfSpaces:
     ----------
     points : the surface's s points, then three of each plane; owner : (s + 3 h,) of each
     tets : (k, 4) the three points of a plane and the point before it, of positive volume
-    areas : (k,) of the points [m^2]
+    areas : (k,) of the points [m^2]; offsets : (k,) of the points, see `ContactMesh` [m]
     """
 
     def __init__(self, mesh: ContactMesh, obstacles: tuple[ObstacleRange, ...]) -> None:
@@ -49,30 +49,42 @@ class HalfSpaces:
             corners = len(mesh.points) + 3 * k + np.arange(3)
             tets.append(np.column_stack([np.tile(corners, (len(near), 1)), near]).astype(np.int32))
         self.tets = np.ascontiguousarray(np.concatenate(tets))
-        self.areas = mesh.areas[self.tets[:, 3]]
+        self.areas, self.offsets = mesh.areas[self.tets[:, 3]], mesh.offsets[self.tets[:, 3]]
         self._all = np.ones(len(self.tets), dtype=np.bool_)
 
     def contacts(self, x: NDArray[np.float64], reach: float) -> tuple[Contacts, float]:
-        """The pairs nearer than `reach` [m] at points x (s + 3 h, 3), and the least of all distances, or infinity.
+        """The pairs with gaps below `reach` [m] at points x (s + 3 h, 3), and the least of all gaps, or infinity.
 
-        Distances are below zero behind a plane.
+        Distances and gaps are below zero behind a plane.
         """
         heights = np.empty(len(self.tets))
         _write_heights(x, self.tets, heights)
-        near = np.flatnonzero(heights < reach)
+        gaps = heights - self.offsets
+        near = np.flatnonzero(gaps < reach)
         out = Contacts.room(len(near))
         _write(x, self.tets[near], heights[near], out)
-        out.weights[:] = self.areas[near]
-        return out, float(heights.min(initial=np.inf))
+        out.weights[:], out.gaps[:] = self.areas[near], gaps[near]
+        return out, float(gaps.min(initial=np.inf))
 
     def largest_step(self, x: NDArray[np.float64], way: NDArray[np.float64]) -> tuple[float, int]:
-        """The largest step along `way` (s + 3 h, 3), at most 1, that keeps a tenth of every distance.
+        """The largest step along `way` (s + 3 h, 3), at most 1, that keeps a tenth of every gap.
 
         Returns
         -------
         step, row : of the pair that allows no more, -1 where none exists; 0 where a point is not before its plane
         """
-        return noninverting_step(x, way, self.tets, self._all, _KEEP) if len(self.tets) else (1.0, -1)
+        if not len(self.tets):
+            return 1.0, -1
+        tets, thick = self.tets, np.flatnonzero(self.offsets)
+        if len(thick):
+            # Points with an offset are tested where their surface is: nearer to the plane by the offset.
+            a, b, c = x[tets[thick, :3]].transpose(1, 0, 2)
+            normals, points, tets = np.cross(b - a, c - a), tets[thick, 3], tets.copy()
+            normals /= np.linalg.norm(normals, axis=1)[:, None]
+            tets[thick, 3] = len(x) + np.arange(len(thick))
+            x = np.concatenate([x, x[points] - self.offsets[thick, None] * normals])
+            way = np.concatenate([way, way[points]])
+        return noninverting_step(x, way, tets, self._all, _KEEP)
 
 
 @njit(cache=True)
@@ -91,5 +103,5 @@ def _write(x, tets, heights, out):
         n, u = area_normal(a, b, c), foot_on_plane(row(x, p), a, b, c)
         h, length = heights[k], math.sqrt(dot(n, n))
         r = (h * n[0] / length, h * n[1] / length, h * n[2] / length)
-        put(out, k, VERTEX_PLANE, (p, i, j, m), (1.0, -u[0], -u[1], -u[2]), r)
+        put(out, k, VERTEX_PLANE, (p, i, j, m), (1.0, -u[0], -u[1], -u[2]), r, 0.0)
         out.distances[k] = h  # below zero behind the plane

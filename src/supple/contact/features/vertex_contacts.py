@@ -41,16 +41,16 @@ def write_vertex_contacts(x, pairs, groups, mesh, surface, dhat, known, out, new
     ----------
     groups : rows, starts (groups + 1, 2) where each group begins in `rows` and in `out`, codes, signs, shares
     mesh : triangles, edges, start and items of neighbors (see `ContactMesh`)
-    surface : owner, areas, and (s,) least weights of vertices that `write_edge_contacts` asks for [m^2]
+    surface : owner, areas, offsets, and (s,) least weights of vertices that `write_edge_contacts` asks for [m^2]
     known : the weights that do not depend on x, a `KnownWeights`
     new : (m,) another one, to be written: codes, the weights that are to be known [m^2], -1 where they do not change,
         and triangles whose planes count, -1 for other contacts
     """
     rows, starts, codes, signs, shares = groups
-    owner, areas, saddles = surface
+    owner, areas, offsets, saddles = surface
     keys, grown, planes = new
     triangles, edges, near_start, near_items = mesh
-    kinds, points, _, vectors, distances, weights = out
+    kinds, points, _, vectors, distances, weights, _ = out
     height = NEARER_SHARE * dhat
     for g in prange(len(starts) - 1):
         v = pairs[rows[starts[g, 0]], 0]
@@ -60,7 +60,7 @@ def write_vertex_contacts(x, pairs, groups, mesh, surface, dhat, known, out, new
         best, nearest = saddles[v], np.inf
         for k in range(first, last):
             sign = signs[offset + k]
-            _write_contact(x, v, codes[offset + k], sign == 0, triangles, edges, out, k)
+            _write_contact(x, v, codes[offset + k], sign == 0, triangles, edges, offsets, out, k)
             r = row(vectors, k)
             if sign > 0:
                 nearest = min(nearest, distances[k])
@@ -109,7 +109,7 @@ def write_vertex_contacts(x, pairs, groups, mesh, surface, dhat, known, out, new
 
 
 @njit
-def _write_contact(x, v, code, plane, triangles, edges, out, k):
+def _write_contact(x, v, code, plane, triangles, edges, offsets, out, k):
     """Contact k but its weight: of vertex v with the feature that a code names, or with its plane."""
     p, zero = row(x, v), (0.0, 0.0, 0.0)
     if code < len(triangles):
@@ -119,16 +119,17 @@ def _write_contact(x, v, code, plane, triangles, edges, out, k):
         shares = (-u[0], -u[1], -u[2])
         # Differences of points are as small as triangles.
         r = combine(shares, subtract(a, p), subtract(b, p), subtract(c, p))
-        put(out, k, VERTEX_TRIANGLE, (v, i, j, m), (1.0, shares[0], shares[1], shares[2]), r)
+        put(out, k, VERTEX_TRIANGLE, (v, i, j, m), (1.0, shares[0], shares[1], shares[2]), r, offsets[v] + offsets[i])
     elif code < len(triangles) + len(edges):
         i, j = edges[code - len(triangles), 0], edges[code - len(triangles), 1]
         a, b = row(x, i), row(x, j)
         w, _ = nearest_of_edge(p, a, b)
         r = combine((w - 1.0, -w, 0.0), subtract(a, p), subtract(b, p), zero)
-        put(out, k, VERTEX_EDGE, (v, i, j, -1), (1.0, w - 1.0, -w, 0.0), r)
+        put(out, k, VERTEX_EDGE, (v, i, j, -1), (1.0, w - 1.0, -w, 0.0), r, offsets[v] + offsets[i])
     else:
         i = code - len(triangles) - len(edges)
-        put(out, k, VERTEX_VERTEX, (v, i, -1, -1), (1.0, -1.0, 0.0, 0.0), subtract(p, row(x, i)))
+        r = subtract(p, row(x, i))
+        put(out, k, VERTEX_VERTEX, (v, i, -1, -1), (1.0, -1.0, 0.0, 0.0), r, offsets[v] + offsets[i])
 
 
 @njit

@@ -10,6 +10,8 @@ the plane of the face (see `vertex_contacts`).
 Source of the alternating sum: Li et al., "Convergent Incremental Potential Contact" (2023), section 4.
 """
 
+import math
+
 import numpy as np
 
 from supple.contact.features.contacts import known_row
@@ -30,18 +32,18 @@ PARTS = 7
 
 
 @njit(cache=True, parallel=True)
-def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
+def near_features(x, pairs, triangles, triangle_edges, edge_count, reach, offsets):
     """The parts of triangles that are closest to vertices.
 
     Parameters
     ----------
-    x : (s, 3) [m]; pairs : (k, 2) of vertices and triangles
+    x : (s, 3) [m]; pairs : (k, 2) of vertices and triangles; offsets : (s,), see `ContactMesh` [m]
 
     Returns
     -------
     features : (k,) number of the triangle, f + number of the edge or f + e + number of the vertex; -1 where the
-        triangle is not nearer than `reach` [m]
-    squares : (k,) squared distances [m^2], infinite where not below `reach`
+        gap is not below `reach` [m]
+    squares : (k,) squared gaps, below zero where gaps are [m^2]; infinite where not below `reach`
     """
     features = np.full(len(pairs), -1, dtype=np.int32)
     squares = np.full(len(pairs), np.inf)
@@ -54,9 +56,11 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
         for j in range(3):
             # Differences of points are as small as triangles.
             square += (f[j] - u[1] * g[j] - u[2] * h[j]) ** 2
-        if not square < reach * reach:
+        offset = offsets[pairs[k, 0]] + offsets[triangles[t, 0]]
+        far = reach + offset
+        if not square < far * far:
             continue
-        squares[k] = square
+        squares[k] = square_of_gap(square, offset)
         inside = (u[0] > 0.0) + (u[1] > 0.0) + (u[2] > 0.0)
         if inside == 3:
             features[k] = t
@@ -65,6 +69,15 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
         else:
             features[k] = len(triangles) + edge_count + triangles[t, 0 if u[0] > 0.0 else (1 if u[1] > 0.0 else 2)]
     return features, squares
+
+
+@njit
+def square_of_gap(square, offset):
+    """g |g| of the gap g that a squared distance leaves of an offset."""
+    if offset == 0.0:
+        return square
+    gap = math.sqrt(square) - offset
+    return gap * abs(gap)
 
 
 @njit(cache=True)
@@ -112,7 +125,7 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reac
 
     Parameters
     ----------
-    mesh : triangles, edges, triangle_edges, start and items of vertex_triangles, owner (see `ContactMesh`)
+    mesh : triangles, edges, triangle_edges, start and items of vertex_triangles, owner, offsets (see `ContactMesh`)
     known : a `KnownWeights`
 
     Returns
@@ -123,12 +136,13 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reac
     codes = np.empty(PARTS * len(rows), dtype=np.int32)
     signs = np.empty(PARTS * len(rows), dtype=np.int32)
     counts, shares = np.empty(len(start) - 1, dtype=np.int32), np.zeros(len(start) - 1)
-    triangles, edges, triangle_edges, own_start, own_items, owner = mesh
+    triangles, edges, triangle_edges, own_start, own_items, owner, offsets = mesh
     for g in prange(len(start) - 1):
         begin, end = start[g], start[g + 1]
         first = PARTS * begin
+        far = reach + (offsets[pairs[rows[begin], 0]] + offsets[triangles[pairs[rows[begin], 1], 0]])
         counts[g] = _alternating_sum(
-            x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, reach, codes, signs
+            x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, far, codes, signs
         )
         if counts[g] == 0:
             continue

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.mesh.near_at_rest import near_at_rest
 from supple.contact.mesh.obstacles import ObstacleRange
 from supple.contact.mesh.stitch_filter import StitchFilter, WeldedPoints, stitch_filter
 from supple.contact.search.patches import Parts, Patches, patches_of
 from supple.mesh.topology import edge_keys
 from supple.model.system import System
-from supple.numerics.adjacency import Adjacency, adjacency, no_lists
+from supple.numerics.adjacency import Adjacency, adjacency, joined_lists, no_lists
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.geometry.triangle_crossings import crossing_triangles
+from supple.scene.shell import Shell
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,8 @@ class ContactMesh:
     patches : of neighbouring triangles, for searches
     stitched : pairs that do not collide because they are stitched or welded; None where there are none
     rows : (s,) the point of the system that each is, or -1
+    offsets : (s,) how far in front of its triangles the surface of a thing is: half of a shell's thickness, or 0 [m]
+    near_at_rest : pairs of a surface and itself that are nearer at rest than the offsets; None without offsets
     """
 
     points: EmbeddedPoints
@@ -57,12 +61,20 @@ class ContactMesh:
     patches: Patches
     stitched: StitchFilter | None
     rows: NDArray[np.int32]
+    offsets: NDArray[np.float64]
+    near_at_rest: tuple[Adjacency, Adjacency] | None
 
     @property
     def excluded(self) -> tuple[Adjacency, Adjacency]:
         """See `Parts`."""
-        if self.stitched is not None:
-            return self.stitched.triangles_of_point, self.stitched.edges_of_edge
+        lists = [] if self.stitched is None else [(self.stitched.triangles_of_point, self.stitched.edges_of_edge)]
+        if self.near_at_rest is not None:
+            lists.append(self.near_at_rest)
+        if len(lists) == 2:
+            (points, edges), (other_points, other_edges) = lists
+            return joined_lists(points, other_points), joined_lists(edges, other_edges)
+        if lists:
+            return lists[0]
         return no_lists(len(self.owner)), no_lists(len(self.edges))
 
     @property
@@ -105,7 +117,15 @@ def contact_mesh(
         welded=_welded_points(system, of_vertex),
         touching=touching,
         rows=np.where(used < len(system.points), used, -1).astype(np.int32),
+        offsets=_offsets(system)[owner[used]],
     )
+
+
+def _offsets(system: System) -> NDArray[np.float64]:
+    """(p,) of bodies, then obstacles; see `ContactMesh`."""
+    bodies = [part.body for part in system.bodies]
+    of_bodies = [0.5 * body.material.thickness if isinstance(body, Shell) else 0.0 for body in bodies]
+    return np.array(of_bodies + [0.0] * len(system.obstacles))
 
 
 def points_of_stitches(system: System, obstacles: tuple[ObstacleRange, ...]) -> NDArray[np.int32]:
@@ -158,6 +178,7 @@ def mesh_of_triangles(
     welded: WeldedPoints | None = None,
     touching: float | None = None,
     rows: NDArray[np.int32] | None = None,
+    offsets: NDArray[np.float64] | None = None,
 ) -> ContactMesh:
     """The mesh of triangles (f, 3) of points with rest positions (s, 3); for the other arguments see `ContactMesh`.
 
@@ -165,7 +186,7 @@ def mesh_of_triangles(
     ----------
     stitches : nodes (k, 4) of stitches, -1 for none, and (s, 3) where the points are at the start; welded : of welds
     touching : see `contact_mesh`
-    rows : see `ContactMesh`; None where the points belong to no system
+    rows : see `ContactMesh`; None where the points belong to no system; offsets : None for zero
     """
     s = len(points)
     triangles = np.ascontiguousarray(triangles, dtype=np.int32)
@@ -181,6 +202,7 @@ def mesh_of_triangles(
     if stitches is not None and (len(stitches[0]) or welded is not None):
         mesh = triangles, edges, triangle_edges, patches
         stitched = stitch_filter(mesh, *stitches, owner, collide, welded, touching)
+    offsets = np.zeros(s) if offsets is None else offsets
     return ContactMesh(
         points=points,
         triangles=triangles,
@@ -199,6 +221,8 @@ def mesh_of_triangles(
         patches=patches,
         stitched=stitched,
         rows=np.full(s, -1, dtype=np.int32) if rows is None else rows,
+        offsets=offsets,
+        near_at_rest=near_at_rest((triangles, edges, triangle_edges, patches), rest, owner, offsets, collide),
     )
 
 

@@ -144,11 +144,6 @@ class Implicit(Solver):
             raise SolverError(
                 f"body {shell!r}: Implicit(linear_solver='pcg') cannot simulate shells; use 'auto' or 'direct'"
             )
-        if shell is not None and self.contact is not None:
-            raise SolverError(
-                f"body {shell!r} is a shell, and Implicit does not simulate their contact yet; give "
-                "Implicit(contact=None)"
-            )
 
     def prepare(self, system: System, tools: Tools | None = None) -> Workspace:
         """Compute the patterns, groups and memory for a system.

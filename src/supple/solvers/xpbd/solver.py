@@ -59,9 +59,7 @@ def refuse_unsupported(system: System) -> None:
     """
     for part in system.bodies:
         if isinstance(part.body, Shell):
-            raise SolverError(
-                f"XPBD: body {part.name!r} is a shell, which it does not simulate yet; use Implicit(contact=None)"
-            )
+            raise SolverError(f"XPBD: body {part.name!r} is a shell, which it does not simulate yet; use Implicit()")
         if part.body.touches_with_skin and not part.rigid:
             raise SolverError(f"XPBD: body {part.name!r} touches with its skin; simulate it with Implicit")
     quadratic = [part.name for part in system.bodies if part.body.mesh.order == 2]

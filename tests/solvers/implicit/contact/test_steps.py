@@ -10,10 +10,11 @@ from supple.model.system import build_system, initial_state
 from supple.solvers.implicit.contact.model import contact_model
 
 
-def largest_plane_step(x, direction):
+def largest_plane_step(x, direction, offset=0.0):
     """Of one point before a plane, whose three points come after it."""
     planes = object.__new__(HalfSpaces)
     planes.tets, planes._all = np.array([[1, 2, 3, 0]], dtype=np.int32), np.ones(1, dtype=np.bool_)
+    planes.offsets = np.array([offset])
     return planes.largest_step(x, direction)[0]
 
 
@@ -24,6 +25,8 @@ def test_a_step_towards_a_plane_leaves_a_tenth_of_the_distance(scale):
     assert largest_plane_step(x, direction) == pytest.approx(0.45, rel=1e-13)
     assert largest_plane_step(x, -direction) == 1.0
     assert largest_plane_step(x, np.zeros_like(x)) == 1.0
+    # A tenth of what is beyond an offset.
+    assert largest_plane_step(x, direction, 0.3 * scale) == pytest.approx(0.18, rel=1e-13)
     # The plane goes the same way.
     direction[1:, 1] = -scale
     assert largest_plane_step(x, direction) == 1.0

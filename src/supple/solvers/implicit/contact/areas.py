@@ -32,7 +32,7 @@ def area_derivatives(collisions: Collisions, x: NDArray[np.float64]) -> Sparse:
     points, here = every[:s], collisions.at(x)
     shape = len(here.kinds), every.size
     near = collisions.finder.at(points)
-    margin = collisions.finder.dhat * (1.0 + _STEP)
+    margin = collisions.finder.reach * (1.0 + _STEP)
     near = near.where(*(found < margin for found in near.distances(mesh, points)))
 
     def areas(way: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ class Collisions:
 
     Parameters
     ----------
-    dhat : [m] contacts are pairs that are nearer than this.
+    dhat : [m] contacts are pairs with gaps below this: distances less the offsets of `ContactMesh`.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Collisions:
         return self._at(x).contacts
 
     def smallest_distance(self, x: NDArray[np.float64]) -> float:
-        """Between surfaces [m]; infinite where nothing is near, and not positive behind a half-space."""
+        """The smallest gap [m]; infinite where nothing is near, not positive behind a half-space or within offsets."""
         return self._at(x).least
 
     def forget_weights(self) -> None:
@@ -107,7 +107,7 @@ class Collisions:
         """
         points, s, mesh = self.points(x), len(self.mesh.points), self.mesh
         found = self.finder.find(points[:s], points[:s] + way[:s])
-        pairs = mesh.triangles, mesh.edges, found.vertex_triangle, found.edge_edge
+        pairs = mesh.triangles, mesh.edges, mesh.offsets, found.vertex_triangle, found.edge_edge
         rows, kept = CollisionRows.room(64), Kept(self.floor, self.finder.dhat)
         while (count := write_collisions(points[:s], way[:s], *pairs, kept, rows)) > len(rows.kinds):
             rows = CollisionRows.room(count)
@@ -121,8 +121,8 @@ class Collisions:
             planes.points,
             planes.coefficients,
             planes.vectors / planes.distances[:, None],
-            planes.distances,
-            planes.distances,
+            planes.gaps,
+            planes.gaps,
         ).along(way)
         return rows.joined(on_planes.where(on_planes.ends < least))
 

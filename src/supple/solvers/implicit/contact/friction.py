@@ -33,7 +33,7 @@ class Press(NamedTuple):
 
     Attributes
     ----------
-    distances : (k,) [m]; weights : (k,) mu kappa a [N]; dhat, soft : of the barrier [m]
+    distances : (k,) gaps [m]; weights : (k,) mu kappa a [N]; dhat, soft : of the barrier [m]
     numbers : (k,) of the contacts among all at that state
     """
 

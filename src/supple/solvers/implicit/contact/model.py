@@ -75,7 +75,7 @@ class ContactModel:
         if not len(rough):
             return []
         weights = slips.forces / forces[rough] * barrier.stiffness * contacts.weights[rough]
-        press = Press(contacts.distances[rough], weights, self.scales.dhat, barrier.soft, rough)
+        press = Press(contacts.gaps[rough], weights, self.scales.dhat, barrier.soft, rough)
         return [Friction(points.points, slips, self.scales.friction_velocity * duration, press)]
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, list[int]]:
@@ -106,7 +106,7 @@ class ContactModel:
         return None if points is None else self.names(points)
 
     def smallest_distance(self, x: NDArray[np.float64]) -> float:
-        """Between anything that may touch, where it is below dhat [m]; else infinite."""
+        """Of anything that may touch, less the offsets of `ContactMesh`, where it is below dhat [m]; else infinite."""
         nearest = self.collisions.smallest_distance(x)
         return nearest if nearest < self.scales.dhat else np.inf
 
@@ -122,6 +122,12 @@ class ContactModel:
         if held_together and apart:
             return
         raise_if_intersecting(self.system, x, time, self.table)
+        if not apart and self.mesh.offsets.any() and not self.collisions.intersect(x):
+            missing = f"{-self.collisions.smallest_distance(x):.2g} m"
+            raise SolverError(
+                f"{self.nearest(x)} are nearer at the start than the thickness of shells, by {missing}; move them "
+                "apart, make shells thinner, or give contact=None"
+            )
         if not apart:
             raise SolverError("the scene starts with surfaces that touch; move them apart, or give contact=None")
 
@@ -135,8 +141,8 @@ class ContactModel:
         pairs = [c for c in (self.collisions.at(x), on_planes) if len(c.distances)]
         if not pairs:
             return "two surfaces"
-        contacts = min(pairs, key=lambda c: c.distances.min())
-        k = int(contacts.distances.argmin())
+        contacts = min(pairs, key=lambda c: c.gaps.min())
+        k = int(contacts.gaps.argmin())
         return self.names([int(side[k]) for side in sides(contacts.kinds, contacts.points)])
 
     def names(self, points: Sequence[int]) -> str:

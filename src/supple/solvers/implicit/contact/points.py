@@ -37,7 +37,7 @@ def contact_points(
     """
     mesh, collisions = model.mesh, model.collisions
     place = collisions.half_spaces.points.positions(x)
-    kinds, points, coefficients, vectors, distances, _ = contacts
+    kinds, points, coefficients, vectors, distances, _, _ = contacts
     normals = vectors / distances[:, None]
     forces = barrier_forces(contacts, collisions.dhat, barrier.stiffness, barrier.soft)[:, None] * normals
     friction = np.zeros_like(forces)
