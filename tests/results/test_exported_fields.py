@@ -10,6 +10,7 @@ import pytest
 import supple as sp
 from supple.errors import OutputError
 from supple.results.export.exporter import export
+from supple.results.export.render_worker import Tracer
 from supple.results.export.video import Film
 from supple.results.export.video_worker import Studio, connections
 from supple.results.view.fields import nodal_values
@@ -106,6 +107,24 @@ def test_films_draw_stitches_and_joints(recorded):
     assert stitches.shape == (4, 2, 3)
     assert np.abs(np.diff(stitches, axis=1)).max() < 0.01
     np.testing.assert_allclose(joints[:3].mean(axis=(0, 1)), (0.4, 0.4, 0), atol=2e-3)
+
+
+def test_traced_pictures_draw_stitches_and_joints(recorded, monkeypatch):
+    """They are inside of the bodies here, which are left out."""
+    pytest.importorskip("mitsuba")
+    monkeypatch.setattr(Tracer, "_mesh", lambda *_: {"type": "sphere", "radius": 1e-6})
+    shown = []
+    with sp.read_recording(recorded) as recording:
+        model = model_of_recording(recording)
+        render_frame = render_frame_of(model, recording[-1])
+        for drawn in (False, True):
+            near = {"eye": (0.4, 0.42, 0.08), "target": (0.4, 0.4, 0.0)}  # to a joint
+            film = Film(render=True, samples=4, size=(240, 180), connections=drawn, **near)
+            shown.append(Tracer(model, [render_frame], film).picture(render_frame, 0.0).astype(int))
+    lines = np.abs(shown[1] - shown[0]).max(axis=2) > 40
+    assert 20 < lines.sum() < 0.2 * lines.size
+    r, g, b = shown[1][lines].T
+    assert ((r > g) & (g > b + 20)).sum() > 10  # the orange of joints
 
 
 def test_the_ends_of_a_scale_are_those_given_and_rigid_bodies_are_grey(recorded):

@@ -33,7 +33,7 @@ _STEPS, _SPLINE = (1, 2, 4), (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)  # of the 
 # Differences that part what is shown: of the numbers of surfaces, of normals, and of depths in radii.
 _WIDTHS = np.array([0.3, 0.25, 0.25, 0.25, 0.25])
 _TOLERANCE = 16.0  # variances by which light may differ; with 4, a floor of 24 samples keeps spots
-_APERTURE = 0.02  # radius of the lens, as a share of that of the scene
+_APERTURE = 0.005  # radius of the lens, as a share of the distance of the camera
 
 
 class Tracer(Pictures):
@@ -134,7 +134,7 @@ class Tracer(Pictures):
         self._eye, self._ahead = eye, (target - eye) / np.linalg.norm(target - eye)
         self._camera = {
             "type": "thinlens",
-            "aperture_radius": _APERTURE * self._view.radius,
+            "aperture_radius": _APERTURE * self._distance,
             "fov": ANGLE,
             "fov_axis": "y",
             "near_clip": 1e-3 * self._view.radius,
@@ -150,11 +150,12 @@ class Tracer(Pictures):
         scene: dict[str, Any] = {"type": "scene", "integrator": {"type": "path", "max_depth": _DEPTH}} | self._around
         for k, ((material, surface), x) in enumerate(zip(self._meshes, points, strict=True)):
             scene[f"surface{k}"] = self._mesh(material, surface, x, nodal)
+        # As wide as in films: a 240th of the height of the picture, at least a pixel.
+        thick = self._distance * float(np.tan(np.radians(0.5 * ANGLE))) / min(240, self._film.size[1])
         for k, (line, _) in enumerate(self._lines):
             matt = {"type": "diffuse", "reflectance": _rgb(_linear(line.color))}
             for j, (a, b) in enumerate(line.points.reshape(-1, 2, 3)):
                 if not np.array_equal(a, b):
-                    thick = 4e-3 * self._view.radius
                     ends = {"p0": a.tolist(), "p1": b.tolist(), "radius": thick}
                     scene[f"line{k}_{j}"] = {"type": "cylinder", "bsdf": {"type": "twosided", "bsdf": matt}} | ends
         # The nearer half of the bodies is sharp.
