@@ -65,6 +65,7 @@ def whole_scene():
     hollow = sp.shapes.box((0.3, 0.3, 0.3), (3, 3, 3))
     inner = np.abs(hollow.vertices[hollow.tets].mean(axis=1)).max(axis=1) > 0.05
     hollow = sp.TetMesh.dropping_unused(hollow.vertices, hollow.tets[inner])
+    sheet = sp.SurfaceMesh([(0, 0, 0), (0.3, 0, 0), (0.3, 0.1, 0.3), (0, 0, 0.3)], [(0, 2, 1), (0, 3, 2)])
     bodies = [
         sp.Body("bar", BOX, RUBBER, velocity=(0.1, 0, 0), skin=sp.shapes.sphere_surface(0.04), look="gummy"),
         sp.Body("hat", BOX, RUBBER, position=(0, 0.3, 0), rotation=(0, 0.1, 0), friction=0.2),
@@ -74,6 +75,7 @@ def whole_scene():
             "b", sp.shapes.box_surface((0.2, 0.2, 0.2)), mass=1.0, inertia=(0.1, 0.1, 0.1), position=(3, 0, 0)
         ),
         sp.RigidBody("c", BOX, density=500.0, position=(0.42, 0, 0)),
+        sp.Shell("sheet", sheet, sp.ShellMaterial(youngs=1e5, poisson=0.3, thickness=1e-3), position=(0, -2, 0)),
     ]
     obstacles = [
         sp.HalfSpace(point=(0, -3, 0), normal=(0.1, 1, 0.2), friction=0.3),
