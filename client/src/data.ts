@@ -13,6 +13,9 @@ export interface Body extends Triangles {
   order: number; corners: Ref; weights: Ref; step: number; rest: Ref;
   /** which vertices are beyond the tets, and how far they are moved out of solids at most [m] */
   outside: Ref; reach: number;
+  /** where vertices are drawn beside their points: cells of the body's points, from which the axes there follow, and
+   * (k, d) distances along these axes [m] */
+  beside: { axes: "normals"; cells: Ref; away: Ref } | null;
 }
 
 export interface Obstacle extends Triangles {

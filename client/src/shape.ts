@@ -7,12 +7,15 @@ import type { Block, Body, Numbers, Obstacle } from "./data.ts";
 export interface Skin {
   corners: Numbers; weights: Numbers; triangles: Numbers; rest: Numbers; outside: Numbers;
   order: number; step: number; first: number;
+  beside: { axes: keyof typeof AXES; cells: Numbers; away: Numbers; count: number } | null;
 }
 
-export function skinOf(block: Block, { order, step, first, ...body }: Body): Skin {
+export function skinOf(block: Block, { order, step, first, count, ...body }: Body): Skin {
   const [corners, weights, triangles, rest, outside] =
     [body.corners, body.weights, body.triangles, body.rest, body.outside].map((ref) => block.array(ref));
-  return { corners, weights, triangles, rest, outside, order, step, first };
+  const beside = body.beside &&
+    { ...body.beside, cells: block.array(body.beside.cells), away: block.array(body.beside.away), count };
+  return { corners, weights, triangles, rest, outside, order, step, first, beside };
 }
 
 /** Values (k, width) of a skin's vertices, of those (n, width) at all points, into `out`. */
@@ -27,6 +30,19 @@ export function follow(skin: Skin, values: Float32Array | Uint8Array, width: num
       for (let i = 0; i < width; i++) out[to + i] += weight * values[from + i];
     }
   }
+}
+
+/** The axes (n, d, 3) at points x (n, 3), as `AXES` of supple.results.view.beside. */
+const AXES = { normals };
+
+/** Moves vertices x (k, 3), which follow one point each of points, along the axes there. */
+export function moveBeside({ beside, corners, first }: Skin, points: Float32Array, x: Float32Array): void {
+  if (!beside) return;
+  const { cells, away, count } = beside, d = away.length / corners.length, axes = new Float32Array(3 * d * count);
+  AXES[beside.axes](points.subarray(3 * first, 3 * (first + count)), cells, axes);
+  for (let k = 0; k < corners.length; k++)
+    for (let j = 0; j < d; j++)
+      for (let i = 0; i < 3; i++) x[3 * k + i] += away[d * k + j] * axes[3 * (d * corners[k] + j) + i];
 }
 
 /** Unit normals at vertices x (k, 3): of the triangles around each, weighted by their areas. */
@@ -59,15 +75,16 @@ export function bounds(x: ArrayLike<number>): [number[], number[]] {
 
 /** The same skin with at most `most` vertices: one in each cell of a grid. */
 export function lighter(skin: Skin, most: number): Skin {
-  const { rest, triangles, order } = skin, count = rest.length / 3, [low, high] = bounds(rest);
+  const { rest, triangles, order, beside } = skin, count = rest.length / 3, [low, high] = bounds(rest);
   if (count <= most) return skin;
-  const map = new Uint32Array(count);
+  const map = new Uint32Array(count), d = beside ? beside.away.length / count : 0;
+  const side = (k: number) => Array.from({ length: d }, (_, j) => Math.sign(beside!.away[d * k + j])); // stay apart
   let chosen: number[] = [];
   for (let size = Math.hypot(...high.map((end, i) => end - low[i])) / Math.sqrt(most); ; size *= 1.2) {
     const cells = new Map<string, number>();
     chosen = [];
     for (let k = 0; k < count; k++) {
-      const cell = [0, 1, 2].map((i) => Math.floor((rest[3 * k + i] - low[i]) / size)).join();
+      const cell = [...[0, 1, 2].map((i) => Math.floor((rest[3 * k + i] - low[i]) / size)), ...side(k)].join();
       if (!cells.has(cell)) cells.set(cell, chosen.push(k) - 1);
       map[k] = cells.get(cell)!;
     }
@@ -85,7 +102,7 @@ export function lighter(skin: Skin, most: number): Skin {
   };
   return {
     ...skin, triangles: new Uint32Array(kept), corners: of(skin.corners, order), weights: of(skin.weights, order - 1),
-    rest: of(rest, 3), outside: of(skin.outside, 1),
+    rest: of(rest, 3), outside: of(skin.outside, 1), beside: beside && { ...beside, away: of(beside.away, d) },
   };
 }
 

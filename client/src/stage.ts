@@ -7,7 +7,7 @@ import {
 import type { Block, Body, Field, Numbers, Source } from "./data.ts";
 import { type Look, palette, SHADOW_LAYER } from "./look.ts";
 import { stops } from "./panel.ts";
-import { bounds, follow, keepOut, lighter, normals, placeTets, type Skin, skinOf } from "./shape.ts";
+import { bounds, follow, keepOut, lighter, moveBeside, normals, placeTets, type Skin, skinOf } from "./shape.ts";
 
 /** What a person has chosen; `body` is a number, or -1. */
 export interface Shown {
@@ -66,6 +66,7 @@ export class Stage {
         mesh.geometry.setDrawRange(0, placeTets(tets, points, this.first, values, how, position, value));
       } else if (skin) {
         follow(skin, points, 3, x);
+        moveBeside(skin, points, x);
         if (body.reach > 0)
           obstacles.forEach(({ solid }, k) => solid &&
             keepOut(x, skin.outside, body.reach, gap, source.pose(k, frame), solid, this.block.array(solid.values)));

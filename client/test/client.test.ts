@@ -3,7 +3,7 @@ import { test } from "node:test";
 import { Vector3 } from "three";
 import { Block, inflated, summed } from "../src/data.ts";
 import { Pace } from "../src/pace.ts";
-import { follow, keepOut, lighter, normals, placeTets, type Skin } from "../src/shape.ts";
+import { follow, keepOut, lighter, moveBeside, normals, placeTets, type Skin } from "../src/shape.ts";
 import { framed } from "../src/view.ts";
 
 /** A sphere of triangles, each vertex of which follows a point of its own and, with weight 1/4, the first one. */
@@ -21,7 +21,7 @@ function sphere(rings: number): Skin {
   return {
     corners: Uint32Array.from({ length: 2 * count }, (_, k) => (k % 2 ? k >> 1 : 0)),
     weights: new Int16Array(count).fill(8192), step: 0.25 / 8192, order: 2, first: 0,
-    triangles: Uint32Array.from(triangles), rest: Float32Array.from(rest), outside: new Uint8Array(count).fill(1),
+    triangles: Uint32Array.from(triangles), rest: Float32Array.from(rest), outside: new Uint8Array(count).fill(1), beside: null,
   };
 }
 
@@ -108,6 +108,30 @@ test("a lighter skin is closed, has about as many vertices as asked, and follows
     assert.deepEqual([0, 1, 2].map((i) => light.rest[3 * k + i]),
       [0, 1, 2].map((i) => skin.rest[3 * light.corners[2 * k + 1] + i]));
   assert.equal(lighter(light, 400), light);
+});
+
+test("both sides of a sheet are half its thickness away, also of a lighter one", () => {
+  const points = sphere(12).rest as Float32Array, n = points.length / 3, { triangles } = sphere(12);
+  const corners = Uint32Array.from({ length: 2 * n }, (_, k) => k % n), away = new Float32Array(2 * n).fill(0.1, 0, n).fill(-0.1, n);
+  const beside = { axes: "normals" as const, cells: triangles, away, count: n };
+  const both = Uint32Array.from([...triangles, ...triangles.map((_, t) => n + triangles[t - (t % 3) + 2 - (t % 3)])]);
+  const rest = Float32Array.from([...points, ...points]);
+  const sheet: Skin = { corners, weights: new Int16Array(0), step: 1, order: 1, first: 1, triangles: both, rest,
+    outside: new Uint8Array(2 * n), beside };
+  const moved = Float32Array.from([9, 9, 9, ...points]); // its points begin with the second one
+  for (const skin of [sheet, lighter(sheet, 200)]) {
+    const count = skin.corners.length, x = new Float32Array(3 * count), seen = new Set<boolean>();
+    follow(skin, moved, 3, x);
+    moveBeside(skin, moved, x);
+    for (let k = 0; k < count; k++) {
+      const side = skin.beside!.away[k], height = x[3 * k + 1];
+      seen.add(side > 0);
+      if (Math.abs(height) < 0.9) assert.ok(Math.abs(Math.hypot(...x.subarray(3 * k, 3 * k + 3)) - 1 - side) < 0.01);
+    }
+    assert.deepEqual([...seen].sort(), [false, true]);
+    for (let t = 0; t < skin.triangles.length; t += 3) // none joins both sides
+      assert.equal(new Set([0, 1, 2].map((i) => skin.beside!.away[skin.triangles[t + i]])).size, 1);
+  }
 });
 
 test("tets are apart from the middle, and end at a cut", () => {

@@ -155,3 +155,19 @@ def test_a_spherical_shell_has_two_surfaces_on_its_radii():
     assert shell.volume == pytest.approx(4 / 3 * np.pi * (0.15**3 - 0.1**3), rel=0.03)
     with pytest.raises(MeshError, match=r"inner_radius = 0.2 m is not below outer_radius = 0.15 m"):
         shapes.spherical_shell(0.2, 0.15, 0.01)
+
+
+@pytest.mark.parametrize(("sides", "edge", "cells"), [((0.3, 0.2), 0.1, (3, 2)), ((1.0, 0.35), None, (29, 10))])
+def test_a_sheet_has_cells_of_its_edge_and_no_direction(sides, edge, cells):
+    sheet = shapes.sheet(*sides, edge)
+    assert len(sheet.triangles) == 2 * cells[0] * cells[1]
+    assert np.allclose(sheet.area_vectors.sum(axis=0), [0.0, sides[0] * sides[1], 0.0])
+    assert np.all(sheet.area_vectors[:, 1] > 0.0)
+    assert np.allclose(sheet.bounds, [(-0.5 * sides[0], 0.0, -0.5 * sides[1]), (0.5 * sides[0], 0.0, 0.5 * sides[1])])
+    ends = sheet.vertices[sheet.edges]
+    diagonals = (ends[:, 1] - ends[:, 0])[:, [0, 2]]
+    diagonals = diagonals[np.abs(diagonals).min(axis=1) > 1e-9]
+    rising = np.count_nonzero(diagonals.prod(axis=1) > 0.0)
+    assert abs(rising - (len(diagonals) - rising)) <= 1
+    with pytest.raises(MeshError, match=r"sheet: edge_length = 0.5 m is longer than shorter side = 0.2 m"):
+        shapes.sheet(0.3, 0.2, 0.5)

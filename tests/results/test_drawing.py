@@ -15,7 +15,8 @@ from supple.results.view.bounds import box_corners, view_of_scene
 from supple.results.view.camera import direction_of, fitted
 from supple.results.view.floor_shadow import FloorShadow
 from supple.results.view.from_recording import evenly, model_of_recording, render_frame_of, view_of
-from supple.results.view.surfaces import body_surface, obstacle_surfaces, split_at_creases, surfaces_of, vertex_normals
+from supple.results.view.normals import vertex_normals
+from supple.results.view.surfaces import body_surface, obstacle_surfaces, split_at_creases, surfaces_of
 from supple.simulate import simulate
 
 

@@ -16,7 +16,7 @@ from supple.mesh.primitives.gummy_bear import gummy_bear_surface
 from supple.mesh.primitives.isosurface_stuffing import stuff
 from supple.mesh.primitives.shape import shape
 from supple.mesh.primitives.sizes import counts, edge_of_torus, edge_or_share, fits, lengths, not_too_many, positive
-from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
+from supple.mesh.primitives.surfaces import sheet, sphere_surface, torus_surface
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 
@@ -27,6 +27,7 @@ __all__ = [
     "cylinder_surface",
     "gummy_bear",
     "gummy_bear_surface",
+    "sheet",
     "sphere",
     "sphere_surface",
     "spherical_shell",

@@ -282,3 +282,32 @@ def test_cavities_are_checked_further_where_they_are_used(tmp_path):
     path.write_text(FILE.format(cavity="{body: shell, pressure: 1, volume: 1}"))
     with pytest.raises(sp.SceneError, match=r"scene.yaml:11.*pressure and volume given"):
         sp.load_run(path)
+
+
+def test_a_shell_is_the_wall_of_a_cavity_whichever_way_it_faces(tmp_path):
+    ball, sheet = sp.shapes.sphere_surface(0.1, 0.05), sp.shapes.sheet(0.1, 0.1, 0.05)
+    material = sp.ShellMaterial(youngs=1e6, poisson=0.4, thickness=1e-3)
+    small = ball.transformed(0.5, translation=(0.3, 0, 0))
+    both = sp.SurfaceMesh(
+        np.concatenate([ball.vertices, small.vertices]),
+        np.concatenate([ball.triangles, small.flipped().triangles + len(ball.vertices)]),
+    )
+    volumes = []
+    for surface in (ball, ball.flipped()):
+        filled = sp.Scene(
+            [sp.Shell("balloon", surface, material)], cavities=[sp.Cavity("balloon", pressure=500.0)], gravity=(0, 0, 0)
+        )
+        sink = sp.Recorder(tmp_path / "balloon.vtkhdf")
+        *_, last = sp.simulate(filled, sp.Implicit(contact=None), 1 / 60, 1, sinks=[sink])
+        volumes.append(last.report.cavities["balloon"].volume)
+        assert sp.check_recording(tmp_path / "balloon.vtkhdf").ok
+    assert volumes[0] > 1.001 * ball.volume
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-6)
+    pair = sp.Shell("pair", both, material)
+    for void, surface in enumerate((ball, small)):
+        start = build_system(sp.Scene([pair], cavities=[sp.Cavity("pair", pressure=1.0, void=void)])).actuators[0].start
+        assert start == pytest.approx(surface.volume)
+    chosen = sp.Cavity("pair", pressure=1.0, triangles=np.arange(len(ball.triangles)))
+    assert build_system(sp.Scene([pair], cavities=[chosen])).actuators[0].start == pytest.approx(ball.volume)
+    with pytest.raises(sp.SceneError, match="encloses 0: the surface of the cavity is open"):
+        sp.Scene([sp.Shell("cloth", sheet, material)], cavities=[sp.Cavity("cloth", pressure=1.0)])

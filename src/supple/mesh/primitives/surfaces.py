@@ -1,4 +1,4 @@
-"""Surfaces of ready-made bodies that do not come from a tet mesh: sphere and torus."""
+"""Ready-made surfaces that do not come from a tet mesh: sheet, sphere and torus."""
 
 from __future__ import annotations
 
@@ -12,6 +12,40 @@ from supple.mesh.primitives.shape import shape
 from supple.mesh.primitives.sizes import edge_of_torus, edge_or_share, fits, not_too_many
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.topology import merge_map
+
+
+@shape
+def sheet(
+    length: Annotated[float, POSITIVE] = 1.0,
+    width: Annotated[float, POSITIVE] = 1.0,
+    edge_length: Annotated[float | None, POSITIVE] = None,
+) -> SurfaceMesh:
+    """A rectangle in the plane y = 0, which faces up: cells cut along one diagonal and the other in turns.
+
+    Vertices are in rows: z runs fastest, then x.
+
+    Parameters
+    ----------
+    length, width : along x and z [m]
+    edge_length : of the edges of cells [m], at most; None: a tenth of the smaller side
+
+    Raises
+    ------
+    MeshError : where a length is not positive, or the edge is too long or too short for the sides.
+    """
+    edge_length = edge_or_share("sheet", edge_length, 0.1, length=length, width=width)
+    fits("sheet", edge_length, "shorter side", min(length, width))
+    nx, nz = (math.ceil(side / edge_length * (1.0 - 1e-9)) for side in (length, width))
+    not_too_many("sheet", 2.0 * nx * nz, "make edge_length longer")
+    i, j = (axis.ravel() for axis in np.meshgrid(np.arange(nx + 1), np.arange(nz + 1), indexing="ij"))
+    x = np.column_stack([length * (i / nx - 0.5), np.zeros(len(i)), width * (j / nz - 0.5)])
+    i, j = (axis.ravel() for axis in np.meshgrid(np.arange(nx), np.arange(nz), indexing="ij"))
+    a = i * (nz + 1) + j
+    b, c, d = a + nz + 1, a + nz + 2, a + 1
+    turned = ((i + j) % 2 == 1)[:, None]
+    first = np.where(turned, np.column_stack([a, c, b]), np.column_stack([a, d, b]))
+    second = np.where(turned, np.column_stack([a, d, c]), np.column_stack([b, d, c]))
+    return SurfaceMesh(x, np.stack([first, second], axis=1).reshape(-1, 3))
 
 
 @shape

@@ -21,9 +21,9 @@ from supple.results.export.recorded_fields import fields_on
 from supple.results.recording.reader import Recording
 from supple.results.view.from_recording import evenly, model_of_recording, render_frame_of
 from supple.results.view.model import RenderFrame
-from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
+from supple.results.view.normals import vertex_normals
+from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of
 from supple.runtime.replacing import whole_file
-from supple.scene.shell import Shell
 
 logger = logging.getLogger(__name__)
 
@@ -165,8 +165,6 @@ class _Glb:
         surface = {"baseColorFactor": [*linear.tolist(), opacity], "metallicFactor": drawn.look.metallic}
         surface["roughnessFactor"] = drawn.look.roughness
         more: dict[str, Any] = {"doubleSided": True, "alphaMode": "BLEND"} if opacity < 1.0 else {}
-        if isinstance(drawn, SoftSurface) and isinstance(drawn.body.body, Shell):
-            more["doubleSided"] = True
         return self._added("materials", {"pbrMetallicRoughness": surface, **more})
 
     def _vectors(self, values: NDArray, *, bounds: bool = False) -> int:

@@ -17,7 +17,8 @@ from supple.results.view.fields import colors_of
 from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.look import LOOKS, Look, floor_disc, theme
 from supple.results.view.model import Model, RenderFrame
-from supple.results.view.surfaces import RigidSurface, SoftSurface, vertex_normals
+from supple.results.view.normals import vertex_normals
+from supple.results.view.surfaces import RigidSurface, SoftSurface
 
 _SAMPLES = 64
 _PASSES = 8  # of a picture: what only one of them has is a firefly

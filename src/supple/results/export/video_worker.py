@@ -26,8 +26,9 @@ from supple.results.view.from_recording import evenly, model_of_recording, rende
 from supple.results.view.joints import JOINT_COLOR, joint_segments, lines_of_joints
 from supple.results.view.look import STITCH_COLOR, Color, Look, background, floor_disc, theme
 from supple.results.view.model import Model, RenderFrame
+from supple.results.view.normals import vertex_normals
 from supple.results.view.occlusion import occlusion
-from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of, vertex_normals
+from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of
 
 ANGLE = 30.0  # of the camera, upwards [degrees]
 _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
@@ -203,7 +204,8 @@ class Studio(Pictures):
         surfaces = [surface for _, surface in self._meshes]
         facing = [-n if surface.container else n for n, surface in zip(normals, surfaces, strict=True)]
         drawn = [(x, surface.triangles, n) for x, surface, n in zip(points, surfaces, facing, strict=True)]
-        for (mesh, surface), dark in zip(self._meshes, occlusion(drawn, self._bodies), strict=True):
+        layers = [surface.layers for surface in surfaces]
+        for (mesh, surface), dark in zip(self._meshes, occlusion(drawn, self._bodies, layers), strict=True):
             if "color" in mesh.point_data:
                 light = (1.0 - dark)[:, None] * np.array(surface.color)
                 mesh.point_data["color"] = light.astype(np.uint8)

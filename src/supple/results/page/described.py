@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.results.page.packed import Packer, differences, quantized
+from supple.results.view.beside import Beside
 from supple.results.view.bounds import floor_height
 from supple.results.view.camera import direction_of
 from supple.results.view.fields import FIELDS, Field, Limits, Range, color_map, nodal_values
@@ -49,11 +50,13 @@ def described_scene(model: Model, packer: Packer) -> dict[str, Any]:
 def _body(model: Model, body: BodyRows, packer: Packer) -> dict[str, Any]:
     """Its vertices among the points, and its surface; also of a rigid body, the surface follows its four points."""
     if body.skin is None:
-        surface = boundary_surface(body).creased(model)
-        corners, weights = surface.rows[:, None], np.ones((len(surface.rows), 1))
+        whole = boundary_surface(body)
     else:
         rows = np.arange(len(body.skin.corners))
-        surface = SoftSurface(body.name, body.skin.triangles, *drawn_as(body), body, True, rows).creased(model)
+        whole = SoftSurface(body.name, body.skin.triangles, *drawn_as(body), body, True, rows)
+    surface = whole.creased(model)
+    corners, weights = surface.rows[:, None], np.ones((len(surface.rows), 1))
+    if body.skin is not None:
         corners, weights = body.skin.corners[surface.rows], body.skin.weights[surface.rows]
     beyond = model.beyond_tets.get(body.name)
     outside, reach = (np.zeros(0), 0.0) if beyond is None else (beyond[0][surface.rows], beyond[1])
@@ -71,10 +74,16 @@ def _body(model: Model, body: BodyRows, packer: Packer) -> dict[str, Any]:
         "weights": packer.add(np.round(kept / step), "i2"),
         "step": step,
         "rest": packer.add(surface.at_rest(model), "f4"),
-        "closed": surface.hides_its_backs(model),
+        "closed": whole.hides_its_backs(model),
+        "beside": None if surface.beside is None else _beside(surface.beside, packer),
         "outside": packer.add(outside, "u1"),
         "reach": STRETCH * reach,
     }
+
+
+def _beside(beside: Beside, packer: Packer) -> dict[str, Any]:
+    kind = "u2" if beside.cells.max(initial=0) < 65535 else "u4"
+    return {"axes": beside.axes, "cells": packer.add(beside.cells, kind), "away": packer.add(beside.away, "f4")}
 
 
 def _triangles(surface: Surface, packer: Packer) -> dict[str, Any]:

@@ -6,6 +6,8 @@ known density; what it finds beyond that is of other surfaces, or of its own whe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
@@ -25,13 +27,14 @@ MOST = 256  # points of one triangle
 _SHORT, _LONG = 5.0, 12.0
 
 
-def occlusion(surfaces: Surfaces, bodies: int) -> list[NDArray[np.float64]]:
+def occlusion(surfaces: Surfaces, bodies: int, layers: Sequence[int]) -> list[NDArray[np.float64]]:
     """How dark (k,) the vertices of each surface are, from 0 to below 1.
 
     Parameters
     ----------
     surfaces : vertices (k, 3) [m], triangles (t, 3) and unit normals (k, 3); those of the bodies first
     bodies : number of these; the grid is about them
+    layers : of each surface, how many of its parts lie on each other and count as one, as the two sides of a sheet
     """
     x = np.concatenate([own for own, _, _ in surfaces[:bodies]])
     low, high = x.min(axis=0), x.max(axis=0)
@@ -39,7 +42,10 @@ def occlusion(surfaces: Surfaces, bodies: int) -> list[NDArray[np.float64]]:
     margin = int(np.ceil((3.0 + _ABOVE) * _BLUR)) + 1
     origin = low - margin * cell
     grid = np.zeros(tuple(np.ceil((high - low) / cell).astype(int) + 2 * margin + 1))
-    longest = [_collect(np.ascontiguousarray(own), item, origin, 1.0 / cell, grid) for own, item, _ in surfaces]
+    longest = [
+        _collect(np.ascontiguousarray(own), item, origin, 1.0 / cell, 1.0 / count, grid)
+        for (own, item, _), count in zip(surfaces, layers, strict=True)
+    ]
     # Of the area [cells^2] in a cell, blurred: at a plane, that of a Gaussian across it.
     density = gaussian_filter(grid, _BLUR, mode="constant", truncate=3.0)
     plane = np.exp(-0.5 * _ABOVE**2) / (np.sqrt(2.0 * np.pi) * _BLUR)
@@ -51,8 +57,8 @@ def occlusion(surfaces: Surfaces, bodies: int) -> list[NDArray[np.float64]]:
 
 
 @njit(cache=True)
-def _collect(x, triangles, origin, per_cell, grid):
-    """Add the area of triangles (t, 3) of vertices x (k, 3) to the cells of a grid, as points spread over each.
+def _collect(x, triangles, origin, per_cell, share, grid):
+    """Add a share of the area of triangles (t, 3) of vertices x (k, 3) to the cells of a grid, as points on each.
 
     Returns the length (k,) of the longest edge at each vertex [cells].
     """
@@ -78,7 +84,7 @@ def _collect(x, triangles, origin, per_cell, grid):
             j = int(np.floor((x[a, 1] - origin[1]) * per_cell + first * u[1] + second * v[1]))
             k = int(np.floor((x[a, 2] - origin[2]) * per_cell + first * u[2] + second * v[2]))
             if 0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]:
-                grid[i, j, k] += area / points
+                grid[i, j, k] += share * area / points
     return longest
 
 

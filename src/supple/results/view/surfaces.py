@@ -13,12 +13,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from supple.mesh.closed_surfaces import is_closed
+from supple.results.view.beside import Beside, sheet
 from supple.results.view.look import OBSTACLE, Look, drawn_as, theme
 from supple.results.view.model import Model, RenderFrame
 from supple.results.view.skin_contact import kept_out
-from supple.runtime.kernel_cache import njit
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rows import BodyRows
+from supple.scene.shell import Shell
 
 # A container is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
 CONTAINER_OPACITY, WALL_OPACITY = 0.13, 0.05
@@ -67,18 +68,20 @@ class Surface(ABC):
 
 @dataclass(frozen=True, eq=False)
 class SoftSurface(Surface):
-    """The skin of a soft body, or the boundary of its tets.
+    """The skin of a soft body, the boundary of its tets, or a sheet about its points.
 
     Attributes
     ----------
     body : of the model
     skin : whether the vertices are those of its skin
     rows : (k,) the vertices of the skin, or of the body, that are drawn
+    beside : where they are drawn beside these; None: there
     """
 
     body: BodyRows
     skin: bool
     rows: NDArray[np.int64]
+    beside: Beside | None = None
     opacity: ClassVar[float] = 1.0
     container: ClassVar[bool] = False
     casts_shadow: ClassVar[bool] = True
@@ -90,7 +93,7 @@ class SoftSurface(Surface):
         return (self.body.skin.positions(own) if self.skin and self.body.skin is not None else own)[self.rows]
 
     def at(self, frame: RenderFrame) -> NDArray[np.float64]:
-        x, kept = self.of(frame.finite_positions), frame.model.beyond_tets.get(self.name)
+        x, kept = self._drawn(frame.finite_positions), frame.model.beyond_tets.get(self.name)
         if kept is None or not self.skin:
             return x
         outside, reach = kept
@@ -98,10 +101,19 @@ class SoftSurface(Surface):
         return kept_out(x, rows, STRETCH * reach, frame.model.obstacles, frame.poses, gap)
 
     def at_rest(self, model: Model) -> NDArray[np.float64]:
-        return self.of(model.rest_positions)
+        return self._drawn(model.rest_positions)
+
+    @property
+    def layers(self) -> int:
+        return 1 if self.beside is None else self.beside.layers
+
+    def _drawn(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        points = self.of(x)
+        return points if self.beside is None else points + self.beside.offsets(x[self.body.vertices], self.rows)
 
     def _with_vertices(self, rows: NDArray[np.int64], triangles: NDArray[np.int32]) -> Self:
-        return replace(self, rows=self.rows[rows], triangles=triangles)
+        beside = None if self.beside is None else self.beside.taken(rows)
+        return replace(self, rows=self.rows[rows], triangles=triangles, beside=beside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +138,7 @@ class RigidSurface(Surface):
     casts_shadow: bool = True
     is_floor: bool = False
     obstacle: Obstacle | None = None
+    layers: ClassVar[int] = 1
 
     def at(self, frame: RenderFrame) -> NDArray[np.float64]:
         pose = self.pose(frame)
@@ -164,7 +177,10 @@ def body_surface(model: Model, body: BodyRows, *, skins: bool = True) -> SoftSur
 
 
 def boundary_surface(body: BodyRows) -> SoftSurface:
-    """The boundary of a body's tets."""
+    """The boundary of a body's tets; of a shell both sides and the rims."""
+    if isinstance(body.body, Shell):
+        rows, closed, beside = sheet(body.boundary, body.body.material.thickness)
+        return SoftSurface(body.name, closed, *drawn_as(body), body, False, rows, beside)
     used, rows = np.unique(body.boundary, return_inverse=True)
     triangles = rows.reshape(-1, 3).astype(np.int32)
     return SoftSurface(body.name, triangles, *drawn_as(body), body, False, used.astype(np.int64))
@@ -304,32 +320,6 @@ def split_at_creases(
     rows = np.empty(parts, dtype=np.int64)
     rows[label] = start
     return rows, label.reshape(-1, 3).astype(np.int32)
-
-
-def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Unit normals (k, 3) at vertices x (k, 3): of the triangles around each, weighted by area."""
-    return _normals_at(np.ascontiguousarray(x), triangles)
-
-
-@njit(cache=True)
-def _normals_at(x, triangles):
-    """(k, 3) the direction of the sum of the area vectors of the triangles (t, 3) around each vertex x (k, 3)."""
-    out = np.zeros_like(x)
-    for t in range(len(triangles)):
-        a, b, c = triangles[t]
-        for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            area = (x[b, i] - x[a, i]) * (x[c, j] - x[a, j]) - (x[b, j] - x[a, j]) * (x[c, i] - x[a, i])
-            out[a, k] += area
-            out[b, k] += area
-            out[c, k] += area
-    for row in out:
-        length = np.sqrt(row[0] ** 2 + row[1] ** 2 + row[2] ** 2)
-        if length > 0.0:
-            row /= length
-        else:
-            row[1] = 1.0
-    return out
 
 
 def _area_vectors(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:

@@ -16,6 +16,7 @@ from supple.mesh.closed_surfaces import enclosed_voids, is_closed, signed_volume
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Rows, body_of
 from supple.scene.loads.over_time import OverTime, OverTimeOf
+from supple.scene.shell import Shell
 
 AMOUNT = OverTimeOf(bounds=POSITIVE)
 GAS_CONSTANT = 8.31446261815324  # [J/(mol K)], exact by definition
@@ -57,7 +58,7 @@ class Cavity(Kind):
 
     Parameters
     ----------
-    body : name of the soft body.
+    body : name of the soft body, or of a shell whose surface is closed.
     pressure : difference to the pressure outside [Pa]; a number, a `Curve`, or a function of time.
     volume : of an incompressible fluid [m^3], above zero; a number, a `Curve`, or a function of time.
     gas : an ideal gas.
@@ -104,14 +105,20 @@ class Cavity(Kind):
         """
         body = body_of(self.body, bodies, self.label)
         points, triangles = body.points, body.triangles
+        two_sided = isinstance(body, Shell)
         if self.triangles is None:
-            voids = enclosed_voids(points, triangles)
+            voids = [triangles[rows] for rows in enclosed_voids(points, triangles)]
+            if two_sided:  # a piece of it may be open, and face outward
+                turned = triangles[:, ::-1]
+                voids += [turned[rows] for rows in enclosed_voids(points, turned)]
+                closed = [one for one in voids if is_closed(one)]
+                voids = sorted(closed, key=lambda one: float(signed_volumes(points, one).sum()))
             if self.void >= len(voids):
                 raise SceneError(
                     f"{self.label}: void {self.void} does not exist; body {self.body!r} encloses {len(voids)}"
                     + ("" if voids else ": the surface of the cavity is open, or the mesh fills it")
                 )
-            return triangles[voids[self.void]]
+            return voids[self.void]
         rows = np.asarray(self.triangles)
         if rows.max() >= len(triangles):
             raise SceneError(f"{self.label}: triangle {rows.max()} does not exist; the surface has {len(triangles)}")
@@ -119,5 +126,7 @@ class Cavity(Kind):
         if not is_closed(chosen):
             raise SceneError(f"{self.label}: its triangles are not a closed surface; add those that are missing")
         if signed_volumes(points, chosen).sum() >= 0.0:
+            if two_sided:
+                return chosen[:, ::-1]
             raise SceneError(f"{self.label}: its triangles face outward; give an inner surface of body {self.body!r}")
         return chosen
