@@ -180,7 +180,6 @@ def test_free_shell_keeps_its_momentum_and_its_spin():
     [
         (sp.XPBD(), "XPBD: body 'cloth' is a shell.*Implicit"),
         (sp.Implicit(contact=None, integrator="newmark"), "newmark.*use 'bdf2'"),
-        (sp.Implicit(contact=None, linear_solver="pcg"), "pcg.*use 'auto'"),
     ],
 )
 def test_solvers_refuse_what_they_do_not_simulate_of_shells(solver, text):

@@ -28,9 +28,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csc_array
 
-from supple.materials.shells.hinges import Bent
+from supple.materials.shells.hinges import angles_of
 from supple.materials.shells.membrane import (
     neo_hookean_energies,
     neo_hookean_stresses,
@@ -82,7 +82,7 @@ class ShellElements:
 
     def energy(self, x: Floats) -> float:
         """[J], zero at rest."""
-        turned = Bent(x, self.hinges).angles - self.rest_angles
+        turned = angles_of(x, self.hinges) - self.rest_angles
         stretched = self.densities(strains(self.deformation_gradients(x)))
         return float((self.areas * self.thickness) @ stretched) + 0.5 * float(turned @ self.moments(turned))
 
@@ -147,6 +147,25 @@ class ShellElements:
         return nodes, places
 
     @cached_property
+    def pairs(self) -> tuple[Ints, Ints, NDArray[np.int64]]:
+        """The two vertices (21 t,) of every pair of nodes of each triangle, twice a corner where one is missing, and
+        the pairs of two nodes that are the same vertex."""
+        nodes, (p, q) = self.stencils[0], np.triu_indices(6)
+        rows, columns = nodes[:, p], nodes[:, q]
+        missing = (rows < 0) | (columns < 0)
+        twice = np.flatnonzero(((rows == columns) & ~missing & (p != q)).ravel())
+        corner = np.broadcast_to(nodes[:, :1], rows.shape)
+        return np.where(missing, corner, rows).ravel(), np.where(missing, corner, columns).ravel(), twice
+
+    @cached_property
+    def owned(self) -> NDArray[np.bool_]:
+        """(t, 3) whether a triangle is the first one of its hinge."""
+        hinges, first = np.unique(self.hinge_of, return_index=True)
+        out = np.zeros(self.hinge_of.size, dtype=bool)
+        out[first[hinges >= 0]] = True
+        return out.reshape(self.hinge_of.shape)
+
+    @cached_property
     def _factors(self) -> Any:
         from scipy.sparse.linalg import splu
 
@@ -156,12 +175,6 @@ class ShellElements:
         W = csc_array((self.compliances[kept], (rows[kept], columns[kept])), shape=shape)
         options = {"SymmetricMode": True}
         return splu(W, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-
-    def jacobian(self, gradients: Floats, vertices: int) -> csr_array:
-        """(e, 3 n) of the angles by all coordinates, from their gradients (e, 4, 3)."""
-        columns = (3 * self.hinges[:, :, None] + np.arange(3, dtype=np.int32)).reshape(-1)
-        starts = np.arange(0, len(columns) + 1, 12, dtype=np.int32)
-        return csr_array((gradients.reshape(-1), columns, starts), shape=(len(self.hinges), 3 * vertices))
 
 
 def elements_of(parts: Sequence[tuple[Floats, Ints, int, ShellMaterial]], holders: NDArray[np.int64]) -> ShellElements:
@@ -217,7 +230,7 @@ def _elements(
         "neo_hookean": np.full(count, material.membrane == "neo_hookean"),
         "damping": np.full(count, material.damping),
         "hinges": (hinges + first).astype(np.int32),
-        "rest_angles": Bent(x, hinges).angles,
+        "rest_angles": angles_of(x, hinges),
         "hinge_damping": np.full(len(hinges), material.damping),
         "hinge_of": np.where(hinge_of < 0, -1, hinge_of + begin).astype(np.int32),
         "compliances": compliances,

@@ -17,6 +17,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.runtime.kernel_cache import njit
+
 Floats = NDArray[np.float64]
 
 
@@ -72,3 +74,33 @@ def _metric(E: Floats) -> tuple[Floats, Floats]:
     det = c11 * c22 - c12 * c12
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.column_stack([c22, c11, -c12]) / det[:, None], np.log(np.maximum(det, 0.0))
+
+
+@njit(cache=True)
+def add_stretching(F, gradients, volumes, S, tangents, out):
+    """V (B_p^T D B_q + (g_p . S g_q) 1): B_p the strains of corner p, D the tangents (t, 3, 3), S (t, 3) stresses.
+
+    out : (21 t, 3, 3) see `hinges`
+    """
+    B, DB = np.empty((3, 3, 3)), np.empty((3, 3))
+    for t in range(len(F)):
+        for p in range(3):
+            g, h = gradients[t, p, 0], gradients[t, p, 1]
+            for i in range(3):
+                B[p, 0, i], B[p, 1, i] = F[t, i, 0] * g, F[t, i, 1] * h
+                B[p, 2, i] = F[t, i, 0] * h + F[t, i, 1] * g
+        for q in range(3):
+            g, h = gradients[t, q, 0], gradients[t, q, 1]
+            along, across = S[t, 0] * g + S[t, 2] * h, S[t, 2] * g + S[t, 1] * h
+            for a in range(3):
+                for j in range(3):
+                    DB[a, j] = 0.0
+                    for b in range(3):
+                        DB[a, j] += volumes[t] * tangents[t, a, b] * B[q, b, j]
+            for p in range(q + 1):
+                stress = volumes[t] * (gradients[t, p, 0] * along + gradients[t, p, 1] * across)
+                k = 21 * t + 6 * p + q - p * (p + 1) // 2
+                for i in range(3):
+                    out[k, i, i] += stress
+                    for j in range(3):
+                        out[k, i, j] += B[p, 0, i] * DB[0, j] + B[p, 1, i] * DB[1, j] + B[p, 2, i] * DB[2, j]

@@ -9,7 +9,9 @@ Source: Saad, "Iterative Methods for Sparse Linear Systems" (2003), algorithm 9.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,9 @@ from supple.runtime.kernel_cache import njit
 _SHARED_FROM = 10_000
 
 NOTHING_MORE, _NO_MATRIX = np.zeros((0, 0, 3)), np.zeros((0, 0))
+
+
+Product = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -64,16 +69,7 @@ def conjugate_gradients(
     """
     order = preconditioner.order
     solution = np.zeros_like(x)
-    inverse = (
-        (order.color_start, order.group_start, order.cluster_start, order.dense_start),
-        (order.lower.start, order.lower.columns, order.lower.blocks),
-        (order.upper.start, order.upper.columns, order.upper.blocks),
-        preconditioner.diagonal,
-        preconditioner.inverse_diagonal,
-        (preconditioner.coarse_of, preconditioner.places, preconditioner.group_start, preconditioner.fields),
-        preconditioner.first,
-        preconditioner.coarse,
-    )
+    inverse = _inverse(preconditioner)
     more = (low_rank, low_rank, low_rank, low_rank, _NO_MATRIX)
     if len(low_rank):
         low = np.take(low_rank, order.rows, axis=1)
@@ -83,6 +79,55 @@ def conjugate_gradients(
     iterations, converged, indefinite, first = _solve(*inverse, rhs, solution, tolerance, max_iterations, more)
     x[order.rows] = solution
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
+
+
+def gradients_by_products(
+    product: Product, inverse: Product, b: NDArray[np.float64], tolerance: float, max_iterations: int
+) -> tuple[NDArray[np.float64], CGResult]:
+    """Solve A x = b for a matrix that is known by its products, with the products of a preconditioner."""
+    x, r, p = np.zeros_like(b), b.copy(), inverse(b)
+    rho = float(np.vdot(b, p))
+    first = rho**0.5 if rho > 0.0 else 0.0
+    for iteration in range(max_iterations + 1):
+        if not 0.0 <= rho < np.inf or rho <= (tolerance * first) ** 2:
+            return x, CGResult(iteration, 0.0 <= rho < np.inf, rho < 0.0, first)
+        if iteration == max_iterations:
+            break
+        Ap = product(p)
+        curvature = float(np.vdot(p, Ap))
+        if not curvature > 0.0:
+            return x, CGResult(iteration, False, True, first)
+        x += rho / curvature * p
+        r -= rho / curvature * Ap
+        z = inverse(r)
+        rho, before = float(np.vdot(r, z)), rho
+        p = z + rho / before * p
+    return x, CGResult(max_iterations, False, False, first)
+
+
+def preconditioned(preconditioner: TwoLevel, r: NDArray[np.float64]) -> NDArray[np.float64]:
+    """M^-1 r, (n, 3)."""
+    rows, out = preconditioner.order.rows, np.empty_like(r)
+    low = r[None, rows]
+    solution = np.zeros_like(low)
+    _prepare(*_inverse(preconditioner), low, np.zeros_like(low), solution, np.zeros_like(low), np.eye(1))
+    out[rows] = solution[0]
+    return out
+
+
+def _inverse(preconditioner: TwoLevel) -> tuple[Any, ...]:
+    """What kernels take of a preconditioner."""
+    order = preconditioner.order
+    return (
+        (order.color_start, order.group_start, order.cluster_start, order.dense_start),
+        (order.lower.start, order.lower.columns, order.lower.blocks),
+        (order.upper.start, order.upper.columns, order.upper.blocks),
+        preconditioner.diagonal,
+        preconditioner.inverse_diagonal,
+        (preconditioner.coarse_of, preconditioner.places, preconditioner.group_start, preconditioner.fields),
+        preconditioner.first,
+        preconditioner.coarse,
+    )
 
 
 @njit

@@ -139,11 +139,6 @@ class Implicit(Solver):
         if refusal := integrator_of(self.integrator).refusal(system):
             raise SolverError(refusal)
         refuse_materials(system)
-        shell = next((part.name for part in system.bodies if isinstance(part.body, Shell)), None)
-        if shell is not None and self.linear_solver == "pcg":
-            raise SolverError(
-                f"body {shell!r}: Implicit(linear_solver='pcg') cannot simulate shells; use 'auto' or 'direct'"
-            )
 
     def prepare(self, system: System, tools: Tools | None = None) -> Workspace:
         """Compute the patterns, groups and memory for a system.

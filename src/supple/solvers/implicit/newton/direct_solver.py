@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix, triu
 
 from supple.numerics.sparse.block_csr import BlockRows
+from supple.numerics.sparse.pcg import Product, gradients_by_products
 
 logger = logging.getLogger(__name__)
 
@@ -29,8 +29,6 @@ _NEGATIVE_EIGENVALUES = 23
 # correction of shells is less than three quarters of the matrix; that is a tenth of the residual in two iterations.
 _CORRECTED = 1e-6
 _MOST_CORRECTIONS = 100
-
-Product = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 _LIBRARY = "PYPARDISO_MKL_RT"  # the environment variable in which pypardiso takes the path of its library
 
@@ -75,7 +73,7 @@ def solve_directly(
     b: NDArray[np.float64],
     require_definite: bool = False,
     low_rank: NDArray[np.float64] = NOTHING_MORE,
-    correct: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+    correct: Product | None = None,
 ) -> NDArray[np.float64] | None:
     """Solve (A + G G^T + C) x = b, (n, 3), for a symmetric A by the factorization L D L^T.
 
@@ -112,30 +110,14 @@ def solve_directly(
     if require_definite and negative:
         return None
     if correct is not None:
-        x = _corrected(lambda p: matrix @ p + G @ (G.T @ p) + correct(p.reshape(-1, 3)).ravel(), solve, b.ravel(), x)
-    return None if x is None else np.ascontiguousarray(x.reshape(-1, 3))
 
+        def product(p: NDArray[np.float64]) -> NDArray[np.float64]:
+            return matrix @ p + G @ (G.T @ p) + correct(p.reshape(-1, 3)).ravel()
 
-def _corrected(product: Product, inverse: Product, b: NDArray[np.float64], x: NDArray[np.float64]) -> Any:
-    """CG with a preconditioner, from its first step x = inverse(b); None where the matrix is not positive definite.
-
-    Source: Saad, "Iterative Methods for Sparse Linear Systems" (2003), algorithm 9.1.
-    """
-    p, rho = x.copy(), float(b @ x)
-    r, x, least = b.copy(), np.zeros_like(b), _CORRECTED**2 * rho
-    for _ in range(_MOST_CORRECTIONS):
-        Ap = product(p)
-        curvature = float(p @ Ap)
-        if not curvature > 0.0:
+        x, result = gradients_by_products(product, solve, b.ravel(), _CORRECTED, _MOST_CORRECTIONS)
+        if result.indefinite:
             return None
-        x += rho / curvature * p
-        r -= rho / curvature * Ap
-        z = inverse(r)
-        rho, before = float(r @ z), rho
-        if not rho > least:
-            break
-        p = z + rho / before * p
-    return x
+    return np.ascontiguousarray(x.reshape(-1, 3))
 
 
 def _by_pardiso(

@@ -16,7 +16,7 @@ from supple.model.system import System
 from supple.numerics.sparse.block_csr import BlockPattern, build_pattern
 from supple.numerics.sparse.block_sum import JointPattern
 from supple.numerics.sparse.couplings import Correction, Couplings
-from supple.numerics.sparse.pcg import CGResult, conjugate_gradients
+from supple.numerics.sparse.pcg import CGResult, conjugate_gradients, gradients_by_products, preconditioned
 from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
 from supple.runtime.thread_tuning import ThreadTuner
 from supple.runtime.threads import has_several
@@ -29,6 +29,9 @@ logger = logging.getLogger(__name__)
 # Where CG has not converged after this many iterations, a factorization is likely faster: usual systems take 10 to 60,
 # thin bodies of nearly incompressible material more than 500 (docs/theory/implicit.md).
 _STALLED = 400
+
+# The same with the corrections of shells: factorizations of surfaces cost less.
+_STALLED_SURFACE = 100
 
 # After this many iterations the slower number of threads is tried again, see `ThreadTuner`.
 _REST = 40
@@ -57,10 +60,11 @@ class LinearSolver:
     kind : "auto" (CG, and a factorization where CG stalls), "pcg" or "direct"
     order : which vertex each row belongs to; row_of : (n,) row of each vertex, -1 where it is pinned
     matrix : the sparse part; low_rank : (k, rows, 3) vectors g, of which g g^T is added to it
-    corrections : what else is added; such a matrix is factorized
+    corrections : what else is added
     age, fresh_iterations : the number of runs of CG on the present coarse level (-1: none), and the iterations of the
         first one
     solves : how many systems have been solved
+    stalled : whether CG has stalled in this step on a matrix with corrections; the next ones are factorized
     pace : the number of threads of an iteration, one or `most_threads`, chosen by its time without the linear solve,
         whose work varies
     """
@@ -80,6 +84,7 @@ class LinearSolver:
     age: int = -1
     fresh_iterations: int = 0
     solves: int = 0
+    stalled: bool = False
     pace: ThreadTuner = field(init=False)
     most_threads: int = 1
 
@@ -104,7 +109,7 @@ class LinearSolver:
 
     def begin_step(self) -> None:
         """Discard what earlier steps have left, so that a step depends on its state alone."""
-        self.age, self.joint = -1, None
+        self.age, self.joint, self.stalled = -1, None, False
 
     def own_threads(self) -> AbstractContextManager[None]:
         """A substep's block. What is outside of iterations runs in the mode that was faster so far."""
@@ -131,7 +136,7 @@ class LinearSolver:
         for k, part in enumerate(hessian.low_rank):
             self.low_rank[k] = part.in_rows(self.row_of, count)
         self.corrections = tuple(hessian.corrections)
-        if self.kind != "direct" and not self.corrections:
+        if self.kind != "direct":
             self.preconditioner.update(self.matrix, coarse=self.age < 0)
 
     def _assemble_joint(
@@ -186,8 +191,9 @@ class LinearSolver:
             return p, LinearReport("none", 0, 0.0)
         first_norm = 0.0
         iterations = 0
-        if self.kind != "direct" and not self.corrections:
-            most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
+        if self.kind != "direct" and not self.stalled:
+            most = _STALLED_SURFACE if self.corrections else _STALLED
+            most = most if self.kind == "auto" else max(1000, 3 * b.size)
             result = self._conjugate_gradients(b, x, tolerance, most)
             if result.indefinite and not convex:
                 return None, LinearReport("pcg", result.iterations, result.first_norm)
@@ -205,6 +211,7 @@ class LinearSolver:
                 return p, LinearReport("pcg", iterations, first_norm)
             if self.kind == "pcg":
                 return None, LinearReport("pcg", iterations, first_norm)
+            self.stalled = bool(self.corrections)
             logger.debug("CG stalled after %d iterations; factorizing", iterations)
         pattern = self.preconditioner.pattern
         correct = self._correct if self.corrections else None
@@ -230,7 +237,20 @@ class LinearSolver:
     def _conjugate_gradients(
         self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int
     ) -> CGResult:
-        return conjugate_gradients(self.preconditioner, b, x, tolerance, most, self.low_rank)
+        if not self.corrections:
+            return conjugate_gradients(self.preconditioner, b, x, tolerance, most, self.low_rank)
+        matrix = self.preconditioner.pattern.to_scipy(self.matrix)
+
+        def product(p: NDArray[np.float64]) -> NDArray[np.float64]:
+            out = (matrix @ p.ravel()).reshape(-1, 3) + self._correct(p)
+            for g in self.low_rank:
+                out += np.vdot(g, p) * g
+            return out
+
+        x[:], result = gradients_by_products(
+            product, lambda r: preconditioned(self.preconditioner, r), b, tolerance, most
+        )
+        return result
 
     def _age_by(self, iterations: int) -> None:
         """After a run of CG: keep the coarse level unless it has become too old."""
