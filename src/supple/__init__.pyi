@@ -31,6 +31,7 @@ from .materials.guccione import Guccione as Guccione
 from .materials.holzapfel_gasser_ogden import HolzapfelGasserOgden as HolzapfelGasserOgden
 from .materials.j2_plastic import J2Plastic as J2Plastic
 from .materials.own.energy_material import EnergyMaterial as EnergyMaterial
+from .materials.rods.rod_material import RodMaterial as RodMaterial
 from .materials.rubber import MooneyRivlin as MooneyRivlin
 from .materials.rubber import Ogden as Ogden
 from .materials.rubber import Yeoh as Yeoh
@@ -84,6 +85,7 @@ from .scene.motion import Keyframes as Keyframes
 from .scene.obstacles.half_space import HalfSpace as HalfSpace
 from .scene.pins import Pin as Pin
 from .scene.rigid.rigid_body import RigidBody as RigidBody
+from .scene.rod import Rod as Rod
 from .scene.scene import Scene as Scene
 from .scene.selection import InBox as InBox
 from .scene.sensors import AngleSensor as AngleSensor

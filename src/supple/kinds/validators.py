@@ -260,11 +260,11 @@ class Limits(Validator):
 
 @dataclass(frozen=True)
 class ListOf(Validator):
-    """A list of numbers, of vectors, or of pairs of positive numbers; the kind checks shapes and values.
+    """A list of numbers, vectors, pairs of positive numbers, or pairs of rows; the kind checks shapes and values.
 
     Attributes
     ----------
-    things : "numbers", "vectors" or "pairs", or several of them; most : the largest length in a scene file
+    things : "numbers", "vectors", "pairs" or "rows", or several of them; most : the largest length in a scene file
     """
 
     things: tuple[str, ...] = ("numbers",)

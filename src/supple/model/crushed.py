@@ -18,7 +18,6 @@ from supple.materials.elastic_tets.stress import least_ratios, mean_deformation_
 from supple.materials.kinds import infinite_when_flat
 from supple.model.state import State
 from supple.model.system import BodyRange, System
-from supple.scene.shell import Shell
 
 # J below which a tet is crushed; and one of a body that cannot carry its weight, which `XPBD` holds below this.
 CRUSHED, HELD = 0.05, 0.25
@@ -57,13 +56,7 @@ def too_soft(system: System, part: BodyRange) -> str:
     """What is wrong with the stiffness of a body that its own weight crushes; "" where it carries its weight."""
     youngs = getattr(part.body.material, "youngs", None)
     gravity = math.hypot(*system.gravity)
-    if (
-        part.rigid
-        or isinstance(part.body, Shell)
-        or youngs is None
-        or not gravity
-        or not (system.obstacles or system.pins)
-    ):
+    if part.rigid or part.body.offset > 0.0 or youngs is None or not gravity or not (system.obstacles or system.pins):
         return ""
     heights = system.start_states[0].positions[part.vertices] @ (system.gravity / gravity)
     density = float(system.masses[part.vertices].sum() / system.rest_volumes[part.tets].sum())

@@ -61,6 +61,8 @@ def measure(system: System, state: State) -> Diagnostics:
     if system.shells is not None:
         elastic += system.shells.energy(x)
         smallest = min(smallest, float(system.shells.area_ratios(x).min()))
+    if system.rods is not None:
+        elastic += system.rods.energy(x)
     return Diagnostics(
         min_det_F=smallest,
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),

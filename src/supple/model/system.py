@@ -20,6 +20,7 @@ from supple.materials.elastic import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
 from supple.materials.elastic_tets.quadratic import QuadraticTets
+from supple.materials.rods.elements import RodElements, joined_rods
 from supple.materials.shells.elements import ShellElements, elements_of
 from supple.mesh.topology import graph_components
 from supple.model.loads.actuators.actuator import Actuator
@@ -29,11 +30,13 @@ from supple.model.loads.build import applied, applied_force
 from supple.model.state import State
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.forces import Force, SoftTarget
+from supple.scene.holders import clamped, holders
 from supple.scene.joints.welding import Welding, linked_pieces
 from supple.scene.motion import Motion, moved_points, points_at_origin, rigid_pose
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rod import Rod
 from supple.scene.rows import BodyRows, rows_of
 from supple.scene.scene import Scene
 from supple.scene.shell import Shell
@@ -108,6 +111,7 @@ class System:
     start_states : where a simulation began, then where it continues; vertices in the scene's order
     quadratic : the quadratic ones among the tets, of which `tets` and `rest_shape_inverse` have the corners; or None
     shells : triangles and hinges of all shells; or None
+    rods : edges and joints of all rods; or None
     """
 
     scene: Scene
@@ -133,6 +137,7 @@ class System:
     start_states: tuple[State, ...] = ()
     quadratic: QuadraticTets | None = None
     shells: ShellElements | None = None
+    rods: RodElements | None = None
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -265,26 +270,27 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         start_states=start_states,
         quadratic=_quadratic_tets(ranges, rest_positions),
         shells=shells_of(scene),
+        rods=rods_of(scene),
     )
 
 
 def shells_of(scene: Scene) -> ShellElements | None:
     """The triangles and hinges of all shells, clamped where a pin or a weld holds whole triangles."""
-    rows = rows_of(scene.bodies)
     parts = [
         (part.body.points, part.body.triangles, part.vertices.start, part.body.material)
-        for part in rows
+        for part in rows_of(scene.bodies)
         if isinstance(part.body, Shell)
     ]
+    return elements_of(parts, holders(scene)) if parts else None
+
+
+def rods_of(scene: Scene) -> RodElements | None:
+    """The edges and joints of all rods, clamped where a pin or a weld holds both ends of an edge."""
+    parts = [part for part in rows_of(scene.bodies) if isinstance(part.body, Rod)]
     if not parts:
         return None
-    begins = {part.name: part.vertices.start for part in rows}
-    holders = np.full(rows[-1].vertices.stop, -1, dtype=np.int64)
-    for number, pin in enumerate(scene.pins):
-        body = scene.body(pin.body)
-        holders[pin.select(body.place(body.mesh.vertices)) + begins[pin.body]] = number
-    holders[scene.welding.vertices] = scene.welding.weld + len(scene.pins)
-    return elements_of(parts, holders)
+    held = [clamped(holders(scene)[part.vertices], part.body.mesh.line) for part in parts]
+    return joined_rods([(p.body.elements(own), p.vertices.start) for p, own in zip(parts, held, strict=True)])
 
 
 def _quadratic_tets(ranges: list[BodyRange], rest_positions: NDArray[np.float64]) -> QuadraticTets | None:
@@ -322,6 +328,8 @@ def _anchored(
     part = next(r for r in ranges if r.name == item.body)
     placed = part.body.place(part.body.mesh.vertices)
     local = item.select(placed)  # of a rigid body, only all: the control points
+    if isinstance(item, Pin):
+        local = part.body.with_clamped(local)
     vertices = (local + part.vertices.start).astype(np.int32)
     anchors = placed[local]
     if start is not None and start.time == 0.0:

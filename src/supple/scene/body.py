@@ -99,6 +99,15 @@ class PlacedBody(Kind):
         """Whether what touches is `skin`."""
         return False
 
+    @property
+    def offset(self) -> float:
+        """How far its surface is from the triangles or edges that touch: half of a thickness, a radius, or 0 [m]."""
+        return 0.0
+
+    def with_clamped(self, rows: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Vertices (k,), with those that one thing holds where it holds all of these."""
+        return rows
+
     def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """World positions (k, 3) [m] at the start of points (k, 3) given in the body's own coordinates."""
         return points @ rotation_matrix(self.rotation).T + np.asarray(self.position)

@@ -32,6 +32,7 @@ from supple.scene.obstacles.torus import Torus
 from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
 from supple.scene.pins import Pin
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rod import Rod
 from supple.scene.sensors import AngleSensor, DistanceSensor, ForceSensor, Sensor, Taxels
 from supple.scene.shell import Shell
 from supple.scene.stitches.springs import VertexEdgeStitch, VertexVertexStitch
@@ -53,7 +54,7 @@ class Part(NamedTuple):
 
 # By the parameter of `Scene`, and the key of scene files.
 PARTS: dict[str, Part] = {
-    "bodies": Part((PlacedBody,), [Body, RigidBody, Shell]),
+    "bodies": Part((PlacedBody,), [Body, RigidBody, Shell, Rod]),
     "obstacles": Part((Obstacle,), [HalfSpace, Box, Sphere, Capsule, Cylinder, Torus, TriangleObstacle]),
     "pins": Part((Pin,), [Pin]),
     "forces": Part((Force,), [Force]),

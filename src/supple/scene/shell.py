@@ -49,6 +49,10 @@ class Shell(PlacedBody):
         object.__setattr__(self, "mesh", mesh)
         self._check_placement(mesh.edges)
 
+    @property
+    def offset(self) -> float:
+        return 0.5 * self.material.thickness
+
     def facts(self, scene: Any) -> str:
         amounts = f"{self.surface.area:.6g} m^2, {self.lumped_masses().sum():.6g} kg"
         return f"{self.material.facts(scene)}, {len(self.triangles)} triangles, {amounts}"

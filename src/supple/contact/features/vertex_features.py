@@ -218,9 +218,12 @@ def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, tri
                         n = _add(codes, signs, first, n, feature, 1 - shared)
                 around, sides = _sharing_vertex(pairs, rows, k, begin, end, triangles, triangle_edges, edges, q)
                 away = subtract(p, row(x, q))
-                # The triangles and edges of a closed fan cancel, those of an open one leave one.
-                if around > 1 and around >= sides and dot(away, away) < reach * reach:
-                    n = _add(codes, signs, first, n, len(triangles) + len(edges) + q, 1 + around - sides)
+                # The triangles and edges of a closed fan cancel, those of an open one leave one. Edges of rods have no
+                # sides to cancel.
+                of_rod = triangles[t, 1] == triangles[t, 2]
+                if around > 1 and (of_rod or around >= sides) and dot(away, away) < reach * reach:
+                    times = 1 - around if of_rod else 1 + around - sides
+                    n = _add(codes, signs, first, n, len(triangles) + len(edges) + q, times)
     left = 0
     for i in range(first, first + n):
         if signs[i] != 0:

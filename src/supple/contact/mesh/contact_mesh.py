@@ -16,7 +16,6 @@ from supple.model.system import System
 from supple.numerics.adjacency import Adjacency, adjacency, joined_lists, no_lists
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.geometry.triangle_crossings import crossing_triangles
-from supple.scene.shell import Shell
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +27,14 @@ class ContactMesh:
     Attributes
     ----------
     points : where the points are
-    triangles : (f, 3) points; edges : (e, 2) points, the lower first, in lexicographic order
-    triangle_edges : (f, 3) edge k joins the corners k and k + 1
-    edge_triangles, vertex_triangles : the triangles at each edge (one at a boundary, two on a manifold) and each point
+    triangles : (f, 3) points; edges of rods are triangles whose last two corners are the same
+    edges : (e, 2) points, the lower first, in lexicographic order
+    triangle_edges : (f, 3) edge k joins the corners k and k + 1; of an edge of a rod itself three times
+    edge_triangles, vertex_triangles : the triangles at each edge (none at one of a rod, one at a boundary, two on a
+        manifold) and each point
     neighbors : the points that an edge joins to each point
     owner : (s,) number of the body, or (number of bodies) + number of the obstacle, of each point
-    areas, edge_areas : (s,), (e,) a third of the adjacent triangles' area at rest [m^2]
+    areas, edge_areas : (s,), (e,) a third of the adjacent triangles' area at rest; of rods, width times length [m^2]
     edge_lengths : (e,) at rest [m]
     body_count : how many of the owners are bodies; names : of all owners
     collide : (p, p) which owners may touch
@@ -123,9 +124,7 @@ def contact_mesh(
 
 def _offsets(system: System) -> NDArray[np.float64]:
     """(p,) of bodies, then obstacles; see `ContactMesh`."""
-    bodies = [part.body for part in system.bodies]
-    of_bodies = [0.5 * body.material.thickness if isinstance(body, Shell) else 0.0 for body in bodies]
-    return np.array(of_bodies + [0.0] * len(system.obstacles))
+    return np.array([part.body.offset for part in system.bodies] + [0.0] * len(system.obstacles))
 
 
 def points_of_stitches(system: System, obstacles: tuple[ObstacleRange, ...]) -> NDArray[np.int32]:
@@ -191,29 +190,37 @@ def mesh_of_triangles(
     s = len(points)
     triangles = np.ascontiguousarray(triangles, dtype=np.int32)
     owner = np.ascontiguousarray(owner, dtype=np.int32)
-    keys, side = np.unique(edge_keys(triangles, s), return_inverse=True)
+    of_rod = triangles[:, 1] == triangles[:, 2]
+    keys = edge_keys(triangles, s)
+    keys[of_rod] = keys[of_rod, :1]
+    keys, side = np.unique(keys, return_inverse=True)
     edges = np.ascontiguousarray(np.column_stack(np.divmod(keys, s)).astype(np.int32))
     triangle_edges = np.ascontiguousarray(side.reshape(-1, 3).astype(np.int32))
     each = np.repeat(np.arange(len(triangles)), 3)
     a, b, c = rest[triangles].transpose(1, 0, 2)
+    offsets = np.zeros(s) if offsets is None else offsets
     doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     thirds = np.repeat(doubled / 6.0, 3)
+    widths = (2.0 * offsets[triangles[:, 0]] * np.linalg.norm(b - a, axis=1))[of_rod]
+    of_edges, of_corners = thirds.copy(), thirds.reshape(-1, 3)
+    of_edges.reshape(-1, 3)[of_rod] = widths[:, None] / 3.0
+    of_corners[of_rod] = widths[:, None] * np.array([0.5, 0.25, 0.25])
+    sided = np.repeat(~of_rod, 3)
     patches, stitched = patches_of(triangles, triangle_edges, owner, rest), None
     if stitches is not None and (len(stitches[0]) or welded is not None):
         mesh = triangles, edges, triangle_edges, patches
         stitched = stitch_filter(mesh, *stitches, owner, collide, welded, touching)
-    offsets = np.zeros(s) if offsets is None else offsets
     return ContactMesh(
         points=points,
         triangles=triangles,
         edges=edges,
         triangle_edges=triangle_edges,
-        edge_triangles=adjacency(triangle_edges.ravel(), each, len(edges)),
+        edge_triangles=adjacency(triangle_edges.ravel()[sided], each[sided], len(edges)),
         vertex_triangles=adjacency(triangles.ravel(), each, s),
         neighbors=adjacency(edges.ravel(), edges[:, ::-1].ravel(), s),
         owner=owner,
-        areas=np.bincount(triangles.ravel(), weights=thirds, minlength=s).astype(np.float64),
-        edge_areas=np.bincount(triangle_edges.ravel(), weights=thirds, minlength=len(edges)).astype(np.float64),
+        areas=np.bincount(triangles.ravel(), weights=of_corners.ravel(), minlength=s).astype(np.float64),
+        edge_areas=np.bincount(triangle_edges.ravel(), weights=of_edges, minlength=len(edges)).astype(np.float64),
         edge_lengths=np.linalg.norm(rest[edges[:, 0]] - rest[edges[:, 1]], axis=1),
         body_count=body_count,
         names=names,

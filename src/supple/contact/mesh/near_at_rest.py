@@ -1,6 +1,6 @@
-"""Pairs of a shell with itself that never collide: they are nearer to each other at rest than its thickness.
+"""Pairs of a shell or a rod with itself that never collide: they are nearer at rest than its thickness.
 
-Only what is near along the surface counts: parts that are joined by triangles which are near, too. Layers of a shell
+Only what is near along it counts: parts that are joined by triangles, or edges of a rod, which are near, too. Layers
 that lie on each other at rest collide.
 """
 
@@ -49,17 +49,20 @@ def near_at_rest(
         for found, out in zip(search.find(rest, np.zeros_like(rest), reach), (of_points, of_edges), strict=True):
             out.append(found.astype(np.int64))
     points, pairs = np.concatenate(of_points), np.concatenate(of_edges)
+    # Triangles join at edges, edges of rods at points.
+    joints = np.where((triangles[:, 1] == triangles[:, 2])[:, None], e + triangles, triangle_edges)
+    joined_at = adjacency(joints.ravel(), np.repeat(np.arange(f), 3), e + s)
     sides = adjacency(triangle_edges.ravel(), np.repeat(np.arange(f), 3), e)
     # What each point is near to, with the triangles that have it; of edges, the triangles of edges.
     own = np.column_stack([triangles.ravel(), np.repeat(np.arange(f), 3)]).astype(np.int64)
-    points = points[_are_joined(points, own, triangle_edges, sides, s)]
+    points = points[_are_joined(points, own, joints, joined_at, s)]
     both = np.concatenate([pairs, pairs[:, ::-1]])
     row, triangle = _expanded(both[:, 1], sides).T
     near = np.column_stack([both[row, 0], triangle])
     around = adjacency(triangles.ravel(), np.repeat(np.arange(f), 3), s)
     ends = [_expanded(edges[:, side], around) for side in (0, 1)]
     joined = np.zeros(len(both), dtype=np.bool_)
-    joined[row[_are_joined(near, np.concatenate(ends), triangle_edges, sides, e)]] = True
+    joined[row[_are_joined(near, np.concatenate(ends), joints, joined_at, e)]] = True
     both = both[joined]
     both = np.concatenate([both, both[:, ::-1]])
     return adjacency(points[:, 0], points[:, 1], s), adjacency(both[:, 0], both[:, 1], e)
@@ -76,18 +79,18 @@ def _expanded(points: NDArray[np.integer], lists: Adjacency) -> NDArray[np.int64
 def _are_joined(
     near: NDArray[np.int64],
     own: NDArray[np.int64],
-    triangle_edges: NDArray[np.int32],
-    sides: Adjacency,
+    joints: NDArray[np.int32],
+    joined_at: Adjacency,
     count: int,
 ) -> NDArray[np.bool_]:
     """(k,) which of the pairs (k, 2) of things and triangles `near` them are joined to an `own` pair (m, 2) over common
-    edges of triangles that are near to the same thing."""
-    f = len(triangle_edges)
+    joints of triangles that are near to the same thing."""
+    f = len(joints)
     codes = np.unique(np.concatenate([near, own]) @ [f, 1])
     thing, triangle = np.divmod(codes, f)
     one, other = [], []
     for k in range(3):
-        expanded = _expanded(triangle_edges[triangle, k], sides)
+        expanded = _expanded(joints[triangle, k], joined_at)
         wanted = thing[expanded[:, 0]] * f + expanded[:, 1]
         at = np.minimum(np.searchsorted(codes, wanted), len(codes) - 1)
         found = codes[at] == wanted

@@ -12,7 +12,6 @@ from supple.contact.mesh.obstacles import placed_with_obstacles, with_obstacles
 from supple.mesh.closed_surfaces import is_closed
 from supple.mesh.topology import connected_components
 from supple.model.system import System
-from supple.scene.shell import Shell
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ def start_surfaces(system: System, positions: NDArray[np.float64], time: float) 
     count = bodies + len(system.obstacles)
     x = placed_with_obstacles(extended, ranges, np.asarray(positions, dtype=np.float64), time)
     planes, rooms, solid = [], [], np.ones(count, dtype=np.bool_)
-    solid[:bodies] = [not isinstance(part.body, Shell) for part in system.bodies]
+    solid[:bodies] = [part.body.offset == 0.0 for part in system.bodies]
     for part in ranges:
         thing, corners = bodies + part.index, x[part.vertices]
         if part.is_plane:

@@ -16,6 +16,7 @@ from supple.results.check.trajectory import Snapshot, Trajectory
 from supple.results.recording.reader import Recording
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import pair_table
+from supple.scene.holders import clamped, holders
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.joint import Joint
 from supple.scene.joints.placed import placed_joints
@@ -94,16 +95,9 @@ def _joined(parts: Iterable[NDArray]) -> NDArray:
 
 
 def _shell(part: BodyRows, scene: Scene) -> StoredByShell:
-    body, welding = part.body, scene.welding
+    body = part.body
     assert isinstance(body, Shell)
-    holder = np.full(len(body.points), -1)
-    for number, pin in enumerate(scene.pins):
-        if pin.body == body.name:
-            holder[pin.select(body.place(body.points))] = number
-    own = (welding.vertices >= part.vertices.start) & (welding.vertices < part.vertices.stop)
-    holder[welding.vertices[own] - part.vertices.start] = len(scene.pins) + welding.weld[own]
-    corners = holder[body.triangles]
-    held = (corners[:, 0] >= 0) & (corners == corners[:, :1]).all(axis=1)
+    held = clamped(holders(scene)[part.vertices], body.triangles)
     return StoredByShell(body.points, body.triangles.astype(np.int64), body.material, held)
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from supple.scene.body import PlacedBody
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 
 ERROR = 1e-3
@@ -55,7 +56,7 @@ def with_stiffness(
 
 
 def _mass(body: PlacedBody) -> float:
-    if isinstance(body, Shell):
+    if not len(body.mesh.tets):
         return float(body.lumped_masses().sum())
     densities = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(body.mesh.tets))
     return float(densities @ body.mesh.volumes)
@@ -72,6 +73,8 @@ def _squared_speed(body: PlacedBody) -> float:
 
 def _modulus(body: PlacedBody) -> float:
     """The largest 3 mu of a soft body's tets, or that of a shell [Pa]."""
+    if isinstance(body, Rod):
+        return body.material.youngs
     if isinstance(body, Shell):
         return 3.0 * body.material.mu
     return 3.0 * float(body.material.per_tet(len(body.mesh.tets)).mu.max())

@@ -32,6 +32,7 @@ from supple.solvers.implicit.energies.damping import quadratic_viscosity_of, vis
 from supple.solvers.implicit.energies.elasticity import elasticity_of, refuse_materials
 from supple.solvers.implicit.energies.potential import HessianBlocks
 from supple.solvers.implicit.energies.regularization import regularization_of
+from supple.solvers.implicit.energies.rods import RodViscosity
 from supple.solvers.implicit.energies.shells import ShellViscosity
 from supple.solvers.implicit.energies.stitch_damping import StitchViscosity
 from supple.solvers.implicit.energies.stitches import StitchEnergy
@@ -184,6 +185,7 @@ class Implicit(Solver):
             quadratic_viscosity_of(elasticity),
             StitchViscosity.of(system.stitching),
             ShellViscosity.of(system.shells),
+            RodViscosity.of(system.rods),
         )
         return Workspace(
             system,

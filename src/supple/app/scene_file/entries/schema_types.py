@@ -142,6 +142,7 @@ def _(validator: validators.Counts) -> Any:
 def _(validator: validators.ListOf) -> Any:
     kinds = {"numbers": Number, "vectors": Vector}
     kinds["pairs"] = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+    kinds["rows"] = Annotated[list[Index], Field(min_length=2, max_length=2)]
     lists = {
         "row" if thing == "numbers" else "rows": Annotated[
             list[kinds[thing]], Field(min_length=1, max_length=validator.most)

@@ -13,6 +13,7 @@ from supple.kinds.kind import Kind
 from supple.kinds.validators import COUNT, POSITIVE, Union
 from supple.model.system import BodyRange, System
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 
 
@@ -101,6 +102,8 @@ def _modulus(part: BodyRange, shear_moduli: NDArray[np.float64]) -> float:
     """Of one body [Pa]; of a rigid body, ten times the stress that its default stiffness is made for."""
     if isinstance(part.body, RigidBody):
         return _RIGID_SHARE * part.body.kappa
+    if isinstance(part.body, Rod):
+        return part.body.material.youngs
     if isinstance(part.body, Shell):
         return 3.0 * part.body.material.mu
     return 3.0 * float(np.mean(shear_moduli))
@@ -117,4 +120,5 @@ def largest_dhat(system: System) -> float:
     edges = np.concatenate(
         [np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)]
     )
+    edges = edges[edges > 0.0]  # an edge of a rod is a triangle with a corner twice
     return min(_DHAT_SHARE * smallest_diagonal(system), _EDGE_SHARE * float(np.percentile(edges, _SHORT_EDGES)))

@@ -18,6 +18,7 @@ from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import BY_LAW, TetMaterial
 from supple.materials.tet_energies import element_energies, element_models
 from supple.model.system import System
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 from supple.solvers.implicit.energies.law_elasticity import NO_PRESSURES, LawElasticity, LawElements
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
@@ -187,7 +188,7 @@ _NO_HESSIANS = np.zeros((0, 12, 12))
 def refuse_materials(system: System) -> None:
     """Raise `SolverError` where a body's material has no elastic energy; the text names the body."""
     for part in system.bodies:
-        if not isinstance(part.body, Shell) and not isinstance(part.body.material, Hyperelastic):
+        if not isinstance(part.body, (Shell, Rod)) and not isinstance(part.body.material, Hyperelastic):
             raise SolverError(
                 f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
                 "give it an elastic one such as StableNeoHookean"

@@ -54,4 +54,7 @@ def regularization_of(system: System) -> Regularization:
         squares = np.einsum("tpa,tpa->t", shells.gradients, shells.gradients)
         share = np.repeat(_SHARE * shells.mu * shells.thickness * shells.areas * squares, 3)
         stiffness += np.bincount(shells.triangles.ravel(), weights=share, minlength=len(stiffness))
+    if (rods := system.rods) is not None:
+        share = np.repeat(_SHARE * rods.section, 4)
+        stiffness += np.bincount(rods.nodes.ravel(), weights=share, minlength=len(stiffness))
     return Regularization(stiffness)

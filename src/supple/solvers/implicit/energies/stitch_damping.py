@@ -11,6 +11,7 @@ from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.stitching import Stitching
 from supple.solvers.implicit.energies.damping import Damping, QuadraticViscosity, StrainRate, Viscosity
 from supple.solvers.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.solvers.implicit.energies.rods import RodViscosity
 from supple.solvers.implicit.energies.shells import ShellViscosity
 from supple.solvers.implicit.energies.stitches import spring_energies, spring_gradients, spring_hessians
 from supple.solvers.implicit.energies.tet_elements import TetElements
@@ -55,7 +56,7 @@ class StitchViscosity:
         return StitchDamping(Damping(self.tets, tets), springs)
 
 
-Damper = Viscosity | QuadraticViscosity | StitchViscosity | ShellViscosity
+Damper = Viscosity | QuadraticViscosity | StitchViscosity | ShellViscosity | RodViscosity
 
 
 @dataclass(frozen=True, eq=False)

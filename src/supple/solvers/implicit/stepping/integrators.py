@@ -220,8 +220,11 @@ class Newmark(Integrator):
                 f"body {system.rigid_bodies[0].name!r}: Implicit(integrator='newmark') cannot simulate rigid bodies; "
                 "use 'bdf2'"
             )
-        if system.shells is not None:
-            return "Implicit: integrator='newmark' cannot simulate shells; use 'bdf2', 'backward_euler' or 'static'"
+        if system.shells is not None or system.rods is not None:
+            return (
+                "Implicit: integrator='newmark' cannot simulate shells and rods; use 'bdf2', 'backward_euler' or "
+                "'static'"
+            )
         if system.laws.material.flowing_laws:
             return (
                 "Implicit: integrator='newmark' cannot simulate Viscoelastic and J2Plastic, which flow to the end of a "

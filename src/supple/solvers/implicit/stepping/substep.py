@@ -19,6 +19,7 @@ from supple.solvers.implicit.energies.loads.pressure import drags_at, pressures_
 from supple.solvers.implicit.energies.loads.springs import soft_targets_at, springs_at
 from supple.solvers.implicit.energies.midpoint import ActingWithin
 from supple.solvers.implicit.energies.potential import Potential
+from supple.solvers.implicit.energies.rods import RodEnergy
 from supple.solvers.implicit.energies.shells import ShellEnergy
 from supple.solvers.implicit.energies.vertex_potential import VertexPotential, inertia
 from supple.solvers.implicit.inversion_guard import InversionGuard
@@ -316,6 +317,8 @@ def stored_and_loaded(
     terms: list[Potential] = [elasticity]
     if system.shells is not None:
         terms.append(ShellEnergy(system.shells))
+    if system.rods is not None:
+        terms.append(RodEnergy(system.rods))
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
     if forces.any():
