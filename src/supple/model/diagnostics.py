@@ -24,7 +24,7 @@ class Diagnostics:
     Attributes
     ----------
     min_det_F : smallest J over all tets, of quadratic ones at their nodes and quadrature points; of triangles of shells
-        their area over that at rest [-]
+        their area over that at rest, of edges of rods their length [-]
     kinetic_energy, elastic_energy : [J], elastic from the rest state
     potential_energy : of gravity [J], zero where all mass is at the origin
     stitch_energy : of all stitches, from their rest state [J]
@@ -63,6 +63,7 @@ def measure(system: System, state: State) -> Diagnostics:
         smallest = min(smallest, float(system.shells.area_ratios(x).min()))
     if system.rods is not None:
         elastic += system.rods.energy(x)
+        smallest = min(smallest, 1.0 + float(system.rods.stretches(x).min()))
     return Diagnostics(
         min_det_F=smallest,
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),

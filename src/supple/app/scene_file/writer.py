@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.scene_file.entries.body import RIGID, SHARED, SOFT
+from supple.app.scene_file.entries.body import RIGID, ROD, SHARED, SOFT
 from supple.app.scene_file.loader import validated
 from supple.app.scene_file.yaml_files import parse_yaml, yaml_text
 from supple.errors import MeshError, SceneError
@@ -42,6 +42,7 @@ from supple.scene.loads.points import Point, PointList, PointValidator
 from supple.scene.motion import MotionValidator
 from supple.scene.registry import PARTS
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rod import Rod
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox, Vertices
 from supple.scene.shell import Shell
@@ -158,6 +159,9 @@ def _body(body: Any, files: Files) -> dict[str, Any]:
     if isinstance(body, Shell):
         shell = _fields(body.material, files, body.name)
         return data | {"surfaces": [files.mesh(body.surface, body.name)], "shell": shell}
+    if isinstance(body, Rod):
+        own = _fields(body, files, body.name, ROD)
+        return data | {"rod": own | _fields(body.material, files, body.name)}
     material = body.material
     materials = material.materials if isinstance(material, Regions) else (material,)
     described = [

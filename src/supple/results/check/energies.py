@@ -32,7 +32,7 @@ def elastic_energy(at: Frame) -> float | None:
     if not knows_all_laws(of):
         return None
     total = _energy_of_edges_and_volumes(at)
-    total += sum(shell.energy(at.positions[body.vertices]) for body, shell in of.shells)
+    total += sum(stored.energy(at.positions[body.vertices]) for body, stored in of.thin)
     for rows, F, volumes in _at_points(at):
         kind, mu, lam = of.material.kind[rows], of.material.mu[rows], of.material.lam[rows]
         # (k,) the part of the first Lamé parameter of which a quadratic tet takes its mean J (docs/theory/locking.md)
@@ -107,7 +107,7 @@ def stiffness_scale(of: Known) -> float:
     """An energy [J] that round-off of elastic and stitch energies is measured by: of strains of a few percent
     everywhere."""
     total = (np.abs(of.material.mu) + np.abs(of.material.lam)) @ of.rest_volumes
-    total += sum(shell.scale for _, shell in of.shells)
+    total += sum(stored.scale for _, stored in of.thin)
     if of.stitching is not None:
         tets, springs = of.stitching.tets, of.stitching.springs
         total += (np.abs(tets.mu) + np.abs(tets.lam)) @ _volumes(tets.rest_shape_inverse)

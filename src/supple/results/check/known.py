@@ -20,6 +20,7 @@ from supple.materials.per_tet import TetMaterial
 from supple.model.state import SolverDetails
 from supple.results.check.geometry import quadratic_tets
 from supple.results.check.geometry.vectors import determinants, edge_vectors, inverses
+from supple.results.check.rods import StoredByRod
 from supple.results.check.shells import StoredByShell
 from supple.results.recording.frame import RecordedFrame
 from supple.results.recording.reader import Recording
@@ -95,7 +96,7 @@ class Known(ABC):
     times : (frames,) [s], or the numbers of frames; dt : from frame to frame [s]
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); material : of the tets
     quadratic : rows (k,), ascending, and nodes (k, 10) of the quadratic tets
-    shells : with what each stores
+    thin : shells and rods, with what each stores
     springs : for each body its law, where that is of edges and volumes
     allowed : (p, p) which bodies, then obstacles, must stay apart; None where all must
     joint_limits : of each joint the largest effort of its motor [N m] or [N], and rate [rad/s] or [m/s]
@@ -120,7 +121,7 @@ class Known(ABC):
     material: TetMaterial
     source: Recording | None = None
     implicit: bool = False
-    shells: Sequence[tuple[BodyRows, StoredByShell]] = ()
+    thin: Sequence[tuple[BodyRows, StoredByShell | StoredByRod]] = ()
     quadratic: tuple[Ints, NDArray[np.int32]] = np.zeros(0, np.int64), np.zeros((0, 10), np.int32)
     springs: Sequence[EdgesAndVolume | None] = ()
     obstacles: Sequence[Obstacle] = ()

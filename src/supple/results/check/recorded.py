@@ -11,6 +11,7 @@ from supple.materials.elastic import EdgesAndVolume
 from supple.materials.elastic_tets.laws import joined_materials, tet_material
 from supple.results.check.known import Cable, Cavity, Growing, Ints, Weld
 from supple.results.check.loads import combined, forces_of
+from supple.results.check.rods import StoredByRod
 from supple.results.check.shells import StoredByShell
 from supple.results.check.trajectory import Snapshot, Trajectory
 from supple.results.recording.reader import Recording
@@ -23,6 +24,7 @@ from supple.scene.joints.placed import placed_joints
 from supple.scene.loads.growth import Growth
 from supple.scene.loads.over_time import script_of
 from supple.scene.pins import Pin
+from supple.scene.rod import Rod
 from supple.scene.rows import BodyRows
 from supple.scene.scene import Scene
 from supple.scene.shell import Shell
@@ -46,7 +48,7 @@ class RecordedTrajectory(Trajectory):
         self.tets = _joined(part.body.mesh.tets + part.vertices.start for part in source.bodies).astype(np.int32)
         self.material = joined_materials([tet_material(b.material, len(b.mesh.tets), b.mesh.order) for b in bodies])
         self.springs = [b.material if isinstance(b.material, EdgesAndVolume) else None for b in bodies]
-        self.shells = [(part, _shell(part, source.scene)) for part in source.bodies if isinstance(part.body, Shell)]
+        self.thin = [(part, _thin(part, source.scene)) for part in source.bodies if isinstance(part.body, (Shell, Rod))]
         curved = [part for part in source.bodies if part.body.mesh.order == 2]
         if curved:
             numbers = _joined(np.arange(part.tets.start, part.tets.stop) for part in curved)
@@ -83,7 +85,8 @@ class RecordedTrajectory(Trajectory):
 
     def _pinned(self, pin: Pin) -> Ints:
         body = self.rows[pin.body].body
-        return pin.select(body.place(body.mesh.vertices)).astype(np.int64) + self.rows[pin.body].vertices.start
+        held = body.with_clamped(pin.select(body.place(body.mesh.vertices)))
+        return held.astype(np.int64) + self.rows[pin.body].vertices.start
 
     def _growing(self, load: Growth) -> Growing:
         rows, directions = load.growing(self.rows[load.body].body)
@@ -94,10 +97,12 @@ def _joined(parts: Iterable[NDArray]) -> NDArray:
     return np.concatenate(list(parts))
 
 
-def _shell(part: BodyRows, scene: Scene) -> StoredByShell:
-    body = part.body
+def _thin(part: BodyRows, scene: Scene) -> StoredByShell | StoredByRod:
+    body, own = part.body, holders(scene)[part.vertices]
+    if isinstance(body, Rod):
+        return StoredByRod(body, clamped(own, body.mesh.line))
     assert isinstance(body, Shell)
-    held = clamped(holders(scene)[part.vertices], body.triangles)
+    held = clamped(own, body.triangles)
     return StoredByShell(body.points, body.triangles.astype(np.int64), body.material, held)
 
 

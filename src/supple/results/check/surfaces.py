@@ -208,12 +208,12 @@ class Surfaces:
         labels = graph_components(self.points, *np.concatenate(parts).T)[triangles[:, 0]]
         order = np.argsort(labels, kind="stable")
         starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
-        pieces, shells = [], {body.number for body, _ in of.shells}
+        pieces, thin = [], {body.number for body, _ in of.thin}
         for rows in np.split(order, starts[1:]) if len(order) else []:
             own = triangles[rows]
             owner = int(self.owners[rows[0]])
             # A thing may be in a closed shell, which is hollow.
-            closed = _is_closed(own) and owner not in shells
+            closed = _is_closed(own) and owner not in thin
             pieces.append(Piece(owner, rows, closed, int(own[0, 0])))
         return tuple(pieces)
 

@@ -20,11 +20,13 @@ from supple.errors import SceneError
 from supple.kinds.kind import declared
 from supple.materials.material import Hyperelastic
 from supple.materials.registry import MATERIALS
+from supple.materials.rods.rod_material import RodMaterial
 from supple.materials.shells.shell_material import ShellMaterial
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body, PlacedBody
 from supple.scene.located import at
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 
 # What all kinds of bodies have, and what each has of its own beside the mesh, shape or surface.
@@ -32,6 +34,8 @@ SHARED = declared(PlacedBody)
 SOFT = {key: one for key, one in declared(Body).items() if key not in (*SHARED, "mesh", "material")}
 RIGID = {key: one for key, one in declared(RigidBody).items() if key not in (*SHARED, "shape")}
 SHELL = declared(ShellMaterial)
+ROD = {key: one for key, one in declared(Rod).items() if key not in (*SHARED, "material")}
+ROD_MATERIAL = declared(RodMaterial)
 
 
 class InitialModel(Model):
@@ -51,9 +55,10 @@ class BuiltBody:
 
 
 class BodyEntry(Model):
-    """One body. Give `mesh` (a file), `shape` or `surfaces`; and `material`, or `rigid` or `shell` for such a one."""
+    """One body. Give `mesh` (a file), `shape` or `surfaces`; and `material`, or `rigid` or `shell` for such a one. A
+    `rod` has its points itself."""
 
-    alternatives = ("mesh", "shape", "surfaces", "a body needs either `mesh` or `shape`; give one of them")
+    alternatives = ("mesh", "shape", "surfaces", "rod", "a body needs either `mesh` or `shape`; give one of them")
     # Of this class alone: the other keys are those of `body_model`.
     others: ClassVar[Sequence[str]] = ("regions", "initial", "order")
 
@@ -70,21 +75,27 @@ class BodyEntry(Model):
     @model_validator(mode="after")
     def _soft_or_rigid(self) -> BodyEntry:
         this: Any = self
-        if sum(one is not None for one in (this.material, this.rigid, this.shell)) != 1:
-            raise ValueError("a body needs either `material`, `rigid` or `shell`; give one of them")
+        if sum(one is not None for one in (this.material, this.rigid, this.shell, this.rod)) != 1:
+            raise ValueError("a body needs either `material`, `rigid`, `shell` or `rod`; give one of them")
         if this.surfaces is not None and this.material is not None:
             raise ValueError("`surfaces` are of rigid bodies and shells; give a soft one a `mesh` or a `shape`")
         if this.material is None:
             for key in (*self.others, *SOFT):
                 if getattr(self, key) is not None:
-                    raise ValueError(f"a {'shell' if this.rigid is None else 'rigid body'} has no `{key}`; remove it")
+                    kind = "shell" if this.shell is not None else "rigid body" if this.rod is None else "rod"
+                    raise ValueError(f"a {kind} has no `{key}`; remove it")
         return self
 
     def build(self, meshes: MeshStore) -> list[BuiltBody]:
         """The body, or all its copies."""
         this: Any = self
         shared = values_of(self, SHARED, meshes)
-        kinds = (this.rigid, self._rigid), (this.shell, self._shell), (this.material, self._soft)
+        kinds = (
+            (this.rigid, self._rigid),
+            (this.shell, self._shell),
+            (this.rod, self._rod),
+            (this.material, self._soft),
+        )
         alone = next(make for given, make in kinds if given is not None)(shared, meshes)
         copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
         digits = max(2, len(str(len(copies))))
@@ -114,6 +125,13 @@ class BodyEntry(Model):
         with at("shell"):
             material = ShellMaterial(**values_of(this.shell, SHELL, meshes))
         return Shell(surface=surface, material=material, **shared)
+
+    def _rod(self, shared: dict[str, Any], meshes: MeshStore) -> Rod:
+        """Without copies."""
+        this: Any = self
+        with at("rod"):
+            material = RodMaterial(**values_of(this.rod, ROD_MATERIAL, meshes))
+            return Rod(material=material, **shared, **values_of(this.rod, ROD, meshes))
 
     def _soft(self, shared: dict[str, Any], meshes: MeshStore) -> Body:
         """Without copies."""
@@ -164,6 +182,9 @@ def body_model() -> type[BodyEntry]:
         **of_sheet,
     )
     keys["shell"] = sheet | None, Field(default=None, description="instead of `material`: the body is a thin sheet")
+    of_rod: dict[str, Any] = typed_keys(Rod, ROD) | typed_keys(RodMaterial, ROD_MATERIAL)
+    rod: Any = create_model("RodModel", __base__=Model, __doc__="What makes a body a rod, along its points.", **of_rod)
+    keys["rod"] = rod | None, Field(default=None, description="instead of `material`: the body is a thin round rod")
     keys["regions"] = (
         list[region] | None,
         Field(default=None, min_length=1, max_length=1000, description=text),

@@ -42,8 +42,8 @@ class Records(FrameCheck):
         if len(apart):
             row = int(np.argmax(apart))
             yield float(apart[row]), f"det F of {of.name('tet', row)}"
-        shells = [shell.least_ratio(x[body.vertices]) for body, shell in of.shells]
-        J, largest = np.append(at.least_J, shells), np.append(sizes, np.ones(len(shells)))
+        thin = [stored.least_ratio(x[body.vertices]) for body, stored in of.thin]
+        J, largest = np.append(at.least_J, thin), np.append(sizes, np.ones(len(thin)))
         g, speeds = float(np.linalg.norm(of.gravity)), np.linalg.norm(v, axis=1)
         momentum, r = m @ v, x - m @ x / m.sum()
         turning = float(m @ (np.linalg.norm(r, axis=1) * speeds))

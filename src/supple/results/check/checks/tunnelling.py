@@ -169,9 +169,13 @@ class GoingOn(FrameCheck):
         volumes = np.abs(np.bincount(owners, np.einsum("ij,ij->i", a - a[0], areas) / 3.0, p))
         thickness = 2.0 * volumes / np.maximum(np.bincount(owners, np.linalg.norm(areas, axis=1), p), 1e-300)
         thickness[~np.array(surfaces.closed, dtype=bool) | (np.arange(p) >= surfaces.bodies)] = np.inf
+        for body, _ in self.of.thin:
+            thickness[body.number] = 2.0 * body.body.offset
         far = np.linalg.norm(means[:, None] - means, axis=2) + spread[:, None] + spread
         fast = surfaces.allowed & (far > np.minimum(thickness[:, None], thickness))
-        np.fill_diagonal(fast, False)
+        solid = np.ones(p, dtype=bool)
+        solid[[body.number for body, _ in self.of.thin]] = False
+        fast[solid, solid] = False
         if not fast.any():
             return []
         pairs = owners[surfaces.pairs(before.tree, before.points, at.points, fast)[1]]
@@ -196,13 +200,20 @@ class GoingOn(FrameCheck):
         first = met(high)
         first = np.where((surfaces.owners[first[:, 0]] == pair[0])[:, None], first, first[:, ::-1])
         x = before.points + high * dt * v0
-        for sign, rows in ((1.0, first[:, 1]), (-1.0, first[:, 0])):
-            normals = area_vectors(x, surfaces.triangles[rows])
+        closed = [surfaces.closed[k] for k in pair]
+        for sign, side in ((1.0, 1), (-1.0, 0)):
+            if any(closed) and not closed[side]:  # of two sides of a sheet, nothing says which is met
+                continue
+            normals = area_vectors(x, surfaces.triangles[first[:, side]])
             n += sign * (normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]).sum(axis=0)
-        n /= max(float(np.linalg.norm(n)), 1e-300)
         # (2, 2, 3) velocities of both where they meet, in both frames.
         v = np.stack([[v[surfaces.triangles[first[:, k]]].mean(axis=(0, 1)) for k in (0, 1)] for v in (v0, v1)])
         one, other = (at.points[surfaces.triangles[first[:, k]]].mean(axis=(0, 1)) for k in (0, 1))
+        if not n.any():  # edges of rods
+            n = np.cross(*(np.diff(x[surfaces.triangles[first[0, k], :2]], axis=0)[0] for k in (0, 1)))
+        n /= max(float(np.linalg.norm(n)), 1e-300)
+        if not any(closed):
+            n *= np.sign((v[0, 1] - v[0, 0]) @ n)
         begin, end = (v[:, 1] - v[:, 0]) @ n
         return bool(
             (other - one) @ n > 0.0
