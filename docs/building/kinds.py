@@ -7,14 +7,17 @@ from dataclasses import MISSING
 from typing import Any
 
 from supple.app.scene_file.document import scene_file_model as scene_file_model  # registers how values are written
+from supple.app.scene_file.entries.body import ROD
 from supple.app.scene_file.entries.kinds import keys_of
 from supple.kinds.kind import Kind, declared, first_paragraph
 from supple.materials.registry import MATERIALS
+from supple.materials.rods.rod_material import RodMaterial
 from supple.materials.shells.shell_material import ShellMaterial
 from supple.mesh.primitives.shape import SHAPES
 from supple.scene.joints.motors import MOTORS
 from supple.scene.registry import PARTS
 from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 from supple.solvers.registry import SOLVERS
 
@@ -44,9 +47,12 @@ def kinds_page() -> str:
         for kind in kinds:
             title = f"`kind: {kind.kind}` (`{kind.__name__}`)" if len(kinds) > 1 else f"`{kind.__name__}`"
             fields = declared(ShellMaterial if kind is Shell else kind)  # the others are those of all bodies
+            if kind is Rod:
+                fields = {key: one for key, one in fields.items() if key in ROD} | declared(RodMaterial)
             rows = [row for field in fields.items() for row in _rows(*field)]
             if name == "bodies":
                 below = {RigidBody: ": its own keys are below `rigid`", Shell: ": its own keys, below `shell`"}
+                below[Rod] = ": its own keys, below `rod`"
                 title = f"`{kind.__name__}`{below.get(kind, '')}"
             table = "\n".join(["| key | default | meaning |", "|---|---|---|", *rows])
             parts.append(f"### {title}\n\n{first_paragraph(kind)}\n\n{table}\n")

@@ -270,10 +270,14 @@ class ListOf(Validator):
     things: tuple[str, ...] = ("numbers",)
     most: int | None = None
 
-    def checked(self, value: Any, what: str) -> NDArray[np.float64]:
+    def checked(self, value: Any, what: str) -> NDArray[Any]:
         numbers = float_array(value, what, "give a list of numbers")
         if numbers.ndim == 0:
             raise SceneError(f"{what} is {value!r}; give a list of numbers")
+        if self.things == ("rows",):
+            if numbers.shape[1:] != (2,) or not np.array_equal(numbers, np.abs(numbers).astype(np.int32)):
+                raise SceneError(f"{what} are not pairs of whole numbers from 0; give rows such as [0, 1]")
+            return numbers.astype(np.int32)
         return numbers
 
 

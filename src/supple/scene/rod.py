@@ -51,11 +51,8 @@ class Rod(PlacedBody):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        edges = None if self.edges is None else np.asarray(self.edges)
-        if edges is not None and np.array_equal(edges, edges.astype(np.int64)):
-            edges = edges.astype(np.int64)
         try:
-            mesh = RodMesh(self.centerline, edges, self.material.radius)
+            mesh = RodMesh(self.centerline, self.edges, self.material.radius)
         except MeshError as error:
             raise SceneError(f"{self.label}: {error}") from None
         object.__setattr__(self, "mesh", mesh)

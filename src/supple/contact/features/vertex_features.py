@@ -209,7 +209,8 @@ def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, tri
     if end - begin > 1:
         for k in range(begin, end):
             t = pairs[rows[k], 1]
-            for i in range(3):
+            of_rod = triangles[t, 1] == triangles[t, 2]
+            for i in range(2 if of_rod else 3):
                 e, q = triangle_edges[t, i], triangles[t, i]
                 shared = _sharing_edge(pairs, rows, k, begin, end, triangle_edges, e)
                 if shared > 1:
@@ -220,7 +221,6 @@ def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, tri
                 away = subtract(p, row(x, q))
                 # The triangles and edges of a closed fan cancel, those of an open one leave one. Edges of rods have no
                 # sides to cancel.
-                of_rod = triangles[t, 1] == triangles[t, 2]
                 if around > 1 and (of_rod or around >= sides) and dot(away, away) < reach * reach:
                     times = 1 - around if of_rod else 1 + around - sides
                     n = _add(codes, signs, first, n, len(triangles) + len(edges) + q, times)

@@ -34,7 +34,8 @@ class ContactMesh:
         manifold) and each point
     neighbors : the points that an edge joins to each point
     owner : (s,) number of the body, or (number of bodies) + number of the obstacle, of each point
-    areas, edge_areas : (s,), (e,) a third of the adjacent triangles' area at rest; of rods, width times length [m^2]
+    areas, edge_areas : (s,), (e,) a third of the adjacent triangles' area at rest; of rods, of width times
+        length half at each end, and a third at the edge [m^2]
     edge_lengths : (e,) at rest [m]
     body_count : how many of the owners are bodies; names : of all owners
     collide : (p, p) which owners may touch
@@ -203,7 +204,7 @@ def mesh_of_triangles(
     thirds = np.repeat(doubled / 6.0, 3)
     widths = (2.0 * offsets[triangles[:, 0]] * np.linalg.norm(b - a, axis=1))[of_rod]
     of_edges, of_corners = thirds.copy(), thirds.reshape(-1, 3)
-    of_edges.reshape(-1, 3)[of_rod] = widths[:, None] / 3.0
+    of_edges.reshape(-1, 3)[of_rod] = widths[:, None] / 9.0  # at each of the three sides, which are one edge
     of_corners[of_rod] = widths[:, None] * np.array([0.5, 0.25, 0.25])
     sided = np.repeat(~of_rod, 3)
     patches, stitched = patches_of(triangles, triangle_edges, owner, rest), None
