@@ -76,6 +76,9 @@ def whole_scene():
         ),
         sp.RigidBody("c", BOX, density=500.0, position=(0.42, 0, 0)),
         sp.Shell("sheet", sheet, sp.ShellMaterial(youngs=1e5, poisson=0.3, thickness=1e-3), position=(0, -2, 0)),
+        sp.Rod(
+            "rope", [(0, 0, 0), (0.1, 0, 0), (0.2, 0.1, 0)], sp.RodMaterial(youngs=1e6, radius=0.01), position=(0, 5, 0)
+        ),
     ]
     obstacles = [
         sp.HalfSpace(point=(0, -3, 0), normal=(0.1, 1, 0.2), friction=0.3),

@@ -372,7 +372,7 @@ def test_the_table_of_the_documentation_has_every_key_of_every_kind():
     spec.loader.exec_module(page)
     text = page.kinds_page()
     definitions = json_schema()["$defs"]
-    for kind in {kind for part in PARTS.values() for kind in part.kinds} - {sp.Body, sp.RigidBody, sp.Shell}:
+    for kind in {kind for part in PARTS.values() for kind in part.kinds} - {sp.Body, sp.RigidBody, sp.Shell, sp.Rod}:
         (section,) = re.findall(rf"^### [^\n]*`{kind.__name__}`\)?\n(.*?)(?=^##|\Z)", text, flags=re.S | re.M)
         model = definitions.get(f"{kind.__name__}Model") or definitions[f"{kind.__name__}EntryModel"]
         keys = set(model["properties"]) - {"kind"}
@@ -380,6 +380,6 @@ def test_the_table_of_the_documentation_has_every_key_of_every_kind():
         assert not re.search(r"\| *\|$", section, flags=re.M), "a key has no description"
     bodies = text.partition("## bodies\n")[2].partition("\n## ")[0]
     keys = {*definitions["BodyModel"]["properties"], *definitions["RigidModel"]["properties"]}
-    keys |= definitions["ShellModel"]["properties"].keys()
-    of_files = {"regions", "order", "copies", "initial", "rigid", "shell"}
+    keys |= definitions["ShellModel"]["properties"].keys() | definitions["RodModel"]["properties"].keys()
+    of_files = {"regions", "order", "copies", "initial", "rigid", "shell", "rod"}
     assert {row.split("`")[1] for row in bodies.splitlines() if row.startswith("| `")} == keys - of_files

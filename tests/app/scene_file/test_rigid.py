@@ -83,7 +83,7 @@ def test_the_schema_and_the_resolved_file_know_them(scene_file, tmp_path):
         (
             "    rigid: {density: 2700}\n",
             "",
-            "2: bodies[0]: a body needs either `material`, `rigid` or `shell`; give one of them",
+            "2: bodies[0]: a body needs either `material`, `rigid`, `shell` or `rod`; give one of them",
         ),
         ("    friction: 0.4\n", "    initial: {scale: [1, 2, 1]}\n", "2: bodies[0]: a rigid body has no `initial`"),
         ("body: palm\n", "body: palm\n    vertices: [0]\n", "pin of body 'palm': a rigid body is held as a whole"),

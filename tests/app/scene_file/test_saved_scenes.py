@@ -147,9 +147,28 @@ def test_shells(tmp_path):
     saved(scene, tmp_path)
 
 
+def test_rods(tmp_path):
+    """An open line, and a long ring whose points and edges are in files."""
+    angles = 2.0 * np.pi * np.arange(40) / 40
+    ring = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(40)])
+    rope = sp.RodMaterial(youngs=1e6, poisson=0.3, radius=0.01, bending=1e-5, damping=0.01)
+    edges = np.column_stack([np.arange(40), (np.arange(40) + 1) % 40])
+    bodies = [
+        sp.Rod("rope", [[0, 0, 0], [0.1, 0, 0], [0.2, 0.05, 0]], rope, position=(0, 1, 0), velocity=(1, 0, 0)),
+        sp.Rod("ring", ring, sp.RodMaterial(youngs=1e7, radius=0.02), edges=edges, rest="straight", twist=1.5),
+    ]
+    saved(sp.Scene(bodies, pins=[sp.Pin("rope", [0, 1])]), tmp_path)
+
+
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
+        ("rod: {centerline: [[0, 0, 0]], youngs: 1, radius: 1}", "it has one point"),
+        ("rod: {centerline: [[0, 0, 0], [1, 0, 0]], youngs: 1, radius: 0}", "radius: is 0; it must be above 0"),
+        ("rod: {centerline: [[0, 0, 0], [1, 0, 0]], radius: 1}", "the key `youngs` is missing"),
+        ("rod: {centerline: [[0, 0, 0], [1, 0, 0]], edges: [[0, 2]], youngs: 1, radius: 1}", "edge 0 is \\[0, 2\\]"),
+        ("mesh: {file: bar.vtu}, rod: {centerline: [[0, 0, 0], [1, 0, 0]], youngs: 1, radius: 1}", "give one of them"),
+        ("order: 2, rod: {centerline: [[0, 0, 0], [1, 0, 0]], youngs: 1, radius: 1}", "a rod has no `order`"),
         ("mesh: {file: bar.vtu}, shell: {youngs: 1, poisson: 0.3, thickness: 1}", "a shell needs a surface"),
         ("mesh: {file: bar.vtu}, shell: {youngs: 1, poisson: 0.3}", "the key `thickness` is missing"),
         ("mesh: {file: bar.vtu}, order: 2, shell: {youngs: 1, poisson: 0.3, thickness: 1}", "a shell has no `order`"),
@@ -160,7 +179,7 @@ def test_shells(tmp_path):
         ),
     ],
 )
-def test_shells_that_are_none(tmp_path, keys, words):
+def test_shells_and_rods_that_are_none(tmp_path, keys, words):
     sp.shapes.box((1, 1, 1), (1, 1, 1)).save(tmp_path / "bar.vtu")
     (tmp_path / "scene.yaml").write_text(f"bodies: [{{name: cloth, {keys}}}]\n")
     with pytest.raises(sp.SceneError, match=words):
