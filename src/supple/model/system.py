@@ -286,11 +286,11 @@ def shells_of(scene: Scene) -> ShellElements | None:
 
 def rods_of(scene: Scene) -> RodElements | None:
     """The edges and joints of all rods, clamped where a pin or a weld holds both ends of an edge."""
-    parts = [part for part in rows_of(scene.bodies) if isinstance(part.body, Rod)]
+    parts = [(part.body, part.vertices) for part in rows_of(scene.bodies) if isinstance(part.body, Rod)]
     if not parts:
         return None
-    held = [clamped(holders(scene)[part.vertices], part.body.mesh.line) for part in parts]
-    return joined_rods([(p.body.elements(own), p.vertices.start) for p, own in zip(parts, held, strict=True)])
+    own = holders(scene)
+    return joined_rods([(body.elements(clamped(own[at], body.mesh.line)), at.start) for body, at in parts])
 
 
 def _quadratic_tets(ranges: list[BodyRange], rest_positions: NDArray[np.float64]) -> QuadraticTets | None:
