@@ -36,6 +36,10 @@ def test_a_surface_with_a_hole(rows_of):
     assert rows["size"] == "1 x 2 x 3 m"
     assert rows["volume"] == "none, the surface is open"
     assert "hole" in rows["problems"]
+    assert rows["as a shell"] == "possible: supple view open.stl --shell"
+    wing = sp.SurfaceMesh(box.vertices, np.concatenate([box.triangles, [[*box.triangles[0, :2], 7]]]))
+    wing.save("twice.obj")
+    assert "not possible: the edge" in rows_of("twice.obj")["as a shell"]
 
 
 @pytest.mark.parametrize("name", ["box.1.node", "box.msh", "box.vtu", "box.vtk"])

@@ -51,6 +51,7 @@ def test_a_surface_becomes_the_body_in_metres(tmp_path, capsys, factor, scale):
         (["scene.json"], "a scene file ends in .yaml"),
         (["no/where.yaml"], "does not exist"),
         (["--scale", "2"], "give --surface, too"),
+        (["--shell"], "--shell is of a surface; give --surface, too"),
         (["--surface", "missing.stl"], "missing.stl: "),
         (["--surface", "ball.stl", "--scale", "-1"], "scale must be"),
     ],

@@ -112,7 +112,7 @@ def test_the_page_of_a_recording_is_written_beside_it_and_opened(tmp_path, serve
         assert opened.pop() == page.as_uri()
         assert capsys.readouterr().out == f"{page}\n"
     assert main(["view", str(path), "--no-open"]) == ExitCode.OK
-    for more in (["--solver", "xpbd"], ["--port", "0"], ["--full"], [str(path)]):
+    for more in (["--solver", "xpbd"], ["--port", "0"], ["--full"], ["--shell"], [str(path)]):
         assert main(["view", str(path), *more]) == ExitCode.INPUT
     assert served == opened == []
 
@@ -132,6 +132,8 @@ def test_several_surfaces_stand_in_a_row_in_one_unit(tmp_path, served):
         assert x[:, 1].min() > 0.0
     assert all(a[:, 0].max() < b[:, 0].min() for a, b in pairwise(placed))
     assert served[0][0].title == "a, b, a"
+    assert main(["view", *map(str, files), "--shell", "--no-open"]) == ExitCode.OK
+    assert all(isinstance(body, sp.Shell) for body in served[1][0].scene.bodies)
 
 
 def test_reload_reads_the_scene_file_again(scene, served):

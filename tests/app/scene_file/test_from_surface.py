@@ -1,6 +1,8 @@
 """A surface file is a scene: a body above a floor, of a sensible size, material and number of tets."""
 
 import logging
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -89,3 +91,55 @@ def test_errors_name_the_surface(capsys):
     assert said.startswith("supple: part.stl: ")
     assert main(["run", "missing.stl"]) == 2
     assert "missing.stl" in capsys.readouterr().err
+
+
+CLOTH = sp.shapes.sheet(0.4, 0.3, 0.05)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1000.0])
+def test_an_open_surface_is_a_shell_above_a_floor(caplog, factor):
+    CLOTH.transformed(factor, HALF_TURN, (30.0, -2.0, 5.0)).save("cloth.obj")
+    with caplog.at_level(logging.INFO):
+        run = load_run("cloth.obj", shell=True)
+    (body,) = run.scene.bodies
+    assert isinstance(body, sp.Shell)
+    assert body.surface.area == pytest.approx(0.12)
+    assert body.material.thickness == 0.002
+    x = body.place(body.points)
+    assert np.allclose(x.mean(axis=0), [0.0, 0.04, 0.0], atol=2e-3)
+    assert "a shell of 96 triangles" in caplog.text
+    assert "--surface cloth.obj --shell" in caplog.text
+    *_, frame = sp.simulate(run.scene, run.solver, run.dt, 8)
+    assert frame.report.status == "converged"
+    assert 0.001 < frame.positions["cloth"][:, 1].min() < 0.04
+    # It stretches by less than a hundredth where it hangs.
+    assert body.material.density * 9.81 * 0.4 / body.material.youngs < 0.011
+
+
+def _broken(name):
+    x, triangles = CLOTH.vertices, CLOTH.triangles
+    if name == "turned":
+        return sp.SurfaceMesh(x, np.concatenate([triangles[:1, ::-1], triangles[1:]]))
+    if name == "three":
+        wing = [triangles[0, 0], triangles[0, 1], len(x)]
+        return sp.SurfaceMesh(np.concatenate([x, x[:1] + [0.0, 0.1, 0.0]]), np.concatenate([triangles, [wing]]))
+    return sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("turned.obj", "turned.obj: as a shell, the edge of vertices .* has two triangles that face different ways"),
+        ("three.obj", "three.obj: as a shell, the edge of vertices .* (more than two triangles|face different ways)"),
+        ("tets.vtu", "tets.vtu: as a shell, it needs a surface, and this is a mesh of tets; give a file of triangles"),
+        ("scene.yaml", "scene.yaml: `shell` is of a file of a surface; a body of a scene file has `shell: {...}`"),
+    ],
+)
+def test_what_cannot_be_a_shell_is_one_line_in_its_words(name, message, capfd):
+    if name == "scene.yaml":
+        Path(name).write_text("bodies: []", encoding="utf-8")
+    else:
+        _broken(name.partition(".")[0]).save(name)
+    for command in ("run", "view"):
+        assert main([command, name, "--shell", *["--no-open"] * (command == "view")]) == 2
+        assert re.search(message.replace("{...}", r"\{\.\.\.\}"), " ".join(capfd.readouterr().err.split()))

@@ -88,6 +88,7 @@ Seconds = Annotated[float | None, Parameter(converter=seconds)]
 CheckpointEvery = Annotated[Checkpoints, Parameter(converter=checkpoints, n_tokens=1, accepts_keys=False)]
 Confine = Annotated[bool, Parameter(negative="")]
 Yes = Annotated[bool, Parameter(name=["--yes", "-y"], negative="")]
+Shell = Annotated[bool, Parameter(negative="")]
 Overwrite = Annotated[bool, Parameter(negative="")]
 
 

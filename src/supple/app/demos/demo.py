@@ -11,10 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.start.intersections import intersections_of
+from supple.contact.start.surfaces import start_surfaces
 from supple.errors import SolverError
+from supple.mesh.surface import SurfaceMesh
 from supple.model.state import Status
 from supple.model.system import BodyRange
 from supple.results.frame import Frame
+from supple.scene.contact_pairs import pair_table
 from supple.scene.scene import Scene
 from supple.solvers.solver import Solver
 
@@ -77,6 +81,11 @@ class Measurement(ABC):
         min_J = min(self.series["min_J"])
         return Claim("no tetrahedron inverts", f"smallest J {min_J:.3g}", min_J > 0.0)
 
+    def nothing_crosses(self) -> Claim:
+        """For demos whose `values` have "meetings"."""
+        total = sum(self.series["meetings"])
+        return Claim("nothing crosses or touches anything in any frame, by exact tests", f"{total} pairs", total == 0)
+
     def end(self) -> None:  # noqa: B027 - most demos have nothing to do here
         """Called when the run is over."""
 
@@ -138,6 +147,19 @@ class Demo:
 def body_range(frame: Frame, name: str) -> BodyRange:
     """The rows of the frame's flat arrays that belong to that body."""
     return next(part for part in frame.system.bodies if part.name == name)
+
+
+def meetings(frame: Frame) -> int:
+    """How many pairs of things have surfaces that are not apart, and how many cross themselves."""
+    surfaces = start_surfaces(frame.system, frame.state.positions, frame.time)
+    return len(intersections_of(surfaces, pair_table(frame.system.scene)))
+
+
+def area_ratios(frame: Frame, first: Frame, name: str) -> NDArray[np.float64]:
+    """(t,) areas of the triangles of a shell, over those in the first frame."""
+    triangles = body_range(frame, name).boundary
+    now, start = (SurfaceMesh(one.positions[name], triangles).area_vectors for one in (frame, first))
+    return np.linalg.norm(now, axis=1) / np.linalg.norm(start, axis=1)
 
 
 def volume(frame: Frame, name: str) -> float:

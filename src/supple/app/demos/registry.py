@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from supple.app.demos.bag import BAG
+from supple.app.demos.balloon import BALLOON
 from supple.app.demos.bears import BEARS
 from supple.app.demos.compliance import COMPLIANCE
+from supple.app.demos.cuff import CUFF
 from supple.app.demos.demo import Demo
+from supple.app.demos.drape import DRAPE
 from supple.app.demos.gripper import GRIPPER
 from supple.app.demos.pneunet import PNEUNET
 from supple.app.demos.squash import SQUASH
@@ -13,7 +17,7 @@ from supple.app.demos.stretch import STRETCH
 from supple.app.demos.twist import TWIST
 from supple.errors import SceneError
 
-_ALL = (SQUASH, STRETCH, COMPLIANCE, BEARS, STITCH, TWIST, PNEUNET, GRIPPER)
+_ALL = (SQUASH, STRETCH, COMPLIANCE, BEARS, STITCH, TWIST, PNEUNET, GRIPPER, DRAPE, BAG, BALLOON, CUFF)
 DEMOS: dict[str, Demo] = {demo.name: demo for demo in _ALL}
 
 

@@ -98,26 +98,28 @@ def load_scene(path: str | Path, *, confine: bool = False) -> Scene:
     return run.scene
 
 
-def load_run(path: str | Path, *, confine: bool = False, scale: float | None = None) -> Run:
+def load_run(path: str | Path, *, confine: bool = False, scale: float | None = None, shell: bool = False) -> Run:
     """The scene of a scene file, with its solver, timing and start.
 
     Parameters
     ----------
     path : of the scene file (YAML), of a robot (URDF), or of a surface, which becomes a body above a floor.
     confine : as of `load_scene`
-    scale : factor of the coordinates of a surface; see `scene_of_surface`
+    scale : factor of the coordinates of a surface; shell : whether it becomes a thin sheet; see `scene_of_surface`
 
     Raises
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
     store, suffix = (ConfinedMeshStore if confine else MeshStore)(Path(path).parent), Path(path).suffix.lower()
+    if shell and suffix not in MESH_FILES:
+        raise SceneError(f"{path}: `shell` is of a file of a surface; a body of a scene file has `shell: {{...}}`")
     if suffix in URDF_FILES:
         document = read_urdf(path, store)
         if pairs := overlaps(run_of(path, document, store).scene):
             document = document.with_pairs(pairs)
     else:
-        document = read_surface_scene(path, scale) if suffix in MESH_FILES else read_yaml(path)
+        document = read_surface_scene(path, scale, shell) if suffix in MESH_FILES else read_yaml(path)
     return run_of(path, document, store)
 
 

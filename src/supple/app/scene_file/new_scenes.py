@@ -1,6 +1,6 @@
 """The text of a new scene file, complete, with the most used keys and what they mean.
 
-A mesh file becomes a soft body above a floor, with a size, a material and a number of tets chosen for it.
+A mesh file becomes a soft body above a floor, with a size, a material and a number of tets chosen for it; or a shell.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.app.scene_file.yaml_files import YamlDocument, parse_yaml
-from supple.errors import SceneError
+from supple.errors import MeshError, SceneError
 from supple.mesh.mesh_file import load_mesh
 from supple.mesh.meshing.child_process import DEFAULT_TETS
 from supple.mesh.meshing.units import likely_scale
+from supple.mesh.shell_mesh import ShellMesh
+from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.solvers.auto import Counts, suits_xpbd
 from supple.solvers.xpbd.assessment.softening import FACTOR
@@ -43,13 +45,26 @@ _MESH = """\
     mesh: {{file: {file}, scale: {scale}{meshing}}}   # scale: 0.001 for a file in millimetres
 """
 
-_REST = """\
+_SOFT = """\
     material:
       kind: stable_neo_hookean   # or neo_hookean, fixed_corotated, arap, st_venant_kirchhoff, edges_and_volume
       youngs: {youngs}                # stiffness [Pa]: 1e4 is jelly, 1e6 is rubber
       poisson: 0.4               # 0 to below 0.5; near 0.5 the volume stays
       density: 1000              # [kg/m^3]
       damping: 0.01              # [s]; 0 rings
+"""
+
+_SHELL = """\
+    shell:                       # a thin sheet; the surface is its middle one, open or closed
+      thickness: {thickness}           # [m]
+      youngs: {youngs}                # stiffness [Pa]: 1e5 is soft, 1e6 is rubber
+      poisson: 0.3               # 0 to 0.5
+      density: 400               # [kg/m^3]
+      damping: 0.01              # [s]; 0 rings
+      # bending: 1e-6            # stiffness [N m]; without it, that of a homogeneous sheet: woven cloth has less
+"""
+
+_REST = """\
     position: [{x}, {height}, {z}]
     friction: 0.5
 
@@ -64,15 +79,20 @@ obstacles:
 gravity: [0, -9.81, 0]
 
 # {choice}
-solver: {{kind: auto, accuracy: 0.1}}   # or xpbd: fast; a smaller accuracy is stiffer and slower; implicit: exact
+solver: {solver}
 dt: 1/60               # from frame to frame
 steps: 120             # frames
 output: {{page: true, plot: true}}
 """
 
 
+_SOLVER = "{kind: auto, accuracy: 0.1}   # or xpbd: fast; a smaller accuracy is stiffer and slower; implicit: exact"
+_SOLVER_OF_SHELLS = "{kind: implicit}   # surfaces never cross, whatever happens"
+
 # The sag of a body under its own weight, as a part of its size, is about density * gravity * size / youngs.
 _SOFTEST, _LARGEST_SAG, _WEIGHT = 5e4, 0.05, 1000.0 * 9.81
+# A shell stretches less: 1 % where it hangs. Its thickness, as a share of its size, is that of felt on a table.
+_SHELL_SOFTEST, _SHELL_SAG, _SHELL_WEIGHT, _SHELL_THICKNESS = 1e5, 0.01, 400.0 * 9.81, 1 / 250
 
 
 def new_scene(name: str, *, radius: float = 0.1) -> str:
@@ -80,7 +100,7 @@ def new_scene(name: str, *, radius: float = 0.1) -> str:
     values = {"body": "ball", "radius": f"{radius:.4g}", "edge": f"{radius / 2.5:.4g}", "height": f"{2 * radius:.4g}"}
     tets = 4.0 / 3.0 * np.pi * 2.5**3 * 6.0 * np.sqrt(2.0)
     choice = _choice(4.0 / 3.0 * np.pi * radius**3, int(tets), "ball", _youngs(2 * radius))
-    return _text(name, _SHAPE, youngs=_youngs(2 * radius), x="0", z="0", choice=choice, **values)
+    return _text(name, _SHAPE + _SOFT, youngs=_youngs(2 * radius), x="0", z="0", choice=choice, **values)
 
 
 def new_scene_of(
@@ -93,6 +113,7 @@ def new_scene_of(
     volume: float,
     tets: int,
     meshing: str,
+    triangles: int | None = None,
 ) -> str:
     """The text of a scene with the mesh in `file`, multiplied by `scale`, above the middle of a floor.
 
@@ -103,6 +124,7 @@ def new_scene_of(
     scale : factor of coordinates; box : lowest and highest coordinates (3,), (3,) of the mesh after scaling [m]
     volume : that it encloses, after scaling [m^3]
     tets : about how many it has, or is filled with; meshing : further keys of the mesh, each after a comma
+    triangles : of a shell, how many it has; the three before say nothing of it
     """
     low, high = box
     size, middle = float((high - low).max()), 0.5 * (low + high)
@@ -114,15 +136,24 @@ def new_scene_of(
         "x": f"{-middle[0] + 0.0:.4g}",
         "z": f"{-middle[2] + 0.0:.4g}",
         "radius": f"{size / 2:.4g}",
-        "youngs": _youngs(size),
-        "choice": _choice(volume, tets, body, _youngs(size)),
+        "body": json.dumps(body),
     }
-    return _text(name, _MESH, body=json.dumps(body), **values)
+    if triangles is not None:
+        youngs = _modulus(max(_SHELL_SOFTEST, _SHELL_WEIGHT * size / _SHELL_SAG))
+        choice, thickness = f"About {triangles:,} triangles.", f"{_SHELL_THICKNESS * size:.1g}"
+        own = {"youngs": youngs, "thickness": thickness, "choice": choice, "solver": _SOLVER_OF_SHELLS}
+        return _text(name, _MESH + _SHELL, **values | own)
+    choice = _choice(volume, tets, body, _youngs(size))
+    return _text(name, _MESH + _SOFT, youngs=_youngs(size), choice=choice, **values)
 
 
 def _youngs(size: float) -> str:
     """Soft, but stiff enough to stand: Young's modulus [Pa] of a body of a size [m]."""
-    return f"{max(_SOFTEST, _WEIGHT * size / _LARGEST_SAG):.0e}".replace("e+0", "e").replace("e+", "e")
+    return _modulus(max(_SOFTEST, _WEIGHT * size / _LARGEST_SAG))
+
+
+def _modulus(value: float) -> str:
+    return f"{value:.0e}".replace("e+0", "e").replace("e+", "e")
 
 
 _ACCURACY, _DT, _POISSON, _DENSITY = 0.1, 1 / 60, 0.4, 1000.0  # of the text above
@@ -145,27 +176,28 @@ def _choice(volume: float, tets: int, body: str, youngs: str) -> str:
 
 
 def _text(name: str, entry: str, **values: str) -> str:
-    return _HEAD.format(name=name) + entry.format(**values) + _REST.format(**values)
+    return _HEAD.format(name=name) + (entry + _REST).format(**{"solver": _SOLVER} | values)
 
 
 logger = logging.getLogger(__name__)
 
 
-def read_surface_scene(path: str | Path, scale: float | None = None) -> YamlDocument:
-    """The scene of a file of a surface or of tets, as if a scene file beside it described it; `scale` as of
-    `scene_of_surface`.
+def read_surface_scene(path: str | Path, scale: float | None = None, shell: bool = False) -> YamlDocument:
+    """The scene of a file of a surface or of tets, as if a scene file beside it described it; see `scene_of_surface`.
 
     Raises
     ------
     MeshError : where the file cannot be read.
     """
     path = Path(path)
-    text, chosen = scene_of_surface(path, path.name, f"{path.stem}.yaml", scale)
-    logger.info("%s; to change it: supple new --surface %s", chosen, path)
+    text, chosen = scene_of_surface(path, path.name, f"{path.stem}.yaml", scale, shell)
+    logger.info("%s; to change it: supple new --surface %s%s", chosen, path, " --shell" if shell else "")
     return parse_yaml(text, path)
 
 
-def scene_of_surface(surface: Path, file: str, name: str, scale: float | None = None) -> tuple[str, str]:
+def scene_of_surface(
+    surface: Path, file: str, name: str, scale: float | None = None, shell: bool = False
+) -> tuple[str, str]:
     """The text of a scene file with the mesh in a file, and one line about what was chosen.
 
     Parameters
@@ -173,10 +205,12 @@ def scene_of_surface(surface: Path, file: str, name: str, scale: float | None = 
     surface : the file; file : its path in the text
     name : of the scene file, for its comments
     scale : factor of coordinates; None: 0.001 where the surface is longer than 10 m, otherwise 1
+    shell : whether it becomes a thin sheet
 
     Raises
     ------
-    MeshError : where the file cannot be read. SceneError : where the scale is not above 0 and finite.
+    MeshError : where the file cannot be read, or a shell cannot have its surface. SceneError : where the scale is not
+        above 0 and finite.
     """
     mesh = load_mesh(surface)
     loaded = mesh.surface if isinstance(mesh, TetMesh) else mesh
@@ -186,15 +220,29 @@ def scene_of_surface(surface: Path, file: str, name: str, scale: float | None = 
     low, high = (used * corner for corner in loaded.bounds)
     body = re.sub(r"[^A-Za-z0-9_-]+", "_", surface.stem)[:50] or "body"
     tets = len(mesh.tets) if isinstance(mesh, TetMesh) else DEFAULT_TETS
+    size = " x ".join(f"{value:.3g}" for value in high - low)
+    unit = f", taken to be in millimetres (scale: {used:g})" if scale is None and used != 1.0 else ""
+    if shell:
+        try:
+            triangles = len(_sheet(mesh).triangles)
+        except MeshError as error:
+            raise MeshError(f"{surface}: as a shell, {error}") from None
+        text = new_scene_of(name, file, body, used, (low, high), volume=0, tets=0, meshing="", triangles=triangles)
+        return text, f"{surface}: {size} m{unit}, a shell of {triangles:,} triangles"
     report = loaded.check()
     meshing = "" if mesh is not loaded else f", tets: {tets}" + (not report.ok) * ", repair: true"
     volume = max(abs(mesh.volume) * used**3, _THINNEST * float((high - low).max()) ** 3)
     text = new_scene_of(name, file, body, used, (low, high), volume=volume, tets=tets, meshing=meshing)
-    size = " x ".join(f"{value:.3g}" for value in high - low)
-    unit = f", taken to be in millimetres (scale: {used:g})" if scale is None and used != 1.0 else ""
     if mesh is not loaded:
         return text, f"{surface}: {size} m{unit}, {tets:,} tets"
     line = f"{surface}: {size} m{unit}, {len(loaded.triangles):,} triangles, about {tets:,} tets"
     if not report.ok:
         line += f"; it is repaired first: {report.problems[0].partition(':')[0]}"
     return text, line
+
+
+def _sheet(mesh: SurfaceMesh | TetMesh) -> SurfaceMesh:
+    """The surface of a shell; raises `MeshError` where it cannot be one."""
+    if isinstance(mesh, TetMesh):
+        raise MeshError("it needs a surface, and this is a mesh of tets; give a file of triangles")
+    return ShellMesh(mesh).surface

@@ -18,7 +18,7 @@ from supple.scene.body import PlacedBody
 _GAP = 0.2  # between two bodies, as a share of the second one's length
 
 
-def load_run_of(paths: Sequence[Path], *, confine: bool = False) -> Run:
+def load_run_of(paths: Sequence[Path], *, confine: bool = False, shell: bool = False) -> Run:
     """The scene of one file, as of `load_run`, or the bodies of several mesh files along x.
 
     Raises
@@ -26,12 +26,12 @@ def load_run_of(paths: Sequence[Path], *, confine: bool = False) -> Run:
     SceneError : where a file cannot be read, or one of several is not a mesh.
     """
     if len(paths) == 1:
-        return load_run(paths[0], confine=confine)
+        return load_run(paths[0], confine=confine, shell=shell)
     for path in paths:
         if path.suffix.lower() not in MESH_FILES:
             raise SceneError(f"{path}: only mesh files can be shown together; put the others into one scene file")
     scale = min(likely_scale(load_mesh(path).vertices) for path in paths)  # they are in the same unit
-    runs = [load_run(path, confine=confine, scale=scale) for path in paths]
+    runs = [load_run(path, confine=confine, scale=scale, shell=shell) for path in paths]
     bodies: list[PlacedBody] = []
     end = 0.0
     for run in runs:

@@ -118,9 +118,22 @@ def _surface_rows(surface: SurfaceMesh, file: Path) -> list[tuple[str, str]]:
         ("area", f"{surface.area:.6g} m^2"),
         ("volume", f"{surface.volume:.6g} m^3" if report.watertight else "none, the surface is open"),
         ("tets", tets),
+        ("as a shell", _as_shell(surface, file)),
         ("problems", "none" if report.ok else "\n".join(report.problems) + repair),
         *([("warning", hint)] if hint else []),
     ]
+
+
+def _as_shell(surface: SurfaceMesh, file: Path) -> str:
+    """Whether it can be one, see `Shell`."""
+    from supple.errors import MeshError
+    from supple.mesh.shell_mesh import ShellMesh
+
+    try:
+        ShellMesh(surface)
+    except MeshError as error:
+        return f"not possible: {error}"
+    return f"possible: supple view {file} --shell"
 
 
 def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:

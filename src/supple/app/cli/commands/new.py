@@ -8,6 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from supple.app.cli.arguments import Shell
 from supple.errors import SceneError
 
 
@@ -17,6 +18,7 @@ def new(
     *,
     surface: Path | None = None,
     scale: float | None = None,
+    shell: Shell = False,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Write a scene file with comments, to begin with: a ball, or a surface of yours, above a floor.
@@ -29,6 +31,8 @@ def new(
         STL, OBJ, PLY, OFF, GLB, glTF, DAE, 3MF, VTP, VTK, VTU, MSH, INP, MESH or USD file that becomes the body.
     scale
         Factor of the surface's coordinates; without it, 0.001 where the surface is longer than 10 m, otherwise 1.
+    shell
+        The surface becomes a thin sheet, such as cloth; it may be open.
     overwrite
         Replace the file where it exists.
     """
@@ -47,10 +51,12 @@ def new(
     if surface is None:
         if scale is not None:
             raise SceneError("--scale is of a surface; give --surface, too")
+        if shell:
+            raise SceneError("--shell is of a surface; give --surface, too")
         text = new_scene(scene.name)
     else:
         file = Path(os.path.relpath(surface.absolute(), scene.absolute().parent)).as_posix()
-        text, chosen = scene_of_surface(surface, file, scene.name, scale)
+        text, chosen = scene_of_surface(surface, file, scene.name, scale, shell)
         print(chosen)
     with whole_file(scene) as fresh:
         fresh.write_text(text, encoding="utf-8")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Confine, Overwrite, Seconds, Steps, Yes
+from supple.app.cli.arguments import ON_THE_WAY, CheckpointEvery, Confine, Overwrite, Seconds, Shell, Steps, Yes
 
 if TYPE_CHECKING:
     from supple.app.scene_file.loader import Run
@@ -22,6 +22,7 @@ def run(
     steps: Steps = None,
     dt: Seconds = None,
     solver: str | None = None,
+    shell: Shell = False,
     separate: Annotated[bool, Parameter(negative="")] = False,
     strict: Annotated[bool, Parameter(negative="")] = False,
     page: bool | None = None,
@@ -51,6 +52,8 @@ def run(
         Time from frame to frame [s], instead of the file's; 1/60 may be written as such.
     solver
         Kind of solver, instead of the file's, with its default parameters.
+    shell
+        Of a mesh: simulate its surface as a thin sheet, such as cloth; it may be open.
     separate
         Move bodies apart that intersect at the start, where a small translation separates them, and print the moves.
     strict
@@ -84,7 +87,7 @@ def run(
     products = Products(output, quiet=quiet, checkpoints=checkpoint_every, overwrite=overwrite)
     products.refuse_a_run()
     with reading(yes):
-        described = load_run(scene, confine=confine)
+        described = load_run(scene, confine=confine, shell=shell)
     if separate:
         described = moved_apart(described)
     used = described.solver if solver is None else solver_of_kind(solver)

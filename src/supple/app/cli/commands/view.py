@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from supple.app.cli.arguments import Yes, exported, recording_at, whole_number
+from supple.app.cli.arguments import Shell, Yes, exported, recording_at, whole_number
 
 if TYPE_CHECKING:
     from supple.app.viewer.protocol.live_source import LiveSource
@@ -28,6 +28,7 @@ def view(
     /,
     *more: Path,
     solver: str | None = None,
+    shell: Shell = False,
     full: Full = False,
     port: Port = None,
     open_: Open = True,
@@ -48,6 +49,8 @@ def view(
         Further surfaces: their bodies stand beside the first one.
     solver
         Kind of solver, instead of the file's, with its default parameters.
+    shell
+        Of a surface: simulate it as a thin sheet, such as cloth; it may be open.
     full
         Simulate with the meshes and the solver as they are. Without this, a scene that would be slower than real time
         gets meshes of fewer tets on the page, with the same skins, or another solver unless --solver is given.
@@ -65,7 +68,7 @@ def view(
     paths = [find_source(path) for path in (source, *more)]
     recordings = [path for path in paths if path.suffix.lower() in RECORDINGS]
     if recordings:
-        given = {"--solver": solver is not None, "--port": port is not None, "--full": full, "another file": more}
+        given = {"--solver": solver is not None, "--port": port is not None, "--full": full, "--shell": shell, "another file": more}
         show_recording(recordings[0], [name for name, value in given.items() if value], open_)
         return
 
@@ -77,7 +80,7 @@ def view(
         from supple.solvers.registry import solver_of_kind
 
         with reading(yes):
-            run = load_run_of(paths, confine=confine)
+            run = load_run_of(paths, confine=confine, shell=shell)
         if solver is not None:
             run = replace(run, solver=solver_of_kind(solver))
         used = run.chosen_solver
