@@ -42,6 +42,7 @@ class Sizes(NullSink):
 
     def begin(self, first, dt, steps):
         self.tets = sum(len(body.mesh.tets) for body in first.system.scene.bodies)
+        self.triangles = sum(len(body.triangles) for body in first.system.scene.bodies if isinstance(body, sp.Shell))
         self.dt, self.frames = dt, steps
 
     def write(self, frame):
@@ -84,7 +85,8 @@ def draw(name: str, folder: Path) -> dict[str, object]:
     image = picture.quantize(palette=palette_of(picture, dark=False), dither=Image.Dither.FLOYDSTEINBERG)
     PICTURES.mkdir(exist_ok=True)
     image.save(PICTURES / f"{name}.png", optimize=True)
-    return entry | {"solver": sizes.solver, "tets": sizes.tets, "frames": sizes.frames, "dt": sizes.dt}
+    counts = {"tets": sizes.tets} | ({"triangles": sizes.triangles} if sizes.triangles else {})
+    return entry | {"solver": sizes.solver, **counts, "frames": sizes.frames, "dt": sizes.dt}
 
 
 def main(names: list[str]) -> None:

@@ -82,10 +82,11 @@ def gallery() -> str:
             f"| {claim['text']} | {claim['measured']} | {'holds' if claim['holds'] else '**does not hold**'} |"
             for claim in demo.get("claims", ())
         ]
+        sheets = f"{demo['triangles']:,} triangles of shells, " if "triangles" in demo else ""
         measured = "| claim | measured | |\n|---|---|---|\n" + "\n".join(rows)
         parts.append(
             f"## {name}\n\n![{demo['summary']}](../images/gallery/{name}.png)\n\n{demo['explanation']}\n\n"
-            f"{demo['tets']:,} tets, {demo['frames']} frames of {demo['dt']:.4g} s, solver `{demo['solver']}`: "
+            f"{demo['tets']:,} tets, {sheets}{demo['frames']} frames of {demo['dt']:.4g} s, solver `{demo['solver']}`: "
             f"`{demo['command']}`\n\n" + (measured if rows else f"``` text\n{demo['prints']}```") + "\n"
         )
     return "\n".join(parts)

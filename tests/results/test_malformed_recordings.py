@@ -103,8 +103,8 @@ DAMAGES = {
     "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),
     "times are not finite": (_set("supple/frames/time", np.full(25, np.nan)), "time is not finite"),
     "unknown status": (_set("supple/frames/status", np.full(25, len(Status), dtype=np.uint8)), "another version"),
-    "newer format": (_of_format(99), "another version (format 99, this one reads 8); simulate it again"),
-    "earlier format": (_of_format(3), "another version (format 3, this one reads 8); simulate it again"),
+    "newer format": (_of_format(99), "another version (format 99, this one reads 9); simulate it again"),
+    "earlier format": (_of_format(3), "another version (format 3, this one reads 9); simulate it again"),
     "another program's": (_delete("supple"), "a VTKHDF UnstructuredGrid of another program"),
 }
 

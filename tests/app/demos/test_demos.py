@@ -1,23 +1,25 @@
 """Demos: each can be built for each of its solvers, the claims of the quick ones hold, and claims can fail."""
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from supple.app.cli.app import main
 from supple.app.cli.console import ExitCode
-from supple.app.demos import gripper, pneunet
-from supple.app.demos.demo import Claim, Demo, Measurement, stitch_lengths
+from supple.app.demos import cuff, gripper, pneunet
+from supple.app.demos.demo import Claim, Demo, Measurement, body_range, meetings, stitch_lengths
 from supple.app.demos.registry import DEMOS, find_demo
 from supple.errors import SceneError, SolverError
 from supple.model.state import Status
 from supple.model.system import build_system, initial_state
-from supple.simulate import simulate
+from supple.simulate import first_frame, simulate
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.solver import XPBD
 
+SHELLS = {"drape", "bag", "balloon", "cuff"}
 EVERY = [(name, kind) for name, demo in DEMOS.items() for kind in demo.kinds]
 SOLVERS = {"xpbd": XPBD, "implicit": Implicit}
 
@@ -30,7 +32,7 @@ def run(demo, kind, steps=None):
 
 
 def test_the_names_and_solvers_of_the_demos():
-    names = {"squash", "stretch", "compliance", "bears", "stitch", "twist", "pneunet", "gripper"}
+    names = {"squash", "stretch", "compliance", "bears", "stitch", "twist", "pneunet", "gripper"} | SHELLS
     assert {name for name, _ in EVERY} == names
     assert {kind for _, kind in EVERY} == set(SOLVERS)
     assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
@@ -68,6 +70,24 @@ def test_the_gripper_holds_its_box_and_not_a_slippery_one(monkeypatch):
     monkeypatch.setattr(gripper, "FRICTION", 0.1)
     lifted, *_ = run(DEMOS["gripper"], "implicit", steps=100)[1]
     assert not lifted.holds
+
+
+@pytest.mark.slow
+def test_the_cuff_does_not_lift_a_slippery_ball(monkeypatch):
+    monkeypatch.setattr(cuff, "FRICTION", 0.05)
+    lifted, *_ = run(DEMOS["cuff"], "implicit", steps=90)[1]
+    assert not lifted.holds
+
+
+def test_what_crosses_is_counted():
+    scene = DEMOS["drape"].scene()
+    state = initial_state(scene)
+    frame = first_frame(scene, state)
+    assert meetings(frame) == 0
+    cloth = body_range(frame, "cloth").vertices
+    through = state.positions.copy()
+    through[cloth, 1] -= 0.05
+    assert meetings(replace(frame, state=replace(state, positions=through))) == 2
 
 
 def test_both_solvers_stretch_the_ball_to_the_same_shape():

@@ -122,7 +122,9 @@ def _broken(name):
         return sp.SurfaceMesh(x, np.concatenate([triangles[:1, ::-1], triangles[1:]]))
     if name == "three":
         wing = [triangles[0, 0], triangles[0, 1], len(x)]
-        return sp.SurfaceMesh(np.concatenate([x, x[:1] + [0.0, 0.1, 0.0]]), np.concatenate([triangles, [wing]]))
+        return sp.SurfaceMesh(
+            np.concatenate([x, x[:1] + np.array([0.0, 0.1, 0.0])]), np.concatenate([triangles, [wing]])
+        )
     return sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1))
 
 

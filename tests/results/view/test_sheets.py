@@ -13,7 +13,7 @@ from supple.results.view.beside import sheet
 from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.normals import vertex_normals
 from supple.results.view.occlusion import occlusion
-from supple.results.view.surfaces import body_surface
+from supple.results.view.surfaces import body_surface, has_fields, surfaces_of
 
 T = 5e-3
 MATERIAL = sp.ShellMaterial(youngs=1e5, poisson=0.3, thickness=T)
@@ -38,7 +38,8 @@ def recording(tmp_path):
     ]
     path = tmp_path / "shells.vtkhdf"
     scene, solver = sp.Scene(bodies, gravity=(0, 0, 0)), sp.Implicit(contact=None)
-    list(sp.simulate(scene, solver, 1e-9, 1, initial_positions={"sheet": bent}, sinks=[sp.Recorder(path)]))
+    sink = sp.Recorder(path, fields=["von_mises"])
+    list(sp.simulate(scene, solver, 1e-9, 1, initial_positions={"sheet": bent}, sinks=[sink]))
     with sp.read_recording(path) as opened:
         yield opened
 
@@ -112,3 +113,34 @@ def test_a_page_gets_what_it_needs_to_draw_both_sides(recording):
     assert bent["beside"]["away"]["count"] == bent["corners"]["count"]
     assert bent["closed"]
     assert cube["closed"]  # its edges are sharp: vertices are there once for each side
+
+
+def test_paraview_sees_shells_as_triangles_beside_tets(recording, tmp_path, tools):
+    vtk, to_numpy = tools.vtk()
+    reader = vtk.vtkHDFReader()
+    reader.SetFileName(str(recording.path))
+    reader.UpdateInformation()
+    reader.SetStep(1)
+    reader.Update()
+    grid = reader.GetOutput()
+    counts = [len(body.boundary) for body in recording.bodies[:2]]
+    assert grid.GetNumberOfCells() == 48 + sum(counts)
+    assert [grid.GetCellType(k) for k in (0, 47, 48)] == [vtk.VTK_TETRA, vtk.VTK_TETRA, vtk.VTK_TRIANGLE]
+    ratios = to_numpy(grid.GetCellData().GetArray("det_F"))
+    np.testing.assert_allclose(ratios, 1.0, atol=3e-3)  # triangles of a pipe are chords
+    assert np.abs(ratios[48 : 48 + counts[0]] - 1.0).max() > 1e-4
+    np.testing.assert_array_equal(to_numpy(grid.GetCellData().GetArray("body")), np.repeat([2, 0, 1], [48, *counts]))
+    corners = to_numpy(grid.GetCells().GetConnectivityArray())[4 * 48 :].reshape(-1, 3)
+    np.testing.assert_array_equal(corners[: counts[0]], recording.bodies[0].boundary)
+    stresses = to_numpy(grid.GetCellData().GetArray("von_mises"))
+    assert np.isfinite(stresses[:48]).all()
+    assert recording[1].field("von_mises")["cube"].shape == (48,)
+    assert recording[1].det_F.shape == (48,)
+    assert sp.check_recording(recording.path).ok
+    recording.export("glb", tmp_path / "fields.glb")
+    recording.export("vtu", tmp_path / "last.vtu")
+
+
+def test_what_shows_a_field_has_tets(recording):
+    model = model_of_recording(recording)
+    assert [has_fields(surface) for surface in surfaces_of(model)] == [False, False, True]

@@ -82,8 +82,8 @@ CUFF = Demo(
     name="cuff",
     summary="a ring of a membrane is blown up around a soft ball, and lifts it",
     explanation=(
-        "The outer half of a ring, a membrane of 1 mm, is held. Air at 7 kPa blows up its inner half around a soft ball, "
-        "which it grips by friction, lifts and holds. Shell, cavity, pins and contact with friction act together."
+        "The outer half of a ring, a membrane of 1 mm, is held. Air at 7 kPa blows up its inner half around a soft "
+        "ball, which it grips by friction, lifts and holds. Shell, cavity, pins and contact with friction act together."
     ),
     scene=scene,
     solvers={"implicit": Implicit},

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from supple.contact.start.intersections import intersections_of
 from supple.contact.start.surfaces import start_surfaces
 from supple.errors import SolverError
-from supple.mesh.surface import SurfaceMesh
 from supple.model.state import Status
 from supple.model.system import BodyRange
 from supple.results.frame import Frame
@@ -153,13 +152,6 @@ def meetings(frame: Frame) -> int:
     """How many pairs of things have surfaces that are not apart, and how many cross themselves."""
     surfaces = start_surfaces(frame.system, frame.state.positions, frame.time)
     return len(intersections_of(surfaces, pair_table(frame.system.scene)))
-
-
-def area_ratios(frame: Frame, first: Frame, name: str) -> NDArray[np.float64]:
-    """(t,) areas of the triangles of a shell, over those in the first frame."""
-    triangles = body_range(frame, name).boundary
-    now, start = (SurfaceMesh(one.positions[name], triangles).area_vectors for one in (frame, first))
-    return np.linalg.norm(now, axis=1) / np.linalg.norm(start, axis=1)
 
 
 def volume(frame: Frame, name: str) -> float:

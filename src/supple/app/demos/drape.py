@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from supple.app.demos.demo import Claim, Demo, Measurement, area_ratios, meetings
+from supple.app.demos.demo import Claim, Demo, Measurement, body_range, meetings
 from supple.materials.elastic import StableNeoHookean
 from supple.materials.shells.shell_material import ShellMaterial
 from supple.mesh import shapes
 from supple.results.frame import Frame
+from supple.results.recording.sheet_cells import area_ratios
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.obstacles.sphere import Sphere
@@ -49,7 +50,7 @@ def scene() -> Scene:
 
 class _Measurement(Measurement):
     def values(self, frame: Frame) -> dict[str, Any]:
-        ratios = area_ratios(frame, self.first, "cloth")
+        ratios = area_ratios(body_range(frame, "cloth"), frame.positions["cloth"])
         return {"meetings": meetings(frame), "ratios": (float(ratios.min()), float(ratios.max()))}
 
     def claims(self) -> list[Claim]:
@@ -81,9 +82,9 @@ DRAPE = Demo(
     name="drape",
     summary="a cloth falls over a ball and a bear",
     explanation=(
-        "A cloth falls on a ball and on a gummy bear, slides, folds and comes to rest on both and on the floor. It is a "
-        "shell: triangles that stretch and bend, and touch with both sides, at half their thickness. The bear is soft "
-        "and yields; it touches with its skin. Surfaces stay apart in each step, and exact tests of each frame show it."
+        "A cloth falls on a ball and on a gummy bear, slides, folds and comes to rest on both and on the floor. It is "
+        "a shell: triangles that stretch and bend, and touch on both sides, half their thickness away. The bear is "
+        "soft and yields; it touches with its skin. Exact tests of each frame show that all surfaces stay apart."
     ),
     scene=scene,
     solvers={"implicit": Implicit},

@@ -18,7 +18,7 @@ from supple.results.view.floor_shadow import floor_shadow
 from supple.results.view.look import LOOKS, Look, floor_disc, theme
 from supple.results.view.model import Model, RenderFrame
 from supple.results.view.normals import vertex_normals
-from supple.results.view.surfaces import RigidSurface, SoftSurface
+from supple.results.view.surfaces import RigidSurface, SoftSurface, has_fields
 
 _SAMPLES = 64
 _PASSES = 8  # of a picture: what only one of them has is a firefly
@@ -191,7 +191,7 @@ class Tracer(Pictures):
             facing = np.einsum("ij,ij->i", np.cross(b - a, c - a), self._eye - a) > 0.0
             triangles = triangles[~facing]
         colors: NDArray[np.float64] | None = None
-        if self._field and self._limits and nodal is not None and isinstance(surface, SoftSurface):
+        if self._field and self._limits and nodal is not None and has_fields(surface):
             values = surface.of(np.repeat(nodal[:, None], 3, axis=1))[:, 0]
             colors = _linear(colors_of(self._field, values, self._limits))
             reflectance = {"type": "mesh_attribute", "name": "vertex_color"}

@@ -28,7 +28,7 @@ from supple.results.view.look import STITCH_COLOR, Color, Look, background, floo
 from supple.results.view.model import Model, RenderFrame
 from supple.results.view.normals import vertex_normals
 from supple.results.view.occlusion import occlusion
-from supple.results.view.surfaces import RigidSurface, SoftSurface, surfaces_of
+from supple.results.view.surfaces import RigidSurface, SoftSurface, has_fields, surfaces_of
 
 ANGLE = 30.0  # of the camera, upwards [degrees]
 _MOST_FRAMES = {"gif": 600, "mp4": 20_000, "png": 1}
@@ -68,7 +68,7 @@ class Pictures(ABC):
             if flat.is_floor:
                 continue
             surface = flat.creased(model)
-            if self._field is not None and number < len(model.bodies) and isinstance(surface, RigidSurface):
+            if self._field is not None and number < len(model.bodies) and not has_fields(surface):
                 surface = replace(surface, color=NOT_KNOWN_COLOR)  # it has no such values
             yield flat.hides_its_backs(model), surface
 
@@ -134,7 +134,7 @@ class Studio(Pictures):
         for closed, surface in self._surfaces(model):
             mesh = pyvista.PolyData.from_regular_faces(surface.at(render_frames[0]), surface.triangles)
             look: dict[str, Any] = _phong(surface.look) | {"color": _share(surface.color)}
-            if self._field is not None and ends is not None and isinstance(surface, SoftSurface):
+            if self._field is not None and ends is not None and has_fields(surface):
                 mesh.point_data["field"] = np.zeros(mesh.n_points)
                 colors = {"cmap": color_map(self._field), "clim": ends, "show_scalar_bar": False}
                 look = _FIELD | {"scalars": "field"} | colors

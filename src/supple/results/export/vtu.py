@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supple.mesh.surface import SurfaceMesh
 from supple.results.recording.reader import Recording
+from supple.results.recording.sheet_cells import area_ratios
 from supple.runtime.replacing import whole_file
 from supple.scene.shell import Shell
 
@@ -33,9 +33,7 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
         elif isinstance(body.body, Shell):
             triangles.append(body.boundary + starts[i])
             of_triangle += [i] * len(body.boundary)
-            at_rest = SurfaceMesh(body.body.points, body.boundary), SurfaceMesh(positions[i], body.boundary)
-            areas = [np.linalg.norm(surface.area_vectors, axis=1) for surface in at_rest]
-            ratios += (areas[1] / areas[0]).tolist()
+            ratios += area_ratios(body, positions[i]).tolist()
         else:
             nodes = body.body.mesh.nodes + starts[i]
             tets.append(body.tets)

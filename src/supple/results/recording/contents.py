@@ -28,6 +28,7 @@ from supple.results.recording.recorder import (
     field_series,
     frame_layout,
 )
+from supple.results.recording.sheet_cells import SheetCells
 from supple.scene.joints.placed import PlacedJoint, placed_joints
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rows import BodyRows, rows_of
@@ -67,9 +68,10 @@ class RecordedContents(Description):
         n, m, names = self.bodies[-1].vertices.stop, self.bodies[-1].tets.stop, self.scene.stitching.names
         breakable = len(names) if names.breakable else 0
         given = self.details, self.fields, self.sensors, flowing, breakable, self.functions
-        self.layout = frame_layout(n, m, len(self.obstacles), *given)
+        cells = m + len(SheetCells(self.bodies).triangles)
+        self.layout = frame_layout(n, cells, len(self.obstacles), *given)
         self._series = {series.path: series for series in self.layout.series}
-        own = [field_series(field, n, m).path for field in self.fields]
+        own = [field_series(field, 0, 0).path for field in self.fields]
         more = [*([INTERNAL] if flowing else []), *([BROKEN_STITCHES] if breakable else [])]
         for path in (*_READ_BY_FRAME, *own, _MESSAGE, *more):
             file.check_series(self._series[path], self._count)

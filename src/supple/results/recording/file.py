@@ -56,10 +56,10 @@ class Series:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a recording's frames hold, and how many points and tets each has."""
+    """What a recording's frames hold, and how many points and cells each has: tets, and triangles of shells."""
 
     points: int
-    tets: int
+    cells: int
     series: tuple[Series, ...]
 
     @property
@@ -254,7 +254,7 @@ def _write_steps(file: h5py.File, layout: Layout, written: int) -> None:
         steps[name] = steps["PartOffsets"]
     steps.create_group("PointDataOffsets")
     steps["PointDataOffsets/body"] = steps["PartOffsets"]
-    steps["CellDataOffsets/det_F"] = index * layout.tets
+    steps["CellDataOffsets/det_F"] = index * layout.cells
     steps["CellDataOffsets/body"] = steps["PartOffsets"]
     for series in layout.series:
         _, group, *name = series.path.split("/")

@@ -65,7 +65,7 @@ class RecordedFrame(TetReadings):
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
         """(m,) J of every tet, in the order of the bodies."""
-        return self._rows("VTKHDF/CellData/det_F")
+        return self._rows("VTKHDF/CellData/det_F")[: self.recording.bodies[-1].tets.stop]
 
     @cached_property
     def obstacle_poses(self) -> NDArray[np.float64]:
@@ -95,6 +95,7 @@ class RecordedFrame(TetReadings):
                 path = field_series(field, 0, 0).path
                 values = self._rows(path).reshape(-1, *field.shape).astype(np.float64)
                 bodies = self.recording.bodies
+                values = values[: bodies[-1].tets.stop] if field.at == "tets" else values
                 rows = {body.name: body.tets if field.at == "tets" else body.vertices for body in bodies}
                 rigid = [body.name for body in bodies if body.rigid]
                 return ByBody(values, rows, dict.fromkeys(rigid, "is rigid: a recording has no fields of its surface"))

@@ -23,6 +23,7 @@ from supple.results.recording.description import Description, described, write_d
 from supple.results.recording.details import RecordedDetails, RecordedSensor, recorded_sensors
 from supple.results.recording.file import TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.results.recording.functions import Values, function_series, values_at
+from supple.results.recording.sheet_cells import SheetCells
 from supple.runtime.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
 
 logger = logging.getLogger(__name__)
@@ -48,7 +49,7 @@ _FIRST_FRAMES, _FIRST_ROOM = 1 << 16, 1 << 30
 
 def frame_layout(
     points: int,
-    tets: int,
+    cells: int,
     obstacles: int,
     details: RecordedDetails,
     fields: Sequence[Field] = (),
@@ -64,7 +65,7 @@ def frame_layout(
     series = (
         Series("VTKHDF/Points", points, (3,)),
         Series("VTKHDF/PointData/velocities", points, (3,)),
-        Series("VTKHDF/CellData/det_F", tets),
+        Series("VTKHDF/CellData/det_F", cells),
         Series(TIMES, 1),
         Series("supple/frames/index", 1, (), "<i8"),
         Series("supple/frames/status", 1, (), "|u1"),
@@ -74,19 +75,19 @@ def frame_layout(
         Series("supple/frames/poses", 1, (obstacles, 3, 4)),
         Series("supple/frames/message", 1, (MESSAGE_BYTES,), "|u1"),
         *(field.series for field in details.fields),
-        *(field_series(field, points, tets) for field in fields),
+        *(field_series(field, points, cells) for field in fields),
         *(sensor.series for sensor in sensors),
         *([Series(INTERNAL, internal, (COLUMNS,))] if internal else []),
         *([Series(BROKEN_STITCHES, 1, (breakable,), "|u1")] if breakable else []),
         *function_series(functions).values(),
     )
-    return Layout(points, tets, series)
+    return Layout(points, cells, series)
 
 
-def field_series(field: Field, points: int, tets: int) -> Series:
+def field_series(field: Field, points: int, cells: int) -> Series:
     """Where a field is: VTK takes tensors as nine numbers."""
     shape = (9,) if field.shape == (3, 3) else field.shape
-    group, rows = ("CellData", tets) if field.at == "tets" else ("PointData", points)
+    group, rows = ("CellData", cells) if field.at == "tets" else ("PointData", points)
     return Series(f"VTKHDF/{group}/{field.name}", rows, shape, "<f4")
 
 
@@ -132,6 +133,7 @@ class Recorder:
         self._fields = checked_fields(fields)
         self._file: RecordingFile | None = None
         self._details = RecordedDetails()
+        self._sheets = SheetCells(())
         self._wanted = 0
         self._functions: list[Callable[..., Any]] = []
         self._at_start: Values = ()
@@ -156,7 +158,7 @@ class Recorder:
             statuses_of_codes=tuple(str(status) for status in Status),
         )
         if self._fields:
-            sizes = len(system.rest_positions), len(system.tets)
+            sizes = len(system.rest_positions), len(system.tets) + len(self._sheets.triangles)
             logger.info("%s: %s", self.path, cost(self._fields, *sizes, steps + 1))
         self._wanted = steps + 1
         capacity = self.first_capacity(layout)
@@ -181,7 +183,8 @@ class Recorder:
         self._details = RecordedDetails.like(first.report.details)
         self._functions = described(system.scene)[2]
         self._at_start = values_at(self._functions, 0.0)
-        sizes = len(system.rest_positions), len(system.tets), len(system.obstacles)
+        self._sheets = SheetCells(system.bodies)
+        sizes = len(system.rest_positions), len(system.tets) + len(self._sheets.triangles), len(system.obstacles)
         names, sensors = system.scene.stitching.names, recorded_sensors(system.scene)
         counts = count_of(system.laws.material), len(names) if names.breakable else 0
         return frame_layout(*sizes, self._details, self._fields, sensors, *counts, self._at_start)
@@ -256,7 +259,8 @@ class Recorder:
         file = self._file
         file.put("VTKHDF/Points", frame.state.positions)
         file.put("VTKHDF/PointData/velocities", frame.state.velocities)
-        file.put("VTKHDF/CellData/det_F", frame.det_F)
+        ratios = self._sheets.area_ratios(frame.state.positions)
+        file.put("VTKHDF/CellData/det_F", np.concatenate([frame.det_F, ratios]))
         file.put(TIMES, frame.time)
         file.put("supple/frames/index", frame.index)
         file.put("supple/frames/status", list(Status).index(report.status))
@@ -292,9 +296,10 @@ class Recorder:
         for sensor in recorded_sensors(frame.system.scene):
             file.put(sensor.series.path, readings[sensor.name].numbers())
         for field in self._fields:
-            series = field_series(field, len(frame.state.positions), len(frame.system.tets))
+            values = _recorded(field, frame)
+            values = self._sheets.with_nothing(values) if field.at == "tets" else values
             with np.errstate(over="ignore"):  # beyond single precision, a value is infinite
-                file.put(series.path, _recorded(field, frame).astype(np.float32))
+                file.put(field_series(field, 0, 0).path, values.astype(np.float32))
         file.commit()
 
 

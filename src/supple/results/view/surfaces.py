@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +149,11 @@ class RigidSurface(Surface):
 
     def _with_vertices(self, rows: NDArray[np.int64], triangles: NDArray[np.int32]) -> Self:
         return replace(self, vertices=self.vertices[rows], triangles=triangles)
+
+
+def has_fields(surface: SoftSurface | RigidSurface) -> TypeGuard[SoftSurface]:
+    """Whether it shows the fields of tets: neither a rigid body nor a shell has them."""
+    return isinstance(surface, SoftSurface) and surface.body.tets.stop > surface.body.tets.start
 
 
 def surfaces_of(model: Model, *, skins: bool = True, dark: bool = False) -> list[SoftSurface | RigidSurface]:

@@ -68,7 +68,8 @@ def view(
     paths = [find_source(path) for path in (source, *more)]
     recordings = [path for path in paths if path.suffix.lower() in RECORDINGS]
     if recordings:
-        given = {"--solver": solver is not None, "--port": port is not None, "--full": full, "--shell": shell, "another file": more}
+        given = {"--solver": solver is not None, "--port": port is not None, "--full": full, "--shell": shell}
+        given |= {"another file": bool(more)}
         show_recording(recordings[0], [name for name, value in given.items() if value], open_)
         return
 

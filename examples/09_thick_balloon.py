@@ -4,7 +4,7 @@ A liquid doubles the inner radius of a thick sphere. A ball that is blown up wit
 stretch of about 1.6; a given volume goes on. The pressure is compared with the closed form for incompressible
 Neo-Hookean material (Ogden, "Non-Linear Elastic Deformations", 1984, chapter 5).
 
-Run it:  python examples/09_balloon.py
+Run it:  python examples/09_thick_balloon.py
 """
 
 import numpy as np
