@@ -15,7 +15,7 @@ export interface Body extends Triangles {
   outside: Ref; reach: number;
   /** where vertices are drawn beside their points: cells of the body's points, from which the axes there follow, and
    * (k, d) distances along these axes [m] */
-  beside: { axes: "normals"; cells: Ref; away: Ref } | null;
+  beside: { axes: "normals" | "frames"; cells: Ref; away: Ref } | null;
 }
 
 export interface Obstacle extends Triangles {

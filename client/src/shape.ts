@@ -33,7 +33,7 @@ export function follow(skin: Skin, values: Float32Array | Uint8Array, width: num
 }
 
 /** The axes (n, d, 3) at points x (n, 3), as `AXES` of supple.results.view.beside. */
-const AXES = { normals };
+const AXES = { normals, frames };
 
 /** Moves vertices x (k, 3), which follow one point each of points, along the axes there. */
 export function moveBeside({ beside, corners, first }: Skin, points: Float32Array, x: Float32Array): void {
@@ -60,6 +60,18 @@ export function normals(x: Float32Array, triangles: Numbers, out: Float32Array):
   for (let i = 0; i < out.length; i += 3) {
     const length = Math.hypot(out[i], out[i + 1], out[i + 2]) || 1;
     out[i] /= length; out[i + 1] /= length; out[i + 2] /= length;
+  }
+}
+
+/** At the first material point of each edge (e, 4) of a rod: its frame, and from end to end, (n, 4, 3). */
+export function frames(x: Float32Array, edges: Numbers, out: Float32Array): void {
+  for (let k = 0; k < edges.length; k += 4) {
+    const [a, b, c, d] = [0, 1, 2, 3].map((p) => Array.from(x.subarray(3 * edges[k + p], 3 * edges[k + p] + 3)));
+    const e = b.map((value, i) => value - a[i]), length = Math.hypot(...e) || 1, t = e.map((value) => value / length);
+    const u = c.map((value, i) => value - d[i]), along = u[0] * t[0] + u[1] * t[1] + u[2] * t[2];
+    const n = u.map((value, i) => value - along * t[i]), size = Math.hypot(...n) || 1, v = n.map((value) => value / size);
+    const w = [t[1] * v[2] - t[2] * v[1], t[2] * v[0] - t[0] * v[2], t[0] * v[1] - t[1] * v[0]];
+    out.set([...v, ...w, ...t, ...e], 12 * edges[k + 2]);
   }
 }
 

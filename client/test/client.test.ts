@@ -3,7 +3,7 @@ import { test } from "node:test";
 import { Vector3 } from "three";
 import { Block, inflated, summed } from "../src/data.ts";
 import { Pace } from "../src/pace.ts";
-import { follow, keepOut, lighter, moveBeside, normals, placeTets, type Skin } from "../src/shape.ts";
+import { follow, frames, keepOut, lighter, moveBeside, normals, placeTets, type Skin } from "../src/shape.ts";
 import { framed } from "../src/view.ts";
 
 /** A sphere of triangles, each vertex of which follows a point of its own and, with weight 1/4, the first one. */
@@ -132,6 +132,12 @@ test("both sides of a sheet are half its thickness away, also of a lighter one",
     for (let t = 0; t < skin.triangles.length; t += 3) // none joins both sides
       assert.equal(new Set([0, 1, 2].map((i) => skin.beside!.away[skin.triangles[t + i]])).size, 1);
   }
+});
+
+test("a frame of an edge of a rod has its first material point ahead, and turns to the right", () => {
+  const x = Float32Array.from([0, 0, 0, 2, 0, 0, 1.1, 0.5, 0, 0.9, -0.5, 0]), axes = new Float32Array(48);
+  frames(x, Uint32Array.from([0, 1, 2, 3]), axes);
+  assert.deepEqual(Array.from(axes.subarray(24, 36)), [0, 1, 0, 0, 0, 1, 1, 0, 0, 2, 0, 0]);
 });
 
 test("tets are apart from the middle, and end at a cut", () => {

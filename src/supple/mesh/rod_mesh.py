@@ -42,6 +42,7 @@ class RodMesh(TetMesh):
 
     line: NDArray[np.int32]
     material_points: NDArray[np.int32]
+    radius: float
 
     _arguments: ClassVar[dict[str, str]] = {"points": "points", "edges": "line", "radius": "radius"}
 

@@ -1,19 +1,20 @@
-"""Shells are drawn with both sides, half their thickness away from their points, and with rims: in all pictures."""
+"""Shells are drawn with both sides, half their thickness away from their points, and with rims, and rods as tubes."""
 
 import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import supple as sp
 from supple.mesh.closed_surfaces import is_closed
 from supple.results.page.described import described_scene
 from supple.results.page.packed import Packer
-from supple.results.view.beside import sheet
+from supple.results.view.beside import sheet, tubes
 from supple.results.view.from_recording import model_of_recording, render_frame_of
 from supple.results.view.normals import vertex_normals
 from supple.results.view.occlusion import occlusion
-from supple.results.view.surfaces import body_surface, has_fields, surfaces_of
+from supple.results.view.surfaces import body_surface, has_fields, split_at_creases, surfaces_of
 
 T = 5e-3
 MATERIAL = sp.ShellMaterial(youngs=1e5, poisson=0.3, thickness=T)
@@ -144,3 +145,21 @@ def test_paraview_sees_shells_as_triangles_beside_tets(recording, tmp_path, tool
 def test_what_shows_a_field_has_tets(recording):
     model = model_of_recording(recording)
     assert [has_fields(surface) for surface in surfaces_of(model)] == [False, False, True]
+
+
+def test_a_rod_is_tubes_about_its_edges_that_turn_with_it():
+    material = sp.RodMaterial(youngs=1e6, radius=0.01)
+    rod = sp.Rod("rod", [[0, 0, 0], [0.1, 0, 0], [0.2, 0.1, 0]], material)
+    edges = np.hstack([rod.mesh.line, rod.mesh.material_points])
+    rows, triangles, beside = tubes(edges, 0.01)
+    R = Rotation.from_rotvec([0.3, 2.0, -1.0]).as_matrix()
+    for turn in (np.eye(3), R):
+        x = rod.points @ turn.T
+        drawn = x[rows] + beside.offsets(x, rows)
+        a, b = x[rod.mesh.line[np.repeat([0, 1], len(rows) // 2)]].swapaxes(0, 1)
+        share = np.clip(np.einsum("ki,ki->k", drawn - a, b - a) / np.einsum("ki,ki->k", b - a, b - a), 0.0, 1.0)
+        np.testing.assert_allclose(np.linalg.norm(drawn - a - share[:, None] * (b - a), axis=1), 0.01, rtol=1e-9)
+        assert is_closed(triangles)
+        volume = np.pi * 1e-4 * rod.lengths.sum() + 2.0 * 4.0 / 3.0 * np.pi * 1e-6
+        assert sp.SurfaceMesh(drawn, triangles).volume == pytest.approx(volume, rel=0.08)
+    assert len(split_at_creases(drawn, triangles)[0]) == len(rows)

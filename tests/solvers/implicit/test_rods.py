@@ -121,3 +121,31 @@ def test_momentum_and_spin_of_a_free_rod_are_kept(tmp_path):
     for name, share in (("linear_momentum", 1e-9), ("angular_momentum", 0.02)):  # BDF2 begins with backward Euler
         series = sp.read_recording(path).series(name)
         np.testing.assert_allclose(series[-1], series[0], atol=share * np.linalg.norm(series[0]))
+
+
+def overhand(radius=0.004, count=40):
+    """An open knot, as points at equal distances, and the direction from its begin to its end."""
+    s = 2.0 * np.linspace(-1.12, 1.12, 400)
+    x = np.column_stack([s**3 - 3 * s, s**4 - 4 * s**2, s**5 / 5 - 2 * s]) * [0.05, 0.03, 0.03]
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
+    places = np.linspace(0.0, along[-1], count + 1)
+    points = np.column_stack([np.interp(places, along, column) for column in x.T])
+    return points, (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
+
+
+def test_a_knot_that_is_pulled_tightens_and_does_not_pass_through_itself(tmp_path):
+    points, way = overhand()
+    n, length = len(points) - 1, float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    pull = 0.5 * (0.92 * length - (points[-1] - points[0]) @ way)
+    material = sp.RodMaterial(youngs=1e6, poisson=0.4, radius=0.004, density=1100.0, damping=0.01)
+    pins = [
+        sp.Pin("rope", rows, motion=sp.Keyframes([0, 1], [[0, 0, 0], list(sign * pull * way)]))
+        for rows, sign in (([0, 1], -1.0), ([n - 1, n], 1.0))
+    ]
+    scene = sp.Scene([sp.Rod("rope", points, material, friction=0.2)], gravity=(0, 0, 0), pins=pins)
+    frame = run(scene, tmp_path / "knot.h5", steps=60)
+    x = frame.positions["rope"][: n + 1]
+    widths = [np.linalg.norm(y - y[0] - np.outer((y - y[0]) @ way, way), axis=1).max() for y in (points, x)]
+    assert widths[0] > 0.2
+    assert 0.008 < widths[1] < 0.1  # a rope that had passed through itself would be straight
+    assert frame.report.min_distance is not None

@@ -5,17 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from supple.mesh.rod_mesh import RodMesh
 from supple.results.recording.reader import Recording
 from supple.results.recording.sheet_cells import area_ratios
 from supple.runtime.replacing import whole_file
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 
 
 def write_last_vtu(recording: Recording, output: Path) -> None:
     """Write the last frame: tets, velocities, J, body numbers and recorded fields; rigid bodies and shells as their
-    surfaces, and their ratios of areas as J."""
+    surfaces, with their ratios of areas as J, and rods as lines, with those of lengths."""
     import meshio
 
     frame = recording[-1]
@@ -34,11 +36,15 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
             triangles.append(body.boundary + starts[i])
             of_triangle += [i] * len(body.boundary)
             ratios += area_ratios(body, positions[i]).tolist()
+        elif isinstance(body.body, Rod):
+            mesh = body.body.mesh
+            parts.append(("line", mesh.line + starts[i], _stretches(positions[i], mesh), np.full(len(mesh.line), i)))
         else:
             nodes = body.body.mesh.nodes + starts[i]
             tets.append(body.tets)
             kind = "tetra" if nodes.shape[1] == 4 else "tetra10"
             parts.append((kind, nodes, frame.det_F[body.tets], np.full(len(nodes), i, dtype=np.int32)))
+    parts.sort(key=lambda part: part[0] == "line")
     if of_triangle:
         parts.append(("triangle", np.concatenate(triangles), np.array(ratios), np.array(of_triangle, dtype=np.int32)))
     at_points: dict[str, ArrayLike] = {"velocities": np.concatenate(velocities), "body": of_point}
@@ -49,7 +55,8 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
         empty = np.full((1, *values.shape[1:]), np.nan)
         if field.at == "tets":
             surfaces = [np.repeat(empty, len(of_triangle), axis=0)] if of_triangle else []
-            at_cells[field.name] = [values[rows] for rows in tets] + surfaces
+            lines = [np.repeat(empty, len(cells), axis=0) for kind, cells, _, _ in parts if kind == "line"]
+            at_cells[field.name] = [values[rows] for rows in tets] + lines + surfaces
         else:
             of_bodies = [
                 np.repeat(empty, len(x), axis=0) if body.rigid else values[body.vertices]
@@ -64,3 +71,9 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
     )
     with whole_file(output) as fresh:
         mesh.write(fresh, file_format="vtu")
+
+
+def _stretches(x: NDArray[np.float64], mesh: RodMesh) -> NDArray[np.float64]:
+    """(e,) the lengths of a rod's edges over those at rest."""
+    now, rest = (np.linalg.norm(np.diff(points[mesh.line], axis=1)[:, 0], axis=1) for points in (x, mesh.vertices))
+    return now / rest

@@ -13,11 +13,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from supple.mesh.closed_surfaces import is_closed
-from supple.results.view.beside import Beside, sheet
+from supple.results.view.beside import Beside, sheet, tubes
 from supple.results.view.look import OBSTACLE, Look, drawn_as, theme
 from supple.results.view.model import Model, RenderFrame
 from supple.results.view.skin_contact import kept_out
 from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.rod import Rod
 from supple.scene.rows import BodyRows
 from supple.scene.shell import Shell
 
@@ -68,7 +69,7 @@ class Surface(ABC):
 
 @dataclass(frozen=True, eq=False)
 class SoftSurface(Surface):
-    """The skin of a soft body, the boundary of its tets, or a sheet about its points.
+    """The skin of a soft body, the boundary of its tets, or a sheet or tubes about its points.
 
     Attributes
     ----------
@@ -182,7 +183,11 @@ def body_surface(model: Model, body: BodyRows, *, skins: bool = True) -> SoftSur
 
 
 def boundary_surface(body: BodyRows) -> SoftSurface:
-    """The boundary of a body's tets; of a shell both sides and the rims."""
+    """The boundary of a body's tets; of a shell both sides and the rims; of a rod tubes."""
+    if isinstance(body.body, Rod):
+        mesh = body.body.mesh
+        rows, closed, beside = tubes(np.hstack([mesh.line, mesh.material_points]), mesh.radius)
+        return SoftSurface(body.name, closed, *drawn_as(body), body, False, rows, beside)
     if isinstance(body.body, Shell):
         rows, closed, beside = sheet(body.boundary, body.body.material.thickness)
         return SoftSurface(body.name, closed, *drawn_as(body), body, False, rows, beside)

@@ -179,7 +179,7 @@ class Works(EnergyCheck):
         rows = np.unique(self.of.pinned_vertices)
         if not moved[rows].any():
             return 0.0, 0.0
-        if not min(last.bounded_J.min(), at.bounded_J.min()) > self._onset:
+        if not min(last.bounded_J.min(initial=np.inf), at.bounded_J.min(initial=np.inf)) > self._onset:
             return 0.0, np.inf
         along = np.zeros_like(moved)
         along[rows] = moved[rows]
