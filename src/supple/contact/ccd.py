@@ -56,12 +56,10 @@ def _moved(x, p, t):
 
 @njit
 def _time_to(gap, speed, keep):
-    """When gap + t speed falls to `keep`: 0 where it is not above, infinite where it does not fall."""
-    if not gap > 0.0:
+    """When gap + t speed falls below `keep`: 0 where it is there already, infinite where it does not fall."""
+    if not (gap > 0.0 and gap >= keep):
         return 0.0
-    if speed >= 0.0:
-        return math.inf
-    return max(0.0, (gap - keep) / -speed)
+    return math.inf if speed >= 0.0 else (gap - keep) / -speed
 
 
 @njit
@@ -161,10 +159,12 @@ def collision_time(x, way, kind, points, limit, kept, offset):
             keep = offset + (_remainder(gap - offset, kept) + error)
         elif gap - offset <= _CLOSE_ENOUGH * (keep - offset):
             return time
-        step, least = _bound(kind, n, a, b, c, p, q, r, keep)
-        if not least > _PRECISE * gap:
+        # Nearer than that, which only round-off does, parts may still go apart.
+        held = min(keep, (1.0 - ROUND_OFF) * gap)
+        step, least = _bound(kind, n, a, b, c, p, q, r, held)
+        if not (least > _PRECISE * gap and least >= held):
             m = _normal(a, subtract(c, b), n) if kind == EDGE_EDGE else _normal(subtract(b, a), subtract(c, a), n)
-            other_step, other_least = _bound(kind, m, a, b, c, p, q, r, keep)
+            other_step, other_least = _bound(kind, m, a, b, c, p, q, r, held)
             if other_least > least:
                 step = other_step
         if time + step > limit:

@@ -1,5 +1,6 @@
 """Additive detection of collisions: no step is too long, and none is needlessly short."""
 
+from decimal import Decimal, localcontext
 from fractions import Fraction
 
 import ipctk
@@ -24,12 +25,12 @@ def times(kind, x, way, offsets=None):
     return out
 
 
-def configurations(kind, count):
+def configurations(kind, count, seed=0):
     """Four points and their ways: random, coplanar, parallel, without area or length, nearly touching, sliding.
 
     Sizes are 1e-9 to 1e3 m, and the places up to 1e3 m from the origin, as far as the points remain distinct.
     """
-    rng = np.random.default_rng(7 + (kind == EDGE_EDGE))
+    rng = np.random.default_rng(7 + (kind == EDGE_EDGE) + 1000 * seed)
     x, way = rng.normal(size=(count, 4, 3)), rng.normal(size=(count, 4, 3)) * 10.0 ** rng.uniform(-2, 1, (count, 1, 1))
     family = np.arange(count) % 8
     first = slice(0, 1) if kind == POINT_TRIANGLE else slice(0, 2)
@@ -118,6 +119,48 @@ def test_every_pair_keeps_a_tenth_of_what_is_beyond_its_offset(kind):
         assert (kept >= KEEP * gaps - error).all(), family[kept < KEEP * gaps - error]
     assert (kept[limited] <= 1.06 * KEEP * gaps[limited] + 4.0 * error[limited]).all()
     assert 0.2 < limited.mean() < 0.9
+
+
+@pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 3, 9, 10, 13))])
+def test_edges_of_every_size_keep_a_tenth_of_what_is_beyond_their_offset_by_exact_sums(seed):
+    """The direction of the distance is round-off where edges are long for it; pairs that are near a tenth are summed in
+    fractions."""
+    x, way, _ = configurations(EDGE_EDGE, 3000, seed)
+    start = distances(EDGE_EDGE, x, way, np.zeros(len(x)))
+    apart = start > 0.0
+    x, way, start = x[apart], way[apart], start[apart]
+    offsets = start * np.random.default_rng(seed).choice([0.3, 0.9, 0.999], len(x))
+    taken, error = np.minimum(times(EDGE_EDGE, x, way, offsets), 1.0), errors(x, way)
+    for share in (0.4, 0.7, 1.0):
+        left = distances(EDGE_EDGE, x, way, share * taken) - offsets
+        for k in np.flatnonzero(left < 1.2 * KEEP * (start - offsets) + error):
+            gap = exact_distance(x[k]) - Fraction(offsets[k])
+            kept = exact_distance(x[k] + share * taken[k] * way[k]) - Fraction(offsets[k])
+            assert kept >= Fraction(KEEP) * gap - Fraction(error[k]) or gap <= 0, (k, share, float(kept / gap))
+
+
+def exact_distance(edges):
+    """Of two edges, four points (4, 3), without round-off but that of the root, of 60 digits."""
+    a, b, c, d = (np.array([Fraction(v) for v in point]) for point in edges.tolist())
+    u, v, w = b - a, d - c, a - c
+    squares = [_to_edge(p, *edge) for p, edge in ((a, (c, d)), (b, (c, d)), (c, (a, b)), (d, (a, b)))]
+    uu, uv, vv, uw, vw = u @ u, u @ v, v @ v, u @ w, v @ w
+    if (det := uu * vv - uv * uv) > 0:
+        s, t = (uv * vw - vv * uw) / det, (uu * vw - uv * uw) / det
+        if 0 <= s <= 1 and 0 <= t <= 1:
+            r = w + s * u - t * v
+            squares.append(r @ r)
+    least = min(squares)
+    with localcontext() as context:
+        context.prec = 60
+        return Fraction((Decimal(least.numerator) / Decimal(least.denominator)).sqrt()) if least else Fraction(0)
+
+
+def _to_edge(p, a, b):
+    e, d = b - a, p - a
+    square = e @ e
+    r = d - (min(max(d @ e / square, Fraction(0)), Fraction(1)) if square else 0) * e
+    return r @ r
 
 
 @pytest.mark.parametrize("kind", [POINT_TRIANGLE, EDGE_EDGE])
