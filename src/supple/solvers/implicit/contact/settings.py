@@ -26,7 +26,8 @@ class IPCContact(Kind):
     dhat : distance below which surfaces repel each other [m]. None: a thousandth of the smallest body's diagonal, or
         less where surface edges or the gaps at the start are shorter than that.
     stiffness : pressure scale of the barrier [Pa]: surfaces half of `dhat` apart press on each other with several
-        times as much. "adaptive": from the bodies' moduli, and raised within a step where surfaces come very close.
+        times as much. "adaptive": from the pressures that strain the bodies (their moduli; of shells, times thickness
+        over diagonal), and raised within a step where surfaces come very close.
     friction_velocity : relative velocity below which friction is static [m/s]: a sticking contact creeps with a part of
         it. None: a thousandth of the smallest body's diagonal per second.
     friction_iterations : how often in a step the normal forces of friction are computed. 1: only at the beginning of
@@ -88,7 +89,7 @@ def scales_of(settings: IPCContact, system: System, shear_moduli: NDArray[np.flo
     shear_moduli : (m,) of the tets [Pa]; gap : smallest distance at the start [m], or infinity
     """
     smallest = smallest_diagonal(system)
-    moduli = [_modulus(part, shear_moduli[part.tets]) for part in system.bodies]
+    moduli = [_modulus(system, part, shear_moduli[part.tets]) for part in system.bodies]
     dhat = settings.dhat
     if dhat is None:
         dhat = min(largest_dhat(system), max(gap, _SMALLEST_SHARE * smallest))
@@ -98,14 +99,16 @@ def scales_of(settings: IPCContact, system: System, shear_moduli: NDArray[np.flo
     return Scales(dhat, stiffness, _SLOW_SHARE * smallest if slow is None else slow, adaptive)
 
 
-def _modulus(part: BodyRange, shear_moduli: NDArray[np.float64]) -> float:
-    """Of one body [Pa]; of a rigid body, ten times the stress that its default stiffness is made for."""
+def _modulus(system: System, part: BodyRange, shear_moduli: NDArray[np.float64]) -> float:
+    """Pressure that strains one body by about one [Pa]; of a rigid body, ten times the stress that its default
+    stiffness is made for."""
     if isinstance(part.body, RigidBody):
         return _RIGID_SHARE * part.body.kappa
     if isinstance(part.body, Rod):
         return part.body.material.youngs
     if isinstance(part.body, Shell):
-        return 3.0 * part.body.material.mu
+        size = float(np.linalg.norm(np.ptp(system.rest_points[part.points], axis=0)))
+        return 3.0 * part.body.material.mu * part.body.material.thickness / size  # a balloon's tension over its radius
     return 3.0 * float(np.mean(shear_moduli))
 
 
