@@ -178,7 +178,6 @@ def test_free_shell_keeps_its_momentum_and_its_spin():
 @pytest.mark.parametrize(
     ("solver", "text"),
     [
-        (sp.XPBD(), "XPBD: body 'cloth' is a shell.*Implicit"),
         (sp.Implicit(contact=None, integrator="newmark"), "newmark.*use 'bdf2'"),
     ],
 )

@@ -22,7 +22,7 @@ Schoeberl, "The Hellan-Herrmann-Johnson method for nonlinear shells" (2019), sec
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -71,6 +71,14 @@ class ShellElements:
     hinge_of: Ints
     compliances: Floats
 
+    def renumbered(self, new: Ints) -> ShellElements:
+        """The same elements with the vertices' numbers new (n,)."""
+        return replace(self, triangles=new[self.triangles], hinges=new[self.hinges])
+
+    def rows_of(self, vertices: slice) -> NDArray[np.bool_]:
+        """(t,) the triangles of one shell, whose vertices these are."""
+        return (self.triangles[:, 0] >= vertices.start) & (self.triangles[:, 0] < vertices.stop)
+
     def deformation_gradients(self, x: Floats) -> Floats:
         """(t, 3, 2) at positions x (n, 3)."""
         return np.einsum("tpi,tpa->tia", x[self.triangles], self.gradients)
@@ -113,6 +121,35 @@ class ShellElements:
     def tangents(self) -> Floats:
         """(t, 3, 3) of small strains [Pa]."""
         return st_venant_kirchhoff_tangents(self.mu, self.a)
+
+    @cached_property
+    def stiffness(self) -> Floats:
+        """(t, 3) of each triangle at rest against a displacement of each corner in its plane, at most [N/m]."""
+        moduli = 2.0 * self.mu * (1.0 + self.a) * self.areas * self.thickness
+        return moduli[:, None] * np.einsum("tpi,tpi->tp", self.gradients, self.gradients)
+
+    @cached_property
+    def hinge_stiffness(self) -> Floats:
+        """(e,) a diagonal D >= W^-1 [N m].
+
+        1/D_e = sum gamma_T (W_T)_ee over triangles, gamma_T the smallest eigenvalue of W_T scaled to a unit diagonal.
+        """
+        has, diagonal = self.hinge_of >= 0, np.einsum("tkk->tk", self.compliances)
+        scale = np.where(has, 1.0 / np.sqrt(np.where(has, diagonal, 1.0)), 0.0)
+        scaled = self.compliances * scale[:, :, None] * scale[:, None, :]
+        scaled += np.where(has, 0.0, 1.0)[:, :, None] * np.eye(3)
+        shares = np.linalg.eigvalsh(scaled)[:, :1] * diagonal
+        return 1.0 / np.bincount(self.hinge_of[has], shares[has], len(self.hinges))
+
+    def ratios(self, x: Floats, w: Floats) -> Floats:
+        """(e,) D sum w |grad theta|^2 at places x (n, 3), with the inverse masses w (e, 4) of hinges [1/s^2]."""
+        gradients = Bent(x, self.hinges).gradients()
+        return self.hinge_stiffness * (w * np.einsum("ekj,ekj->ek", gradients, gradients)).sum(axis=1)
+
+    @cached_property
+    def laws(self) -> Floats:
+        """(t, 4) volume [m^3], mu [Pa], a, and 1 where neo-Hookean."""
+        return np.column_stack([self.areas * self.thickness, self.mu, self.a, self.neo_hookean])
 
     @cached_property
     def bounds(self) -> Floats:

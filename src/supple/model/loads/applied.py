@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,12 +45,13 @@ class AppliedLoad(ABC):
 
     Attributes
     ----------
-    is_internal : whether its forces act between vertices of one body, so that they change no momentum
+    is_internal : whether its forces act between vertices of one body, or have no sum and no moment there, so that they
+        change no momentum
     is_steady : whether its forces stay the same within a frame, wherever the vertices are
     work : the name under which its work is counted, see `Report.work`
     """
 
-    is_internal: ClassVar[bool] = False
+    is_internal: bool = False
     is_steady: bool = False
     work: str
 

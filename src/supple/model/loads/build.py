@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
+from supple.mesh.closed_surfaces import is_closed
 from supple.model.loads.applied import AppliedLoad, DeadLoad, MassLoad, Setting
 from supple.model.loads.growth import GrownTets
 from supple.model.loads.muscles import FibreTension
@@ -25,6 +26,7 @@ from supple.scene.loads.muscle import Muscle
 from supple.scene.loads.over_time import script_of
 from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction, Wind
+from supple.scene.shell import Shell
 
 
 @singledispatch
@@ -59,7 +61,11 @@ def _(load: Traction, setting: Setting) -> list[AppliedLoad]:
 def _(load: Pressure, setting: Setting) -> list[AppliedLoad]:
     body, at, begin = setting.body(load.body), script_of(load, "pressure"), setting.begins[load.body]
     return [
-        FollowerPressure((triangles + begin).astype(np.int32), lambda time, weight=weight: weight * float(at(time)))
+        FollowerPressure(
+            (triangles + begin).astype(np.int32),
+            lambda time, weight=weight: weight * float(at(time)),
+            isinstance(body, Shell) and is_closed(triangles),
+        )
         for triangles, weight in _weighted_triangles(body, load.triangles(body))
     ]
 

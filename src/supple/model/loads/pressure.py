@@ -26,10 +26,15 @@ from supple.scene.shell import Shell
 
 @dataclass(frozen=True, eq=False)
 class FollowerPressure(AppliedLoad):
-    """A pressure on `triangles` (t, 3), counter-clockwise from outside of the body; `pressure` : time -> [Pa]."""
+    """A pressure on `triangles` (t, 3), counter-clockwise from outside of the body; `pressure` : time -> [Pa].
+
+    is_internal : of a closed shell. Forces at predicted places have a moment about those before: it would turn a light
+        balloon faster and faster.
+    """
 
     triangles: NDArray[np.int32]
     pressure: Callable[[float], float]
+    is_internal: bool = False
 
     work = "pressures"
 

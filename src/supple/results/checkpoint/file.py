@@ -26,12 +26,13 @@ from supple.solvers.xpbd.assessment.softening import MeasuredWork
 from supple.solvers.xpbd.contact.frame_forces import LoadedRows
 from supple.solvers.xpbd.contact.memory import ContactMemory, ListMemory
 from supple.solvers.xpbd.damping.kelvin_voigt import ViscousMemory
-from supple.solvers.xpbd.memory import ControlMemory, XPBDMemory
+from supple.solvers.xpbd.memory import ControlMemory, ElementMemory, XPBDMemory
 from supple.solvers.xpbd.sleep import SleepMemory
 
 MEMORIES: tuple[type, ...] = (
     ContactMemory,
     ControlMemory,
+    ElementMemory,
     EnergyMade,
     History,
     Ledger,

@@ -36,6 +36,24 @@ class ControlMemory:
 
 
 @dataclass(frozen=True, eq=False)
+class ElementMemory:
+    """What `ElementStage`s must know of the frame before.
+
+    Attributes
+    ----------
+    positions : (n, 3) at its end [m]; values : see `ElementStage.memory`, of each stage
+    """
+
+    positions: NDArray[np.float64]
+    values: tuple[NDArray[np.float64], ...]
+
+    def of(self, positions: NDArray[np.float64], stages: int) -> tuple[NDArray[np.float64] | None, ...]:
+        """The values for so many stages where they belong to these positions, else None for each."""
+        known = len(self.values) == stages and np.array_equal(positions, self.positions)
+        return self.values if known else (None,) * stages
+
+
+@dataclass(frozen=True, eq=False)
 class XPBDMemory:
     """The memory of one state.
 
@@ -43,6 +61,7 @@ class XPBDMemory:
     ----------
     contact : of contact; None without contact of surfaces
     viscous : of damping; None where nothing is damped
+    elements : of element stages; None without any
     ledger : of the assessment of frames; None at the start
     measured : how much of their stiffness bodies lacked; None at the start
     substeps : the number that the last frame requires of the next one, where repetitions helped; falls back to zero
@@ -54,6 +73,7 @@ class XPBDMemory:
 
     contact: ContactMemory | None = None
     viscous: ViscousMemory | None = None
+    elements: ElementMemory | None = None
     ledger: Ledger | None = None
     measured: MeasuredWork | None = None
     substeps: float = 0.0

@@ -16,18 +16,22 @@ from supple.model.system import System
 
 
 def response_rates(system: System) -> NDArray[np.float64]:
-    """(n,) k / m of every vertex [1/s^2], with k = sum (lam + 2 mu) V |b|^2 over its tets; inf without an energy.
+    """(n,) k / m of every vertex [1/s^2], with k = sum (lam + 2 mu) V |b|^2 over its tets, and triangles
+    of shells with the modulus of plane stress; inf without an energy.
 
     Those of rigid bodies are zero: nothing yields between their points and their masses.
     """
     b = np.concatenate([-system.rest_shape_inverse.sum(axis=1, keepdims=True), system.rest_shape_inverse], axis=1)
     stiffness = np.zeros(len(system.tets))
     for part in system.bodies:
-        if part.rigid:
+        if part.rigid or not len(system.tets[part.tets]):
             continue
         material = part.body.material.per_tet(part.tets.stop - part.tets.start)
         modulus = material.lam + 2.0 * material.mu
         stiffness[part.tets] = np.where(modulus > 0.0, modulus, np.inf)
     each = (stiffness * system.rest_volumes)[:, None] * np.einsum("tnj,tnj->tn", b, b)
     sums = np.bincount(system.tets.ravel(), weights=each.ravel(), minlength=len(system.masses))
+    if system.shells is not None:
+        shells = system.shells
+        sums = sums + np.bincount(shells.triangles.ravel(), weights=shells.stiffness.ravel(), minlength=len(sums))
     return np.where(system.inverse_masses > 0.0, sums, 0.0) * system.inverse_masses

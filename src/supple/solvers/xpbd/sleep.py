@@ -89,7 +89,9 @@ class Sleep:
             self._own_times, self._limits = self._times, np.zeros(len(system.bodies))
             self._unloaded = self._scene = ""
             return
-        damping = [part.body.material.per_tet(part.tets.stop - part.tets.start).damping for part in system.bodies]
+        # Shells have no tets, and one damping.
+        counts = [max(1, part.tets.stop - part.tets.start) for part in system.bodies]
+        damping = [part.body.material.per_tet(n).damping for part, n in zip(system.bodies, counts, strict=True)]
         self._own_times = np.array([max(after, float(np.max(tau))) for tau in damping])
         edges = np.array([float(system.rest_lengths[part.edges].mean()) for part in system.bodies])
         fall = 0.5 * math.hypot(*system.gravity) * (0.5 * self._own_times) ** 2

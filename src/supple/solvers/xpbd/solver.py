@@ -21,7 +21,6 @@ from supple.model.state import State, Status, StepReport
 from supple.model.system import System
 from supple.runtime.thread_tuning import ThreadTuner
 from supple.runtime.threads import numba_threads
-from supple.scene.shell import Shell
 from supple.solvers.solver import Solver
 from supple.solvers.xpbd.assessment.assessment import Assessment
 from supple.solvers.xpbd.assessment.softening import enough
@@ -58,8 +57,6 @@ def refuse_unsupported(system: System) -> None:
     SolverError : where it cannot.
     """
     for part in system.bodies:
-        if isinstance(part.body, Shell):
-            raise SolverError(f"XPBD: body {part.name!r} is a shell, which it does not simulate yet; use Implicit()")
         if part.body.touches_with_skin and not part.rigid:
             raise SolverError(f"XPBD: body {part.name!r} touches with its skin; simulate it with Implicit")
     quadratic = [part.name for part in system.bodies if part.body.mesh.order == 2]

@@ -173,7 +173,7 @@ def _detect(record, h, again):
     counts[ROWS] = detect(*whole, *listed, slack, chosen, far, first, rows)
     if not again:
         for e in range(counts[ROWS]):
-            values[SMALLEST] = min(values[SMALLEST], rows.distances[e])
+            values[SMALLEST] = min(values[SMALLEST], rows.distances[e] - rows.offsets[e])
 
 
 def _solve_rows(record, h, most, most_rigid, anew):

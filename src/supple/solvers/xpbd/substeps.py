@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from supple.model.system import System
+from supple.scene.shell import Shell
 from supple.solvers.xpbd.assessment.softening import MeasuredWork, Softening
 from supple.solvers.xpbd.moment import Moment
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
@@ -66,7 +67,13 @@ class SubstepChoice:
         Dm_inv = system.rest_shape_inverse
         b = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)
         heights = 1.0 / np.linalg.norm(b, axis=2).max(axis=1)
-        of_bodies = [float(heights[part.tets].mean()) for part in system.bodies]
+        shells, of_bodies = system.shells, [0.0] * len(system.bodies)
+        for k, part in enumerate(system.bodies):
+            if shells is not None and isinstance(part.body, Shell):
+                own = shells.gradients[shells.rows_of(part.vertices)]
+                of_bodies[k] = float((1.0 / np.linalg.norm(own, axis=2).max(axis=1)).mean())
+            else:
+                of_bodies[k] = float(heights[part.tets].mean())
         self.height = min(of_bodies)
         self._smallest = min((of_bodies[k] for k in rigid.numbers[~rigid.held]), default=math.inf)
         free = np.where(

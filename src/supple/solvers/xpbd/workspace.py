@@ -21,7 +21,7 @@ from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
 from supple.solvers.xpbd.assessment.works import Works
 from supple.solvers.xpbd.constraints.actuators import ActuatorProjection
 from supple.solvers.xpbd.constraints.delivered_work import DeliveredWork
-from supple.solvers.xpbd.constraints.registry import ConstraintSet
+from supple.solvers.xpbd.constraints.registry import ConstraintSet, ElementStage
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.solvers.xpbd.constraints.stitches import StitchAnchors, StitchForces
 from supple.solvers.xpbd.contact.contact import Contact
@@ -122,6 +122,7 @@ class XPBDWorkspace:
         self._rigid = Rigid(rigid.control, rigid.masses, loose, rigid.welds, *nodes.embedded, before, nodes.movers)
         before, expected, base = np.zeros((3, count, 3))
         self._scratch = before, expected, base, np.zeros((n, 3)), np.zeros(count, dtype=np.bool_)
+        self.element_stages = [each for each in self.sets if isinstance(each, ElementStage)]
         self.grows = self.system.laws_at(0.0).growth is not None
 
     def with_loads(self, system: System) -> XPBDWorkspace:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic import EdgesAndVolume
 from supple.materials.material import Elastic
+from supple.materials.shells.elements import ShellElements
+from supple.materials.shells.kernels import angles_of, membrane_energies
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit, prange
 
@@ -66,6 +68,13 @@ class ElasticEnergy:
         starts = [part.tets.start for part in system.bodies], [part.edges.start for part in system.bodies]
         self._tet_starts = np.searchsorted(np.flatnonzero(tets), starts[0])
         self._edge_starts = np.searchsorted(np.flatnonzero(edges), starts[1])
+        self._shells = system.shells if vertices is None else None
+        if self._shells is not None:
+            first = [part.vertices.start for part in system.bodies]
+            self._bodies = [
+                np.searchsorted(first, elements[:, 0], side="right") - 1
+                for elements in (self._shells.triangles, self._shells.hinges)
+            ]
 
     def grow(self, Dm_inv: NDArray[np.float64], volumes: NDArray[np.float64]) -> None:
         """Take other stress-free shapes of all tets of the system: (m, 3, 3) [1/m], (m,) [m^3]."""
@@ -80,7 +89,19 @@ class ElasticEnergy:
         _energies_of_tets(points, self._tets, self._data, 1.0 / h**2, self._of_tets)
         if len(self._edges):
             _energies_of_edges(points, self._edges, self._springs, 1.0 / h**2, self._of_edges)
-        return _sums(self._of_tets, self._tet_starts) + _sums(self._of_edges, self._edge_starts)
+        total = _sums(self._of_tets, self._tet_starts) + _sums(self._of_edges, self._edge_starts)
+        if self._shells is not None:
+            for own, energies in zip(self._bodies, energies_of_shells(self._shells, points), strict=True):
+                total += np.bincount(own, energies, len(total))
+        return total
+
+
+def energies_of_shells(shells: ShellElements, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """The energies of the triangles (t,), and of the hinges (e,), at places x (n, >= 3) [J]."""
+    stretched = np.zeros(len(shells.triangles))
+    membrane_energies(x, shells.triangles, shells.gradients, shells.laws, stretched)
+    turned = angles_of(x, shells.hinges) - shells.rest_angles
+    return stretched, 0.5 * turned * shells.moments(turned)
 
 
 def _inverse(slopes: NDArray[np.float64]) -> NDArray[np.float64]:

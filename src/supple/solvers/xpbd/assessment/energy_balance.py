@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from supple.model.energy_balance import NUMERICAL
 from supple.model.system import System
+from supple.scene.shell import Shell
 from supple.scene.stitches.measures import stitch_energy
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
 from supple.solvers.xpbd.moment import Moment
@@ -96,7 +97,7 @@ def _stiffness(system: System) -> float:
     """The sum of shear modulus times volume, or of edge stiffness times squared length [J]."""
     total = 0.0
     for part in system.bodies:
-        if part.rigid:
+        if part.rigid or isinstance(part.body, Shell):
             continue
         material, volumes = part.body.material, system.rest_volumes[part.tets]
         compliance = getattr(material, "edge_compliance", None)
@@ -104,4 +105,7 @@ def _stiffness(system: System) -> float:
             total += float(np.broadcast_to(material.per_tet(len(volumes)).mu, len(volumes)) @ volumes)
         elif compliance > 0.0:
             total += float((system.rest_lengths[part.edges] ** 2).sum()) / compliance
+    if system.shells is not None:
+        shells = system.shells
+        total += float((shells.areas * shells.thickness) @ shells.mu)
     return total

@@ -7,13 +7,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.shells.kernels import add_forces_of_shells, angles_of
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
 
 
 class HeldElements(ElasticEnergy):
-    """The tets and springs of bodies and stitches with a node among `held` (n + a,), of vertices and anchors."""
+    """Tets and springs of bodies and stitches, and elements of shells, with a node among `held` (n + a,).
+
+    These are vertices, then anchors.
+    """
 
     def __init__(self, system: System, held: NDArray[np.bool_]) -> None:
         stitches = system.stitching
@@ -23,6 +27,13 @@ class HeldElements(ElasticEnergy):
         moduli = np.column_stack([tets.mu, tets.lam, np.zeros(len(tets))]) * tets.rest_volumes[:, None]
         self._stitch_data = np.hstack([tets.rest_shape_inverse.reshape(-1, 9), moduli])[near]
         super().__init__(system, held[: len(system.masses)])
+        self._own = None
+        if system.shells is not None and held[system.shells.triangles].any():
+            shells = self._own = system.shells
+            self._sheets, self._turning = (held[each].any(axis=1) for each in (shells.triangles, shells.hinges))
+            near = self._sheets
+            self._of_sheets = [np.ascontiguousarray(each[near]) for each in (shells.triangles, shells.gradients)]
+            self._of_sheets += [shells.laws[near], np.ascontiguousarray(shells.hinges[self._turning])]
         near = held[springs.vertices].any(axis=1)
         laws = np.column_stack([springs.rest_lengths, springs.stiffness, np.zeros(len(springs))])
         # An edge is a spring to a vertex: to the place 0 of an edge of length zero.
@@ -38,6 +49,8 @@ class HeldElements(ElasticEnergy):
         np.add.at(out, self._all_tets, (2.0 * data[:, 9] + data[:, 10])[:, None] * np.einsum("tki,tki->tk", b, b))
         ends, springs = self._all_springs
         np.add.at(out, ends, springs[:, 1, None])
+        if self._own is not None:
+            np.add.at(out, self._of_sheets[0], self._own.stiffness[self._sheets])
         return out
 
     def grow(self, Dm_inv: NDArray[np.float64], volumes: NDArray[np.float64]) -> None:
@@ -53,6 +66,9 @@ class HeldElements(ElasticEnergy):
         """
         _add_forces_of_tets(points, self._all_tets, self._all_data, 1.0 / h**2, factor, out)
         _add_forces_of_springs(points, *self._all_springs, 1.0 / h**2, factor, out)
+        if self._own is not None:
+            moments = self._own.moments(angles_of(points, self._own.hinges) - self._own.rest_angles)
+            add_forces_of_shells(points, *self._of_sheets, moments[self._turning], factor, out)
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,9 @@ from supple.materials.elastic import EdgesAndVolume, StableNeoHookean
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Elastic, Material
 from supple.model.system import BodyRange, System
+from supple.scene.shell import Shell
 from supple.solvers.xpbd.constraints.edges_and_volume import EdgeConstraints, VolumeConstraints
+from supple.solvers.xpbd.constraints.shells import shell_constraints
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.solvers.xpbd.sweeps.ordering import Layout
 from supple.solvers.xpbd.sweeps.sweep import Sweep
@@ -38,6 +40,23 @@ class ConstraintSet(Protocol):
         points : (n, 4) positions [m] and inverse masses [1/kg], in the solver's numbering.
         h : length of the substep [s].
         """
+        ...
+
+
+@runtime_checkable
+class ElementStage(Protocol):
+    """A constraint set whose projections depend on those of the substep before."""
+
+    def begin_frame(self, x: NDArray[np.float64], known: NDArray[np.float64] | None) -> None:
+        """Begin a frame at places x (n, >= 3) [m], with the `memory` of the frame before, where it is known."""
+        ...
+
+    def begin(self, x: NDArray[np.float64], v: NDArray[np.float64], h: float) -> None:
+        """Begin a substep of h [s] at places x (n, 3) [m], with velocities v (n, 3) [m/s]."""
+        ...
+
+    def memory(self) -> NDArray[np.float64]:
+        """What the next frame must know of the last projections, in the numbering of the scene's elements."""
         ...
 
 
@@ -63,7 +82,11 @@ def refuse_materials(system: System) -> None:
     """Raise `SolverError` where the material of a soft body has no constraints; the text names the body."""
     for part in system.bodies:
         material = part.body.material
-        if not part.rigid and not any(entry.takes(material) for entry in CONSTRAINT_SETS):
+        if (
+            not part.rigid
+            and not isinstance(part.body, Shell)
+            and not any(entry.takes(material) for entry in CONSTRAINT_SETS)
+        ):
             raise SolverError(f"XPBD: {_why_not(part.name, material)}, or simulate with Implicit")
 
 
@@ -86,7 +109,7 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
         parts = [part for part in soft if entry.takes(part.body.material)]
         if parts:
             sets += [build(system, parts, layout) for build in entry.sets]
-    return [made for made in sets if made.count > 0]
+    return [made for made in [*sets, *shell_constraints(system, layout)] if made.count > 0]
 
 
 def _why_not(body: str, material: Material) -> str:

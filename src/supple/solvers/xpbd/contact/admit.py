@@ -27,8 +27,8 @@ from supple.solvers.xpbd.contact.tets import determinant, least_J, share_of_tet
 
 # Of the gap: a distance below this may not become smaller in a substep.
 NEAREST = 0.02
-# Of the gap: to what distance things are moved that begin through each other, and pairs that have been that far apart
-# and came nearer by what rows leave. With .15, a ball between two bars is truncated. And things that touch, of which no
+# Of the gap beyond offsets: to what distance things are moved that begin through each other, and pairs that have been
+# that far apart and came nearer by what rows leave. With .15, a ball between two bars is truncated. And things that touch, of which no
 # side is known at the next look: a body moves for it by less than 1e-6 of its edges, which is below round-off of its
 # energy.
 PARTED, APART = 0.2, 1e-5
@@ -297,9 +297,10 @@ def part(points, movers, loose, pairs, rows, count, most, marks):
         if rows.kinds[e] == SHAPE:
             lack = rows.targets[e] - s if rows.distances[e] >= 0.0 else min(most, -s)
         elif pairs.deep[rows.pairs[e]]:
-            lack = min(most, PARTED * rows.gaps[e] - s)
+            lack = min(most, rows.offsets[e] + PARTED * (rows.gaps[e] - rows.offsets[e]) - s)
         else:
-            known = min(PARTED * rows.gaps[e], pairs.reached[rows.pairs[e]])
+            parted = rows.offsets[e] + PARTED * (rows.gaps[e] - rows.offsets[e])
+            known = min(parted, pairs.reached[rows.pairs[e]])
             lack = min(most, max(APART * rows.gaps[e], known) - s) if rows.distances[e] < rows.gaps[e] else 0.0
         if not lack > 0.0:
             continue

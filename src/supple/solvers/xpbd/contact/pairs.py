@@ -28,10 +28,10 @@ NIL, OPPOSED = 5e-6, -0.25
 # A pair: its nodes and kind; of pairs with a shape, the number of that, of pairs with a triangle, that of the triangle;
 # its parts as one number, see `keys_of`, by which pairs are sorted. Whether it pushes: pairs of one body that are near
 # each other at rest are only kept apart. Whether the sides penetrated each other when the frame began: then they are
-# not kept on their sides, but pushed out along the normals at that time. Friction, and the smallest gap
-# of its nodes [m]. The normal as of the latest look, and the impulse with which the next substep begins [kg m]. The
-# largest distance of its rows since it is listed, its gap at most [m]. Whether it may come near while its nodes go on,
-# see `near_pairs`.
+# not kept on their sides, but pushed out along the normals at that time. Friction; the smallest gap of its nodes and the
+# offsets of its sides together, and these alone [m]. The normal as of the latest look, and the impulse with which the
+# next substep begins [kg m]. The largest distance of its rows since it is listed, its gap at most [m]. Whether it may
+# come near while its nodes go on, see `near_pairs`.
 PAIR = np.dtype(
     [
         ("keys", np.int64),
@@ -43,6 +43,7 @@ PAIR = np.dtype(
         ("near", np.int8),
         ("friction", np.float64),
         ("gaps", np.float64),
+        ("offsets", np.float64),
         ("normals", np.float64, 3),
         ("impulses", np.float64, 3),
         ("reached", np.float64),
@@ -161,7 +162,7 @@ def is_loaded(impulses, k):
 def describe_pairs(pairs, s, shape_friction, old, is_kept):
     """Fill in what pairs are, and what was known of those of them that are among `old` pairs.
 
-    Pairs of one body push that are farther from each other at rest than twice their gap.
+    Pairs of one body push that are farther from each other at rest than twice their gap without offsets.
 
     Parameters
     ----------
@@ -184,9 +185,11 @@ def describe_pairs(pairs, s, shape_friction, old, is_kept):
         else:
             for j in range(2):
                 pairs.nodes[k, j], pairs.nodes[k, 2 + j] = s.edges[first, j], s.edges[second, j]
-        pairs.gaps[k] = np.inf
+        gap = np.inf
         for i in range(4):
-            pairs.gaps[k] = min(pairs.gaps[k], s.gaps[pairs.nodes[k, i]])
+            gap = min(gap, s.gaps[pairs.nodes[k, i]])
+        pairs.offsets[k] = s.offsets[pairs.nodes[k, 0]] + (s.offsets[pairs.nodes[k, 3]] if kind != SHAPE else 0.0)
+        pairs.gaps[k] = gap + pairs.offsets[k]
         one, other = s.owner[pairs.nodes[k, 0]], s.owner[pairs.nodes[k, 3]]
         if kind != SHAPE:
             pairs.friction[k] = s.friction[one, other]
@@ -201,7 +204,7 @@ def describe_pairs(pairs, s, shape_friction, old, is_kept):
             pairs.near[k], pairs.pushes[k] = old.near[o], old.pushes[o]
         elif kind != SHAPE and one == other:
             _, r = weights_of(s.rest, pairs.nodes, k, kind)
-            pairs.pushes[k] = dot(r, r) > (2.0 * pairs.gaps[k]) ** 2
+            pairs.pushes[k] = dot(r, r) > (2.0 * gap) ** 2
 
 
 @njit

@@ -20,8 +20,8 @@ PARALLEL = 0.05
 
 
 # A row: the number of its pair, its nodes and its kind; c_i, q (see `pairs`), n, the least n . r, and d [m]; the gap
-# of the pair [m]; the impulse [kg m] along n that changes n . r by one, see `softness`, 0 where nothing moves or
-# pushes; the same along the surface, of rows with a rigid body, 0 until something slips; the coefficient of friction;
+# of the pair and its offsets [m]; the impulse [kg m] along n that changes n . r by one, see `softness`, 0 where
+# nothing moves or pushes; the same along the surface, of rows with a rigid body, 0 until something slips; the coefficient of friction;
 # the accumulated impulse [kg m]; whether a node is on a rigid body; of rows with rigid bodies these, shares and arms
 # [m], and what is fixed [m]; see `levers`.
 ROW = np.dtype(
@@ -33,7 +33,7 @@ ROW = np.dtype(
         ("weights", np.float64, 4),
         ("places", np.float64, 3),
         ("normals", np.float64, 3),
-        *((name, np.float64) for name in ("targets", "distances", "gaps", "masses", "across", "friction")),
+        *((name, np.float64) for name in ("targets", "distances", "gaps", "offsets", "masses", "across", "friction")),
         ("impulses", np.float64, 3),
         ("movers", np.int32, 4),
         ("levers", np.float64, (4, 4)),
@@ -76,8 +76,8 @@ def detect(begin, end, bodies, faces, first_of, near, pairs, walls, slack, chose
                 continue
             c, d = (1.0, 0.0, 0.0, 0.0), walls.gaps[w]
             # What is behind a wall leaves it slowly.
-            skin = SKIN * pairs.gaps[k]
-            target = min(skin, d) if d >= 0.0 else min(0.0, d + skin)
+            skin = SKIN * (pairs.gaps[k] - pairs.offsets[k])
+            target = min(pairs.offsets[k] + skin, d) if d >= 0.0 else min(0.0, d + skin)
         else:
             loaded = loaded or pairs.deep[k]
             if not loaded and room_between(begin, end, pairs.nodes, k, kind, row(pairs.normals, k)) > reach:
@@ -101,6 +101,7 @@ def detect(begin, end, bodies, faces, first_of, near, pairs, walls, slack, chose
             rows.impulses[count, j] = pairs.impulses[k, j]
         rows.pairs[count], rows.kinds[count] = k, kind
         rows.targets[count], rows.distances[count], rows.gaps[count] = target, d, pairs.gaps[k]
+        rows.offsets[count] = pairs.offsets[k]
         set_levers(bodies, rows, count)
         soft = softness(end, bodies, rows, count, n)
         pushes = pairs.pushes[k]

@@ -13,7 +13,7 @@ from supple.solvers.xpbd.assessment.surfaces import Overlap
 from supple.solvers.xpbd.damping.kelvin_voigt import Damping, cycle_lengths
 from supple.solvers.xpbd.frame.substep import SubstepRunner
 from supple.solvers.xpbd.integration import to_world
-from supple.solvers.xpbd.memory import XPBDMemory
+from supple.solvers.xpbd.memory import ElementMemory, XPBDMemory
 from supple.solvers.xpbd.sleep import SleepMemory
 from supple.solvers.xpbd.workspace import XPBDWorkspace
 
@@ -70,6 +70,10 @@ def advance(
     ws.begin_frame(state.time, h)
     times = state.time + h * np.arange(substeps + 1, dtype=np.float64)
     ws.joints.begin_frame(state, sleep.asleep, ws.origins[0], times)
+    stages = ws.element_stages
+    known = (memory.elements or ElementMemory(state.positions, ())).of(state.positions, len(stages))
+    for stage, values in zip(stages, known, strict=True):
+        stage.begin_frame(ws.previous, values)
     damping, lengths = damping_in(ws, h), cycles(substeps)
     if damping is not None:
         damping.begin_step(memory.viscous, state.velocities)

@@ -17,7 +17,7 @@ from supple.solvers.xpbd.assessment.surfaces import Overlap, crossings
 from supple.solvers.xpbd.details import XPBDDetails
 from supple.solvers.xpbd.frame.advance import damping_in, overlaps_after
 from supple.solvers.xpbd.integration import to_world
-from supple.solvers.xpbd.memory import XPBDMemory
+from supple.solvers.xpbd.memory import ElementMemory, XPBDMemory
 from supple.solvers.xpbd.record import CUTS, RESIDUAL, SMALLEST
 from supple.solvers.xpbd.sleep import SleepMemory
 from supple.solvers.xpbd.substeps import FALL, Substeps
@@ -58,7 +58,7 @@ def end_frame(
     held, works = held_back / used.count, ws.works.by_name
     softening = ws.assessment.softening
     delivered = ws.delivered.end(ws.points, h)
-    measured = softening.after(softening.own(before.measured), delivered, h, sleep.asleep)
+    measured = softening.after(softening.own(before.measured), delivered, h, sleep.asleep, ws.points)
     shares = softening.by_body(h, measured)
     findings, ledger = ws.assessment.end(
         ws.moment(time),
@@ -93,6 +93,7 @@ def end_frame(
     memory = XPBDMemory(
         contact=ws.contact.memory(x, h),
         viscous=None if damping is None else damping.memory(v),
+        elements=ElementMemory(x, tuple(each.memory() for each in ws.element_stages)) if ws.element_stages else None,
         ledger=ledger,
         measured=measured,
         substeps=float(used.count) if repeats else FALL * before.substeps,

@@ -58,6 +58,8 @@ class SubstepRunner:
         now = ws.substep(ws.time, h)
         self._predict(now, k)  # 1, 2
         self._push(now, last)  # 3
+        for stage in ws.element_stages:
+            stage.begin(now.begun, now.velocities, h)
         for constraints in ws.sets:  # 4: (X1) to (X4)
             if last:
                 ws.stitch_forces.project(constraints, ws.extended, h)

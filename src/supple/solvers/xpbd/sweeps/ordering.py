@@ -61,7 +61,8 @@ class Layout:
 def make_layout(system: System) -> Layout:
     """Number the vertices of a system and divide it into chunks."""
     n = len(system.masses)
-    order, level_of_old = breadth_first_order([system.edges], n)
+    joined = [system.edges] if system.shells is None else [system.edges, system.shells.hinges]
+    order, level_of_old = breadth_first_order(joined, n)
     rank_of_old = np.empty(n, dtype=np.int32)
     rank_of_old[order] = np.arange(n, dtype=np.int32)
     body_of_old = np.full(n, len(system.bodies), dtype=np.int32)
@@ -117,6 +118,7 @@ def reordered(system: System, layout: Layout) -> System:
         masses=np.ascontiguousarray(system.masses[old]),
         tets=np.ascontiguousarray(new[system.tets]),
         edges=np.ascontiguousarray(new[system.edges]),
+        shells=None if system.shells is None else system.shells.renumbered(new),
         triangles=np.ascontiguousarray(new_points[system.triangles]),
         points=replace(points, vertices=new[points.vertices]),
         components=np.ascontiguousarray(system.components[old]),

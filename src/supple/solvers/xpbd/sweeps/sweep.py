@@ -57,6 +57,17 @@ class Sweep:
         """Replace the constants (m, c)."""
         self._data = self._groups.lanes(constants)
 
+    def write(self, first: int, values: NDArray[np.float64]) -> None:
+        """Replace some of the constants, from number `first`: values (m, k)."""
+        self._data[:, first : first + values.shape[1]] = values[self._groups.members].transpose(0, 2, 1)
+
+    def read(self, first: int, count: int) -> NDArray[np.float64]:
+        """(m, count) what projections have written into these rows of the constants."""
+        used = np.arange(self._corners.shape[1]) < self._counts[:, None]
+        out = np.empty((int(self._groups.members.max()) + 1, count))
+        out[self._groups.members[used]] = self._data[:, first : first + count].transpose(0, 2, 1)[used]
+        return out
+
     def run(self, points: NDArray[np.float64], h: float) -> None:
         """Project every constraint once: see `ConstraintSet.project`."""
         self.kernel(points, self.groups, h)

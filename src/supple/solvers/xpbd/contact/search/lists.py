@@ -57,7 +57,8 @@ class Lists:
 
     def __init__(self, surface: RowSurface, shapes: RowShapes) -> None:
         self._surface, self._shapes, self._edge = surface, shapes, surface.edge_length
-        self._widest = float(surface.simplices.gaps[surface.simplices.nodes].max(initial=0.0))
+        nodes, gaps, offsets = surface.simplices.nodes, surface.simplices.gaps, surface.simplices.offsets
+        self._widest = float(gaps[nodes].max(initial=0.0) + 2.0 * offsets[nodes].max(initial=0.0))
         self._search = PatchSearch(surface.parts, surface.patches)
         excluded = surface.parts.excluded_triangles, surface.parts.excluded_edges
         self._excluded = sum(len(lists.items) for lists in excluded)
@@ -237,7 +238,9 @@ class Lists:
         s = self._surface.simplices
         mine = np.flatnonzero(s.owner[s.nodes] < len(self._shapes.collide))
         nodes = s.nodes[mine]
-        reach = s.gaps[nodes] + self.margins[0] + np.sqrt(np.einsum("ij,ij->i", way[nodes], way[nodes]))
+        reach = (
+            s.gaps[nodes] + s.offsets[nodes] + self.margins[0] + np.sqrt(np.einsum("ij,ij->i", way[nodes], way[nodes]))
+        )
         keys = [np.zeros(0, dtype=np.int64)]
         for o in range(len(self._shapes)):
             every = np.full(len(nodes), o, dtype=np.int32)

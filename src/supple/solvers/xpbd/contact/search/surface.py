@@ -20,7 +20,8 @@ from supple.model.system import System
 from supple.numerics.adjacency import Adjacency, adjacency, only
 from supple.numerics.cross_rows import cross_rows
 from supple.scene.contact_pairs import pair_table
-from supple.solvers.xpbd.contact.search.gaps import point_gaps
+from supple.scene.shell import Shell
+from supple.solvers.xpbd.contact.search.gaps import SHARE, point_gaps
 from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 
@@ -37,6 +38,7 @@ class Simplices(NamedTuple):
     owner : (N,) the body or obstacle of each node, -1 for nodes that are on no surface
     collide : (p, p) which owners may touch; friction : (p, p)
     gaps : (N,) the distances that are kept, of a pair the smallest of its nodes [m]
+    offsets : (N,) half of a shell's thickness, or 0: both sides' are added to the distance of a pair [m]
     rest : (N, 3) places at rest [m]
     around : the triangles at each node
     first : (f, 6) whether a triangle is the first of those with its corner j, and with the side across from it
@@ -49,6 +51,7 @@ class Simplices(NamedTuple):
     collide: NDArray[np.bool_]
     friction: NDArray[np.float64]
     gaps: NDArray[np.float64]
+    offsets: NDArray[np.float64]
     rest: NDArray[np.float64]
     around: Adjacency
     first: NDArray[np.bool_]
@@ -61,7 +64,7 @@ class RowSurface:
     Attributes
     ----------
     parts : the same arrays as a search takes them; patches : of them, without edges and points in flat rigid faces
-    closed : (p,) which things have a closed surface
+    closed : (p,) which things have a closed surface with an inside
     count : number of nodes; first : the first node of obstacles
     anchors : (o, 3) of the obstacles' nodes at time 0 [m]; of_anchor : (o,) their obstacle
     body : (N,) the rigid body of each node, or -1; points : (N,) the point of the system that it is, or -1
@@ -124,6 +127,8 @@ def row_surface(
     body[first_embedded:] = rigid.of_vertex[control[:, 0]]
     points = np.full(count, -1, dtype=np.int32)
     points[nodes] = mesh.rows
+    offsets = np.zeros(count)
+    offsets[nodes] = mesh.offsets
     simplices = Simplices(
         nodes,
         np.ascontiguousarray(nodes[mesh.triangles]),
@@ -132,12 +137,14 @@ def row_surface(
         np.ascontiguousarray(mesh.collide),
         np.ascontiguousarray(pair_table(system.scene).friction),
         _gaps(mesh, system, rest, nodes, thickness),
+        offsets,
         rest,
         adjacency(nodes[mesh.triangles].ravel(), np.repeat(np.arange(len(mesh.triangles)), 3), count),
         _is_first(mesh),
     )
     closed = np.ones(len(collide), dtype=np.bool_)
     closed[mesh.owner[mesh.edges[np.diff(mesh.edge_triangles.start) != 2, 0]]] = False
+    closed[: len(system.bodies)] &= [not isinstance(part.body, Shell) for part in system.bodies]  # no inside
     return RowSurface(
         simplices,
         Parts(nodes, simplices.triangles, simplices.edges, simplices.collide, *mesh.excluded),
@@ -188,6 +195,7 @@ def _gaps(
     if thickness is not None:
         return np.full(len(rest), thickness)
     of_points, gaps = point_gaps(mesh, rest[nodes]), np.full(len(rest), np.inf)
+    of_points = np.where(mesh.offsets > 0.0, np.minimum(of_points, 2.0 * SHARE * mesh.offsets), of_points)
     for k, part in enumerate(system.bodies):
         gaps[part.vertices] = of_points[mesh.owner == k].min(initial=np.inf)
     gaps[nodes] = of_points
