@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from supple.materials.shells.hinges import angles_of
+from supple.materials.shells.hinges import angles_of, turns_of
 from supple.materials.shells.membrane import (
     neo_hookean_energies,
     neo_hookean_stresses,
@@ -143,8 +143,8 @@ class ShellElements:
 
     def ratios(self, x: Floats, w: Floats) -> Floats:
         """(e,) D sum w |grad theta|^2 at places x (n, 3), with the inverse masses w (e, 4) of hinges [1/s^2]."""
-        gradients = Bent(x, self.hinges).gradients()
-        return self.hinge_stiffness * (w * np.einsum("ekj,ekj->ek", gradients, gradients)).sum(axis=1)
+        turns = turns_of(x, self.hinges)
+        return self.hinge_stiffness * (w * np.einsum("ekj,ekj->ek", turns, turns)).sum(axis=1)
 
     @cached_property
     def laws(self) -> Floats:

@@ -1,4 +1,4 @@
-"""Angles of hinges, and energies and forces of shells, element by element: what `XPBD` needs in each substep.
+"""Angles of hinges, and energies and forces of triangles, one by one: what `XPBD` needs in each substep.
 
 The formulas are those of `hinges` and `membrane`.
 """
@@ -28,31 +28,6 @@ def hinge(i, j, k, l):  # noqa: E741
     a = (u * c[0] + v * d[0], u * c[1] + v * d[1], u * c[2] + v * d[2])
     b = (-s * c[0] - t * d[0], -s * c[1] - t * d[1], -s * c[2] - t * d[2])
     return angle, a, b, c, d
-
-
-@njit(inline="always")
-def _hinge(x, hinges, e):
-    return hinge(row(x, hinges[e, 0]), row(x, hinges[e, 1]), row(x, hinges[e, 2]), row(x, hinges[e, 3]))
-
-
-@njit(cache=True)
-def angles_of(x, hinges):
-    """The angles (e,) at places x (n, >= 3) [rad]."""
-    out = np.empty(len(hinges))
-    for e in range(len(hinges)):
-        out[e] = _hinge(x, hinges, e)[0]
-    return out
-
-
-@njit(cache=True)
-def rates_of(x, v, hinges):
-    """The rates (e,) of angles at places x and velocities v (n, 3) [rad/s]."""
-    out = np.empty(len(hinges))
-    for e in range(len(hinges)):
-        _, a, b, k, l = _hinge(x, hinges, e)  # noqa: E741
-        rate = dot(a, row(v, hinges[e, 0])) + dot(b, row(v, hinges[e, 1]))
-        out[e] = rate + dot(k, row(v, hinges[e, 2])) + dot(l, row(v, hinges[e, 3]))
-    return out
 
 
 @njit(inline="always")
@@ -100,9 +75,8 @@ def membrane_energies(x, triangles, gradients, constants, out):
 
 
 @njit(cache=True)
-def add_forces_of_shells(x, triangles, gradients, constants, hinges, moments, factor, out):
-    """Add `factor` times the forces of triangles, see `membrane_energies`, and of hinges with moments (e,) [N m] to
-    `out` (n, 3)."""
+def add_membrane_forces(x, triangles, gradients, constants, factor, out):
+    """Add `factor` times the forces of triangles, see `membrane_energies`, to `out` (n, 3)."""
     for t in range(len(triangles)):
         f1, f2, e1, e2, e12 = strain(x, triangles, gradients, t)
         V, mu, a, law = factor * constants[t, 0], constants[t, 1], constants[t, 2], constants[t, 3]
@@ -112,11 +86,3 @@ def add_forces_of_shells(x, triangles, gradients, constants, hinges, moments, fa
             u, w = V * (s1 * g[0] + s12 * g[1]), V * (s12 * g[0] + s2 * g[1])
             for j in range(3):
                 out[triangles[t, p], j] -= u * f1[j] + w * f2[j]
-    for e in range(len(hinges)):
-        _, a, b, k, l = _hinge(x, hinges, e)  # noqa: E741
-        m = factor * moments[e]
-        for j in range(3):
-            out[hinges[e, 0], j] -= m * a[j]
-            out[hinges[e, 1], j] -= m * b[j]
-            out[hinges[e, 2], j] -= m * k[j]
-            out[hinges[e, 3], j] -= m * l[j]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from supple.materials.elastic import EdgesAndVolume
 from supple.materials.material import Elastic
 from supple.materials.shells.elements import ShellElements
-from supple.materials.shells.kernels import angles_of, membrane_energies
+from supple.materials.shells.hinges import angles_of
+from supple.materials.shells.kernels import membrane_energies
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit, prange
 

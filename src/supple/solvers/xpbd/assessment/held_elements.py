@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.shells.kernels import add_forces_of_shells, angles_of
+from supple.materials.shells.hinges import add_hinge_forces, angles_of, turns_of
+from supple.materials.shells.kernels import add_membrane_forces
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
@@ -68,7 +69,9 @@ class HeldElements(ElasticEnergy):
         _add_forces_of_springs(points, *self._all_springs, 1.0 / h**2, factor, out)
         if self._own is not None:
             moments = self._own.moments(angles_of(points, self._own.hinges) - self._own.rest_angles)
-            add_forces_of_shells(points, *self._of_sheets, moments[self._turning], factor, out)
+            *sheets, hinges = self._of_sheets
+            add_membrane_forces(points, *sheets, factor, out)
+            add_hinge_forces(turns_of(points, hinges), hinges, -factor * moments[self._turning], out)
 
 
 @njit(cache=True)

@@ -31,7 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.shells.elements import ShellElements
-from supple.materials.shells.kernels import angles_of, hinge, rates_of, strains_of
+from supple.materials.shells.hinges import angles_of, hinge_products, turns_of
+from supple.materials.shells.kernels import hinge, strains_of
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, make_groups, nine, put_nine, put_twelve, twelve
@@ -122,7 +123,9 @@ class HingeConstraints:
         turned = self._angles - shells.rest_angles
         if self._is_damped:
             tau = np.maximum(shells.hinge_damping - h, 0.0) / (1.0 + h * h * self._ratios) ** 2
-            changes = tau * rates_of(x, v, shells.hinges)
+            changes = np.empty(len(D))
+            hinge_products(turns_of(x, shells.hinges), shells.hinges, v, changes)
+            changes *= tau
             moments = shells.moments(turned + changes) - D * changes
             self.sweep.write(4, np.column_stack([D * (1.0 + tau / h), moments])[self._rows])
         else:

@@ -28,9 +28,9 @@ from supple.solvers.xpbd.contact.tets import determinant, least_J, share_of_tet
 # Of the gap: a distance below this may not become smaller in a substep.
 NEAREST = 0.02
 # Of the gap beyond offsets: to what distance things are moved that begin through each other, and pairs that have been
-# that far apart and came nearer by what rows leave. With .15, a ball between two bars is truncated. And things that touch, of which no
-# side is known at the next look: a body moves for it by less than 1e-6 of its edges, which is below round-off of its
-# energy.
+# that far apart and came nearer by what rows leave. With .15, a ball between two bars is truncated. And things that
+# touch, of which no side is known at the next look: a body moves for it by less than 1e-6 of its edges, which is below
+# round-off of its energy.
 PARTED, APART = 0.2, 1e-5
 # Of sqrt(a c), see `_keeps_apart`: 1 is where sides meet.
 TURNING = 0.9

@@ -28,10 +28,10 @@ NIL, OPPOSED = 5e-6, -0.25
 # A pair: its nodes and kind; of pairs with a shape, the number of that, of pairs with a triangle, that of the triangle;
 # its parts as one number, see `keys_of`, by which pairs are sorted. Whether it pushes: pairs of one body that are near
 # each other at rest are only kept apart. Whether the sides penetrated each other when the frame began: then they are
-# not kept on their sides, but pushed out along the normals at that time. Friction; the smallest gap of its nodes and the
-# offsets of its sides together, and these alone [m]. The normal as of the latest look, and the impulse with which the
-# next substep begins [kg m]. The largest distance of its rows since it is listed, its gap at most [m]. Whether it may
-# come near while its nodes go on, see `near_pairs`.
+# not kept on their sides, but pushed out along the normals at that time. Friction; the smallest gap of its nodes and
+# the offsets of its sides together, and these alone [m]. The normal as of the latest look, and the impulse with which
+# the next substep begins [kg m]. The largest distance of its rows since it is listed, its gap at most [m]. Whether it
+# may come near while its nodes go on, see `near_pairs`.
 PAIR = np.dtype(
     [
         ("keys", np.int64),

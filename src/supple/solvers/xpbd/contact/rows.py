@@ -21,7 +21,8 @@ PARALLEL = 0.05
 
 # A row: the number of its pair, its nodes and its kind; c_i, q (see `pairs`), n, the least n . r, and d [m]; the gap
 # of the pair and its offsets [m]; the impulse [kg m] along n that changes n . r by one, see `softness`, 0 where
-# nothing moves or pushes; the same along the surface, of rows with a rigid body, 0 until something slips; the coefficient of friction;
+# nothing moves or pushes; the same along the surface, of rows with a rigid body, 0 until something slips; the
+# coefficient of friction;
 # the accumulated impulse [kg m]; whether a node is on a rigid body; of rows with rigid bodies these, shares and arms
 # [m], and what is fixed [m]; see `levers`.
 ROW = np.dtype(
