@@ -33,8 +33,8 @@ class HeldElements(ElasticEnergy):
             shells = self._own = system.shells
             self._sheets, self._turning = (held[each].any(axis=1) for each in (shells.triangles, shells.hinges))
             near = self._sheets
-            self._of_sheets = [np.ascontiguousarray(each[near]) for each in (shells.triangles, shells.gradients)]
-            self._of_sheets += [shells.laws[near], np.ascontiguousarray(shells.hinges[self._turning])]
+            self._sheet_triangles, self._hinges = shells.triangles[near], shells.hinges[self._turning]
+            self._membranes = shells.gradients[near], shells.laws[near]
         near = held[springs.vertices].any(axis=1)
         laws = np.column_stack([springs.rest_lengths, springs.stiffness, np.zeros(len(springs))])
         # An edge is a spring to a vertex: to the place 0 of an edge of length zero.
@@ -51,7 +51,7 @@ class HeldElements(ElasticEnergy):
         ends, springs = self._all_springs
         np.add.at(out, ends, springs[:, 1, None])
         if self._own is not None:
-            np.add.at(out, self._of_sheets[0], self._own.stiffness[self._sheets])
+            np.add.at(out, self._sheet_triangles, self._own.stiffness[self._sheets])
         return out
 
     def grow(self, Dm_inv: NDArray[np.float64], volumes: NDArray[np.float64]) -> None:
@@ -69,9 +69,9 @@ class HeldElements(ElasticEnergy):
         _add_forces_of_springs(points, *self._all_springs, 1.0 / h**2, factor, out)
         if self._own is not None:
             moments = self._own.moments(angles_of(points, self._own.hinges) - self._own.rest_angles)
-            *sheets, hinges = self._of_sheets
-            add_membrane_forces(points, *sheets, factor, out)
-            add_hinge_forces(turns_of(points, hinges), hinges, -factor * moments[self._turning], out)
+            add_membrane_forces(points, self._sheet_triangles, *self._membranes, factor, out)
+            turns = turns_of(points, self._hinges)
+            add_hinge_forces(turns, self._hinges, -factor * moments[self._turning], out)
 
 
 @njit(cache=True)

@@ -65,7 +65,7 @@ class MembraneConstraints:
         stiffness = (shells.areas * shells.thickness * shells.mu)[rows]
         # A direction in which nothing can move has a metric of zero.
         metric = np.maximum(metric, 1e-12 * metric[:, 1:])
-        law = np.column_stack([stiffness, shells.a[rows], shells.neo_hookean[rows]])
+        law = np.column_stack([stiffness, shells.a[rows], shells.neo_hookean[rows].astype(np.float64)])
         tau = shells.damping[rows, None]
         constants = np.hstack([(b @ axes)[:, 1:].reshape(-1, 4), metric, law, w, tau, np.zeros((len(rows), 3))])
         self._triangles, self._gradients = np.ascontiguousarray(triangles), np.ascontiguousarray(b @ axes)
@@ -74,9 +74,8 @@ class MembraneConstraints:
 
     def begin_frame(self, x: Floats, known: Floats | None) -> None:
         """See `ElementStage`; (t, 3) strains 11, 22, 12."""
-        if known is None or known.shape != (self.count, 3):
-            known = strains_of(x, self._triangles, self._gradients)
-        self.sweep.write(13, known)
+        fits = known is not None and known.shape == (self.count, 3)
+        self.sweep.write(13, known if fits else strains_of(x, self._triangles, self._gradients))
 
     def begin(self, x: Floats, v: Floats, h: float) -> None:
         """See `ElementStage`."""
