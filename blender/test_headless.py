@@ -72,6 +72,18 @@ def a_ball_falls_on_the_floor_and_a_lift():
     assert not ball.modifiers
 
 
+def a_cloth_falls_on_the_floor():
+    scene = empty_scene()
+    scene.supple.solver = "implicit"
+    cloth = mesh_object(
+        bpy.ops.mesh.primitive_grid_add, "cloth", x_subdivisions=6, y_subdivisions=6, size=0.4, location=(0, 0, 0.05)
+    )
+    cloth.supple.role, cloth.supple.thickness = "SHELL", 4e-3
+    assert bpy.ops.supple.simulate() == {"FINISHED"}
+    heights = world_vertices(cloth, FRAMES + 1)[:, 2]
+    assert 2e-3 < heights.min() < heights.max() < 4e-3, heights
+
+
 def a_paddle_turns_a_ball_aside():
     scene = empty_scene()
     scene.supple.floor_height = 0.0
@@ -158,6 +170,7 @@ bpy.ops.preferences.addon_install(filepath=str(Path(sys.argv[-1]).resolve()))
 assert bpy.ops.preferences.addon_enable(module="supple_addon") == {"FINISHED"}
 for test in (
     a_ball_falls_on_the_floor_and_a_lift,
+    a_cloth_falls_on_the_floor,
     a_paddle_turns_a_ball_aside,
     an_armature_drives_pins,
     mistakes_are_named,

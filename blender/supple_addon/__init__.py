@@ -55,6 +55,7 @@ class SuppleObject(bpy.types.PropertyGroup):
         items=[
             ("NONE", "None", "Not part of the simulation"),
             ("SOFT", "Soft body", "Its closed surface is filled with tetrahedra"),
+            ("SHELL", "Cloth", "A thin sheet: its surface may be open; needs the solver Implicit"),
             ("OBSTACLE", "Obstacle", "Soft bodies collide with it; its location and rotation may be animated"),
         ],
     )
@@ -64,6 +65,7 @@ class SuppleObject(bpy.types.PropertyGroup):
     damping: FloatProperty(name="Damping [s]", default=0.005, min=0.0)
     friction: FloatProperty(name="Friction", default=0.5, min=0.0, soft_max=1.0)
     tets: IntProperty(name="Tetrahedra", description="Their number, within 10 %", default=3000, min=20)
+    thickness: FloatProperty(name="Thickness [m]", default=2e-3, min=1e-6, precision=4)
     repair: BoolProperty(
         name="Repair", description="Repair a surface with holes or crossings first (needs supple[dirty])"
     )
@@ -185,8 +187,9 @@ class SUPPLE_PT_panel(bpy.types.Panel):
             values = thing.supple
             layout.label(text=thing.name)
             layout.prop(values, "role")
-            if values.role == "SOFT":
-                for key in ("youngs", "poisson", "density", "damping", "friction", "tets", "repair"):
+            if values.role in ("SOFT", "SHELL"):
+                own = ("tets", "repair") if values.role == "SOFT" else ("thickness",)
+                for key in ("youngs", "poisson", "density", "damping", "friction", *own):
                     layout.prop(values, key)
                 layout.prop_search(values, "pinned", thing, "vertex_groups")
             elif values.role == "OBSTACLE":

@@ -72,12 +72,29 @@ def bake(job: dict[str, Any], folder: Path) -> dict[str, Any]:
     return {"summary": f"{count} frames of {len(bodies)} bodies, {tets} tets", "warnings": bad}
 
 
-def _body(described: dict[str, Any], folder: Path, dt: float) -> tuple[sp.Body, sp.Pin | None, Embedding]:
-    """A soft body, the pin of its vertex group, and Blender's vertices in its tets."""
+class Corners:
+    """Blender's vertices (n, 3), of which those at `rows` are the points of a shell; loose ones stay."""
+
+    def __init__(self, vertices: NDArray[np.float64], rows: NDArray[np.integer]) -> None:
+        self.vertices, self.rows = vertices, rows
+
+    def apply(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where they are when the points of the shell are at `points` [m]."""
+        out = self.vertices.copy()
+        out[self.rows] = points
+        return out
+
+
+def _body(
+    described: dict[str, Any], folder: Path, dt: float
+) -> tuple[sp.Body | sp.Shell, sp.Pin | None, Embedding | Corners]:
+    """A soft body or a shell, the pin of its vertex group, and Blender's vertices in its tets or at its points."""
     with np.load(folder / described["arrays"]) as arrays:
         vertices, triangles, pinned, path = (arrays[key] for key in ("vertices", "triangles", "pinned", "path"))
     name = described["name"]
     surface = sp.SurfaceMesh(vertices, triangles)
+    if described.get("role") == "SHELL":
+        return _shell(described, surface, pinned, path, dt)
     try:
         mesh = sp.tetrahedralize(surface.compact(), tets=described["tets"], repair=described["repair"])
     except MeshingError as error:
@@ -95,6 +112,25 @@ def _body(described: dict[str, Any], folder: Path, dt: float) -> tuple[sp.Body, 
     chosen = np.flatnonzero(pinned[KDTree(vertices).query(mesh.vertices)[1]])
     shifts = carried(mesh.vertices[chosen], path) - mesh.vertices[chosen]
     return body, sp.Pin(name, chosen, _motion(shifts, dt)), skin
+
+
+def _shell(
+    described: dict[str, Any],
+    surface: sp.SurfaceMesh,
+    pinned: NDArray[np.bool_],
+    path: NDArray[np.float64],
+    dt: float,
+) -> tuple[sp.Shell, sp.Pin | None, Corners]:
+    """Its points are the vertices of the surface that triangles use."""
+    keys = ("youngs", "poisson", "density", "damping", "thickness")
+    material = sp.ShellMaterial(**{key: described[key] for key in keys})
+    rows = surface.used_vertices
+    shell = sp.Shell(described["name"], surface.compact(), material, friction=described["friction"])
+    chosen = np.flatnonzero(pinned[rows])
+    if not len(chosen):
+        return shell, None, Corners(surface.vertices, rows)
+    shifts = (path - path[0])[:, np.isin(np.flatnonzero(pinned), rows)]
+    return shell, sp.Pin(shell.name, chosen, _motion(shifts, dt)), Corners(surface.vertices, rows)
 
 
 def carried(points: NDArray[np.float64], path: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -29,10 +29,10 @@ def write(context, folder):
     """
     scene = context.scene
     things = [thing for thing in scene.objects if thing.type == "MESH" and thing.supple.role != "NONE"]
-    bodies = [thing for thing in things if thing.supple.role == "SOFT"]
+    bodies = [thing for thing in things if thing.supple.role in ("SOFT", "SHELL")]
     obstacles = [thing for thing in things if thing.supple.role == "OBSTACLE"]
     if not bodies:
-        raise JobError("no object is a soft body; choose the role 'Soft body' in the panel Supple")
+        raise JobError("no object is a soft body; choose the role 'Soft body' or 'Cloth' in the panel Supple")
     if scene.frame_end <= scene.frame_start:
         raise JobError("the scene has one frame only; set its end after its start")
     for thing in bodies:
@@ -54,7 +54,7 @@ def write(context, folder):
             pinned=pinned,
             path=path[:, pinned],
         )
-        keys = ("youngs", "poisson", "density", "damping", "friction", "tets", "repair")
+        keys = ("role", "youngs", "poisson", "density", "damping", "friction", "tets", "repair", "thickness")
         described.append(
             {"name": thing.name, "arrays": f"arrays_{k}.npz", **{key: getattr(values, key) for key in keys}}
         )

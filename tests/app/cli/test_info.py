@@ -28,7 +28,7 @@ def rows_of(tmp_path, monkeypatch, capsys):
     return rows
 
 
-def test_a_surface_with_a_hole(rows_of):
+def test_a_surface_with_a_hole(rows_of, tmp_path):
     box = sp.shapes.box_surface((1, 2, 3), (1, 1, 1))
     sp.SurfaceMesh(box.vertices, box.triangles[1:]).save("open.stl")
     rows = rows_of("open.stl")
@@ -40,6 +40,13 @@ def test_a_surface_with_a_hole(rows_of):
     wing = [*box.triangles[0, :2], len(box.vertices)]
     wing = sp.SurfaceMesh([*box.vertices, (9, 9, 9)], [*box.triangles, wing])
     wing.save("twice.obj")
+    (tmp_path / "cloth.yaml").write_text(
+        "bodies: [{name: c, mesh: {file: open.stl}, shell: {youngs: 1e5, poisson: 0.3, thickness: 0.01}}]",
+        encoding="utf-8",
+    )
+    scene = rows_of("cloth.yaml")
+    assert (scene["tets"], scene["triangles"]) == ("0", "11 of shells")
+    assert scene["body c"].startswith("neo_hookean shell 0.01 m thick")
     assert "not possible: the edge" in rows_of("twice.obj")["as a shell"]
 
 

@@ -195,11 +195,14 @@ def _scene(file: Path, timed: bool, modes: int | None, confine: bool) -> None:
 
 def _counted(system: System) -> list[tuple[str, str]]:
     """How many things a scene has, and their names."""
-    scene = system.scene
+    from supple.results.recording.sheet_cells import SheetCells
+
+    scene, sheets = system.scene, SheetCells(system.bodies)
     return [
         ("bodies", str(len(scene.bodies))),
         ("vertices", str(len(system.masses))),
         ("tets", str(len(system.tets))),
+        *([("triangles", f"{len(sheets.triangles)} of shells")] if sheets.shells else []),
         ("obstacles", ", ".join(f"{o.name} ({type(o).__name__})" for o in scene.obstacles) or "none"),
         ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
         ("loads", ", ".join(load.label for load in scene.loads) or "none"),
