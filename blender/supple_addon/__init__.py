@@ -55,7 +55,7 @@ class SuppleObject(bpy.types.PropertyGroup):
         items=[
             ("NONE", "None", "Not part of the simulation"),
             ("SOFT", "Soft body", "Its closed surface is filled with tetrahedra"),
-            ("SHELL", "Cloth", "A thin sheet: its surface may be open; needs the solver Implicit"),
+            ("SHELL", "Cloth", "A thin sheet, whose surface may be open"),
             ("OBSTACLE", "Obstacle", "Soft bodies collide with it; its location and rotation may be animated"),
         ],
     )

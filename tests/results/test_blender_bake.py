@@ -71,7 +71,8 @@ def test_every_vertex_has_a_position_in_every_frame(tmp_path: Path, capsys: pyte
     assert capsys.readouterr().out.splitlines()[-1] == "frame 4 of 4"
 
 
-def test_a_cloth_keeps_its_vertices_and_loose_ones_stay(tmp_path: Path) -> None:
+@pytest.mark.parametrize("solver", ["implicit", "xpbd"])
+def test_a_cloth_keeps_its_vertices_and_loose_ones_stay(tmp_path: Path, solver: str) -> None:
     job(tmp_path, role="SHELL", thickness=2e-3)
     sheet = shapes.sheet(0.3, 0.3, 0.05)
     vertices = np.concatenate([[[1.0, 2.0, 3.0]], sheet.vertices[:, [0, 2, 1]]])
@@ -80,7 +81,7 @@ def test_a_cloth_keeps_its_vertices_and_loose_ones_stay(tmp_path: Path) -> None:
     path = np.array([vertices[pinned] + [0.0, 0.0, 0.01 * k] for k in range(5)])
     np.savez(tmp_path / "a.npz", vertices=vertices, triangles=triangles, pinned=pinned, path=path)
     whole = json.loads((tmp_path / "job.json").read_text("utf-8"))
-    (tmp_path / "job.json").write_text(json.dumps({**whole, "solver": "implicit"}), "utf-8")
+    (tmp_path / "job.json").write_text(json.dumps({**whole, "solver": solver}), "utf-8")
     assert bake.main(tmp_path) == 0
     positions = np.load(tmp_path / "positions_0.npy")
     np.testing.assert_allclose(positions[0], vertices, atol=1e-7)

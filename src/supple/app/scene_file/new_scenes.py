@@ -79,15 +79,12 @@ obstacles:
 gravity: [0, -9.81, 0]
 
 # {choice}
-solver: {solver}
+solver: {{kind: auto, accuracy: 0.1}}   # or xpbd: fast; a smaller accuracy is stiffer and slower; implicit: exact
 dt: 1/60               # from frame to frame
 steps: 120             # frames
 output: {{page: true, plot: true}}
 """
 
-
-_SOLVER = "{kind: auto, accuracy: 0.1}   # or xpbd: fast; a smaller accuracy is stiffer and slower; implicit: exact"
-_SOLVER_OF_SHELLS = "{kind: implicit}   # surfaces never cross, whatever happens"
 
 # The sag of a body under its own weight, as a part of its size, is about density * gravity * size / youngs.
 _SOFTEST, _LARGEST_SAG, _WEIGHT = 5e4, 0.05, 1000.0 * 9.81
@@ -141,8 +138,7 @@ def new_scene_of(
     if triangles is not None:
         youngs = _modulus(max(_SHELL_SOFTEST, _SHELL_WEIGHT * size / _SHELL_SAG))
         choice, thickness = f"About {triangles:,} triangles.", f"{_SHELL_THICKNESS * size:.1g}"
-        own = {"youngs": youngs, "thickness": thickness, "choice": choice, "solver": _SOLVER_OF_SHELLS}
-        return _text(name, _MESH + _SHELL, **values | own)
+        return _text(name, _MESH + _SHELL, **values, youngs=youngs, thickness=thickness, choice=choice)
     choice = _choice(volume, tets, body, _youngs(size))
     return _text(name, _MESH + _SOFT, youngs=_youngs(size), choice=choice, **values)
 
@@ -176,7 +172,7 @@ def _choice(volume: float, tets: int, body: str, youngs: str) -> str:
 
 
 def _text(name: str, entry: str, **values: str) -> str:
-    return _HEAD.format(name=name) + (entry + _REST).format(**{"solver": _SOLVER} | values)
+    return _HEAD.format(name=name) + (entry + _REST).format(**values)
 
 
 logger = logging.getLogger(__name__)
