@@ -19,6 +19,7 @@ from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.shell import Shell
 from supple.solvers.implicit.solver import Implicit
+from supple.solvers.xpbd.solver import XPBD
 
 SIDE, THICKNESS, RADIUS, BALLS, G = 0.5, 2e-3, 0.035, 6, 9.81
 GATHERED, CARRIED = 1.2, 1.8  # [s]
@@ -99,7 +100,7 @@ BAG = Demo(
         "folds of the cloth against each other touch with friction, at the thickness of the cloth, and nothing crosses."
     ),
     scene=scene,
-    solvers={"implicit": Implicit},
+    solvers={"implicit": Implicit, "xpbd": XPBD},
     measurement=_Measurement,
     steps=140,
 )

@@ -32,7 +32,7 @@ def scene() -> Scene:
     low = min(skin.bounds[0][1], float(bear.vertices[:, 1].min()))
     feet = np.flatnonzero(bear.vertices[:, 1] < low + 0.15 * HEIGHT)
     bodies = [
-        Shell("cloth", shapes.sheet(SIDE, SIDE, SIDE / 12), cloth, position=(0, HEIGHT + 0.02, 0), friction=0.5),
+        Shell("cloth", shapes.sheet(SIDE, SIDE, SIDE / 16), cloth, position=(0, HEIGHT + 0.02, 0), friction=0.5),
         Body(
             "bear",
             bear,
