@@ -163,3 +163,27 @@ def test_a_rod_is_tubes_about_its_edges_that_turn_with_it():
         volume = np.pi * 1e-4 * rod.lengths.sum() + 2.0 * 4.0 / 3.0 * np.pi * 1e-6
         assert sp.SurfaceMesh(drawn, triangles).volume == pytest.approx(volume, rel=0.08)
     assert len(split_at_creases(drawn, triangles)[0]) == len(rows)
+
+
+def test_paraview_sees_rods_as_lines_with_their_stretches(tmp_path, tools):
+    rod = sp.Rod("rod", [[0, 0, 0], [0.1, 0, 0], [0.2, 0.1, 0]], sp.RodMaterial(youngs=1e6, radius=0.01))
+    cloth = sp.Shell("cloth", sp.shapes.sheet(0.2, 0.2, 0.1), MATERIAL, position=(0.0, -1.0, 0.0))
+    x = 1.5 * rod.points
+    sink = sp.Recorder(tmp_path / "rod.vtkhdf")
+    scene, solver = sp.Scene([rod, cloth], gravity=(0, 0, 0)), sp.Implicit(contact=None)
+    list(sp.simulate(scene, solver, 1e-9, 1, initial_positions={"rod": x}, sinks=[sink]))
+    vtk, to_numpy = tools.vtk()
+    reader = vtk.vtkHDFReader()
+    reader.SetFileName(str(tmp_path / "rod.vtkhdf"))
+    reader.UpdateInformation()
+    reader.Update()
+    grid = reader.GetOutput()
+    kinds = [grid.GetCellType(k) for k in range(grid.GetNumberOfCells())]
+    assert kinds == 2 * [vtk.VTK_LINE] + 8 * [vtk.VTK_TRIANGLE]
+    np.testing.assert_allclose(to_numpy(grid.GetCellData().GetArray("det_F")), 2 * [1.5] + 8 * [1.0], rtol=1e-6)
+    last = sp.read_recording(tmp_path / "rod.vtkhdf").export("vtu", tmp_path / "last.vtu")
+    meshio = pytest.importorskip("meshio")
+    mesh = meshio.read(last)
+    assert {block.type: len(block.data) for block in mesh.cells} == {"line": 2, "triangle": 8}
+    ratios = dict(zip([block.type for block in mesh.cells], mesh.cell_data["det_F"], strict=True))
+    np.testing.assert_allclose(ratios["line"], 1.5, rtol=1e-6)

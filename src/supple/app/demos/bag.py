@@ -11,7 +11,7 @@ from supple.materials.elastic import StableNeoHookean
 from supple.materials.shells.shell_material import ShellMaterial
 from supple.mesh import shapes
 from supple.results.frame import Frame
-from supple.results.recording.sheet_cells import area_ratios
+from supple.results.recording.thin_cells import ratios_of
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
 from supple.scene.obstacles.half_space import HalfSpace
@@ -53,7 +53,7 @@ class _Measurement(Measurement):
     def values(self, frame: Frame) -> dict[str, Any]:
         balls = [frame.positions[f"ball{k + 1}"] for k in range(BALLS)]
         held = sum((force for force in frame.reactions.values()), np.zeros(3))
-        ratios = area_ratios(body_range(frame, "bag"), frame.positions["bag"])
+        ratios = ratios_of(body_range(frame, "bag"), frame.positions["bag"])
         return {
             **super().values(frame),
             "meetings": meetings(frame),

@@ -11,7 +11,7 @@ from supple.materials.elastic import StableNeoHookean
 from supple.materials.shells.shell_material import ShellMaterial
 from supple.mesh import shapes
 from supple.results.frame import Frame
-from supple.results.recording.sheet_cells import area_ratios
+from supple.results.recording.thin_cells import ratios_of
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.obstacles.sphere import Sphere
@@ -50,7 +50,7 @@ def scene() -> Scene:
 
 class _Measurement(Measurement):
     def values(self, frame: Frame) -> dict[str, Any]:
-        ratios = area_ratios(body_range(frame, "cloth"), frame.positions["cloth"])
+        ratios = ratios_of(body_range(frame, "cloth"), frame.positions["cloth"])
         return {"meetings": meetings(frame), "ratios": (float(ratios.min()), float(ratios.max()))}
 
     def claims(self) -> list[Claim]:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from supple.mesh.rod_mesh import RodMesh
 from supple.results.recording.reader import Recording
-from supple.results.recording.sheet_cells import area_ratios
+from supple.results.recording.thin_cells import ratios_of, thin_cells
 from supple.runtime.replacing import whole_file
-from supple.scene.rod import Rod
-from supple.scene.shell import Shell
 
 
 def write_last_vtu(recording: Recording, output: Path) -> None:
@@ -32,13 +29,13 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
             triangles.append(body.skin.triangles + starts[i])
             of_triangle += [i] * len(body.skin.triangles)
             ratios += [float(frame.det_F[body.tets.start])] * len(body.skin.triangles)
-        elif isinstance(body.body, Shell):
-            triangles.append(body.boundary + starts[i])
-            of_triangle += [i] * len(body.boundary)
-            ratios += area_ratios(body, positions[i]).tolist()
-        elif isinstance(body.body, Rod):
-            mesh = body.body.mesh
-            parts.append(("line", mesh.line + starts[i], _stretches(positions[i], mesh), np.full(len(mesh.line), i)))
+        elif (cells := thin_cells(body)) is not None and cells.shape[1] == 3:
+            triangles.append(cells + starts[i])
+            of_triangle += [i] * len(cells)
+            ratios += ratios_of(body, positions[i]).tolist()
+        elif cells is not None:
+            lines = ratios_of(body, positions[i])
+            parts.append(("line", cells + starts[i], lines, np.full(len(cells), i, dtype=np.int32)))
         else:
             nodes = body.body.mesh.nodes + starts[i]
             tets.append(body.tets)
@@ -71,9 +68,3 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
     )
     with whole_file(output) as fresh:
         mesh.write(fresh, file_format="vtu")
-
-
-def _stretches(x: NDArray[np.float64], mesh: RodMesh) -> NDArray[np.float64]:
-    """(e,) the lengths of a rod's edges over those at rest."""
-    now, rest = (np.linalg.norm(np.diff(points[mesh.line], axis=1)[:, 0], axis=1) for points in (x, mesh.vertices))
-    return now / rest

@@ -28,7 +28,7 @@ from supple.results.recording.recorder import (
     field_series,
     frame_layout,
 )
-from supple.results.recording.sheet_cells import SheetCells
+from supple.results.recording.thin_cells import ThinCells
 from supple.scene.joints.placed import PlacedJoint, placed_joints
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rows import BodyRows, rows_of
@@ -68,7 +68,7 @@ class RecordedContents(Description):
         n, m, names = self.bodies[-1].vertices.stop, self.bodies[-1].tets.stop, self.scene.stitching.names
         breakable = len(names) if names.breakable else 0
         given = self.details, self.fields, self.sensors, flowing, breakable, self.functions
-        cells = m + len(SheetCells(self.bodies).triangles)
+        cells = m + len(ThinCells(self.bodies).owners)
         self.layout = frame_layout(n, cells, len(self.obstacles), *given)
         self._series = {series.path: series for series in self.layout.series}
         own = [field_series(field, 0, 0).path for field in self.fields]

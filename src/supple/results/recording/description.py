@@ -25,7 +25,7 @@ from supple.mesh.tetmesh import TetMesh
 from supple.model.state import Status
 from supple.results.recording.checked_hdf5 import CheckedFile
 from supple.results.recording.details import RecordedDetails, RecordedField
-from supple.results.recording.sheet_cells import SheetCells
+from supple.results.recording.thin_cells import ThinCells
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rows import rows_of
 from supple.scene.scene import Scene
@@ -35,7 +35,8 @@ _GROUP, _HEADER = "supple", "supple/header"
 _INLINE = 16  # entries of arrays that are in the tree: vectors and matrices
 # What a scene does not contain, such as solvers and studies.
 _OF_PROGRAM = re.compile(r"supple\.(?!scene|materials)")
-VTK_TRIANGLE, VTK_TETRA, VTK_QUADRATIC_TETRA = 5, 10, 24
+# The types of VTK of cells by their number of nodes: lines, triangles, tets, quadratic tets.
+_KINDS = {2: 3, 3: 5, 4: 10, 10: 24}
 
 
 @dataclass(eq=False, repr=False)
@@ -161,22 +162,22 @@ def _check_consistency(found: Description, functions: list[int]) -> None:
 
 
 def _write_grid(grid: h5py.Group, scene: Scene) -> None:
-    """Write what VTK needs to know of the tets, and of the triangles of shells."""
+    """Write what VTK needs to know of the tets, of the triangles of shells and of the edges of rods."""
     parts = rows_of(scene.bodies)
-    sheets = SheetCells(parts)
-    n, m = parts[-1].vertices.stop, parts[-1].tets.stop + len(sheets.triangles)
+    thin = ThinCells(parts)
+    n, m = parts[-1].vertices.stop, parts[-1].tets.stop + len(thin.owners)
     grid.attrs.create("Version", np.array([2, 2], dtype=np.int64))
     grid.attrs.create("Type", np.bytes_("UnstructuredGrid"))
-    cells = [*(part.body.mesh.nodes + part.vertices.start for part in parts), sheets.triangles]
+    cells = [*(part.body.mesh.nodes + part.vertices.start for part in parts)]
+    cells += [own + part.vertices.start for part, own in thin.parts]
     widths = np.concatenate([np.full(len(nodes), nodes.shape[1], dtype=np.int64) for nodes in cells])
     for name, count in (("NumberOfPoints", n), ("NumberOfCells", m), ("NumberOfConnectivityIds", widths.sum())):
         grid[name] = np.array([count], dtype=np.int64)
     grid["Connectivity"] = np.concatenate([nodes.ravel() for nodes in cells]).astype(np.int64)
     grid["Offsets"] = np.concatenate([[0], np.cumsum(widths)])
-    kinds = {3: VTK_TRIANGLE, 4: VTK_TETRA, 10: VTK_QUADRATIC_TETRA}
-    grid["Types"] = np.array([kinds[width] for width in widths], dtype=np.uint8)
+    grid["Types"] = np.array([_KINDS[width] for width in widths], dtype=np.uint8)
     of_point, of_cell = np.zeros(n, dtype=np.int32), np.zeros(m, dtype=np.int32)
-    of_cell[m - len(sheets.owners) :] = sheets.owners
+    of_cell[m - len(thin.owners) :] = thin.owners
     for part in parts:
         of_point[part.vertices], of_cell[part.tets] = part.number, part.number
     grid["PointData/body"], grid["CellData/body"] = of_point, of_cell

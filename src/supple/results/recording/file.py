@@ -56,7 +56,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a recording's frames hold, and how many points and cells each has: tets, and triangles of shells."""
+    """What a recording's frames hold, and its points and cells: tets, triangles of shells, edges of rods."""
 
     points: int
     cells: int

@@ -23,7 +23,7 @@ from supple.results.recording.description import Description, described, write_d
 from supple.results.recording.details import RecordedDetails, RecordedSensor, recorded_sensors
 from supple.results.recording.file import TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.results.recording.functions import Values, function_series, values_at
-from supple.results.recording.sheet_cells import SheetCells
+from supple.results.recording.thin_cells import ThinCells
 from supple.runtime.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
 
 logger = logging.getLogger(__name__)
@@ -133,7 +133,7 @@ class Recorder:
         self._fields = checked_fields(fields)
         self._file: RecordingFile | None = None
         self._details = RecordedDetails()
-        self._sheets = SheetCells(())
+        self._thin = ThinCells(())
         self._wanted = 0
         self._functions: list[Callable[..., Any]] = []
         self._at_start: Values = ()
@@ -158,7 +158,7 @@ class Recorder:
             statuses_of_codes=tuple(str(status) for status in Status),
         )
         if self._fields:
-            sizes = len(system.rest_positions), len(system.tets) + len(self._sheets.triangles)
+            sizes = len(system.rest_positions), len(system.tets) + len(self._thin.owners)
             logger.info("%s: %s", self.path, cost(self._fields, *sizes, steps + 1))
         self._wanted = steps + 1
         capacity = self.first_capacity(layout)
@@ -183,8 +183,8 @@ class Recorder:
         self._details = RecordedDetails.like(first.report.details)
         self._functions = described(system.scene)[2]
         self._at_start = values_at(self._functions, 0.0)
-        self._sheets = SheetCells(system.bodies)
-        sizes = len(system.rest_positions), len(system.tets) + len(self._sheets.triangles), len(system.obstacles)
+        self._thin = ThinCells(system.bodies)
+        sizes = len(system.rest_positions), len(system.tets) + len(self._thin.owners), len(system.obstacles)
         names, sensors = system.scene.stitching.names, recorded_sensors(system.scene)
         counts = count_of(system.laws.material), len(names) if names.breakable else 0
         return frame_layout(*sizes, self._details, self._fields, sensors, *counts, self._at_start)
@@ -259,7 +259,7 @@ class Recorder:
         file = self._file
         file.put("VTKHDF/Points", frame.state.positions)
         file.put("VTKHDF/PointData/velocities", frame.state.velocities)
-        ratios = self._sheets.area_ratios(frame.state.positions)
+        ratios = self._thin.ratios(frame.state.positions)
         file.put("VTKHDF/CellData/det_F", np.concatenate([frame.det_F, ratios]))
         file.put(TIMES, frame.time)
         file.put("supple/frames/index", frame.index)
@@ -297,7 +297,7 @@ class Recorder:
             file.put(sensor.series.path, readings[sensor.name].numbers())
         for field in self._fields:
             values = _recorded(field, frame)
-            values = self._sheets.with_nothing(values) if field.at == "tets" else values
+            values = self._thin.with_nothing(values) if field.at == "tets" else values
             with np.errstate(over="ignore"):  # beyond single precision, a value is infinite
                 file.put(field_series(field, 0, 0).path, values.astype(np.float32))
         file.commit()

@@ -195,14 +195,18 @@ def _scene(file: Path, timed: bool, modes: int | None, confine: bool) -> None:
 
 def _counted(system: System) -> list[tuple[str, str]]:
     """How many things a scene has, and their names."""
-    from supple.results.recording.sheet_cells import SheetCells
+    from supple.results.recording.thin_cells import ThinCells
 
-    scene, sheets = system.scene, SheetCells(system.bodies)
+    scene = system.scene
+    counts = {3: 0, 2: 0}
+    for _, cells in ThinCells(system.bodies).parts:
+        counts[cells.shape[1]] += len(cells)
     return [
         ("bodies", str(len(scene.bodies))),
         ("vertices", str(len(system.masses))),
         ("tets", str(len(system.tets))),
-        *([("triangles", f"{len(sheets.triangles)} of shells")] if sheets.shells else []),
+        *([("triangles", f"{counts[3]} of shells")] if counts[3] else []),
+        *([("edges", f"{counts[2]} of rods")] if counts[2] else []),
         ("obstacles", ", ".join(f"{o.name} ({type(o).__name__})" for o in scene.obstacles) or "none"),
         ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
         ("loads", ", ".join(load.label for load in scene.loads) or "none"),
