@@ -24,7 +24,8 @@ is taken alike. Umetani, Schmidt, Stam, "Position-based elastic rods" (2014), fo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,10 @@ FORMS = np.zeros((4, 3, 3))
 for _k, (_i, _j) in enumerate([(2, 1), (0, 2), (1, 0)]):
     FORMS[_k, _i, _j], FORMS[_k, _j, _i] = 1.0, -1.0
 FORMS[3] = np.eye(3)
+
+# e, u and m of an edge as sums of its four nodes, see `RodElements.ways`; e and u of two edges, of their eight nodes.
+SHARES = np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.5, -0.5], [-0.5, -0.5, 0.5, 0.5]])
+PAIRED = np.kron(np.eye(2), SHARES[:2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +70,24 @@ class RodElements:
     damping: Floats
     joint_damping: Floats
 
+    def renumbered(self, new: Ints) -> RodElements:
+        """The same elements with the vertices' numbers new (n,)."""
+        return replace(self, nodes=new[self.nodes])
+
+    @cached_property
+    def joint_nodes(self) -> tuple[Ints, Floats]:
+        """(j, 7) the far end of the first edge, the common point, the far end of the second one, and the material
+        points of both; and (j, 2) 1 where the first edge ends there, and the second one begins there, otherwise -1."""
+        first, second = self.nodes[self.joints[:, 0]], self.nodes[self.joints[:, 1]]
+        ends, begins = (
+            (first[:, 1, None] == second[:, :2]).any(axis=1),
+            (second[:, 0, None] == first[:, :2]).any(axis=1),
+        )
+        common, far = np.where(ends, first[:, 1], first[:, 0]), np.where(ends, first[:, 0], first[:, 1])
+        other = np.where(begins, second[:, 1], second[:, 0])
+        nodes = np.column_stack([far, common, other, first[:, 2:], second[:, 2:]]).astype(np.int32)
+        return nodes, np.where(np.column_stack([ends, begins]), 1.0, -1.0)
+
     def ways(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """(e, 3) e, u and m of every edge at positions x (n, 3); see the module."""
         a, b, c, d = x[self.nodes].transpose(1, 0, 2)
@@ -80,11 +103,80 @@ class RodElements:
         a, b = self.turned(frames(e, u))
         return bends_of(forms_of(a, b))
 
+    def bend_slopes(self, x: Floats) -> tuple[Floats, Floats]:
+        """(j, 3) the strains of the joints, and (j, 3, 4, 3) their derivatives by e and u of the first edge, then of
+        the second one."""
+        e, u, _ = self.ways(x)
+        F, length = frames(e, u), np.linalg.norm(e, axis=1)
+        t, across = F[:, :, 2], F[:, :, 1]
+        along = np.einsum("ei,ei->e", u, t)
+        width = np.linalg.norm(u - along[:, None] * t, axis=1)
+        a, b = self.turned(F)
+        bends = bends_of(forms_of(a, b))
+        # A turn f of the second frame against the first one changes the strains by z . f.
+        half = 0.5 * bends
+        rows = np.eye(3) + half[:, :, None] * half[:, None, :]
+        for k, (i, j) in enumerate([(1, 2), (2, 0), (0, 1)]):
+            rows[:, k, i] += half[:, j]
+            rows[:, k, j] -= half[:, i]
+        z = rows @ a
+        out = np.empty((len(z), 3, 4, 3))
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            edge = self.joints[:, side]
+            turn = np.einsum("cki,ci->ck", z, t[edge]) / width[edge, None]
+            of_e = np.cross(z, t[edge][:, None]) - (turn * along[edge, None])[:, :, None] * across[edge][:, None]
+            out[:, :, 2 * side] = sign * of_e / length[edge, None, None]
+            out[:, :, 2 * side + 1] = sign * turn[:, :, None] * across[edge][:, None]
+        return bends, out
+
+    def add_gradient(self, x: Floats, tensions: Floats, section: Floats, moments: Floats, out: Floats) -> None:
+        """Add to `out` (n, 3) the gradient of the energies whose derivatives by the length of edges are tensions (e,)
+        [N] and by the strains of joints moments (j, 3) [N m], and of cross sections with a stiffness (e,) [N/m]."""
+        e, _, m = self.ways(x)
+        t = e / np.linalg.norm(e, axis=1)[:, None]
+        slopes = section[:, None, None] * np.einsum("ek,ekvi->evi", *self.section_slopes(x))
+        slopes[:, 0] += tensions[:, None] * t
+        slopes = np.concatenate([slopes, (section[:, None] * m)[:, None]], axis=1)
+        scatter(out, self.nodes, np.einsum("vp,evi->epi", SHARES, slopes))
+        if len(self.joints):
+            of_ways = np.einsum("ck,ckvi->cvi", moments, self.bend_slopes(x)[1])
+            scatter(out, self.nodes[self.joints].reshape(-1, 8), on_nodes(of_ways))
+
+    def add_elastic_gradient(self, x: Floats, out: Floats) -> None:
+        """Add the gradient (n, 3) of the energy to `out` [N]."""
+        self.add_gradient(x, self.stretching * self.stretches(x), self.section, self.stiffness * self.bends(x), out)
+
+    def section_slopes(self, x: Floats) -> tuple[Floats, Floats]:
+        """(e, 2) u . t and (u . u - r^2)/(2 r), and (e, 2, 2, 3) their derivatives by e and u."""
+        e, u, _ = self.ways(x)
+        length = np.linalg.norm(e, axis=1)
+        t = e / length[:, None]
+        along, grown = np.einsum("ei,ei->e", u, t), (np.einsum("ei,ei->e", u, u) - self.radius**2) / (2.0 * self.radius)
+        slopes = np.zeros((len(e), 2, 2, 3))
+        slopes[:, 0, 0], slopes[:, 0, 1] = (u - along[:, None] * t) / length[:, None], t
+        slopes[:, 1, 1] = u / self.radius[:, None]
+        return np.stack([along, grown], axis=1), slopes
+
+    def ratios(self, w: Floats, x: Floats) -> Floats:
+        """(j, 3) K sum w |grad k|^2 of the strains at places x (n, 3), with inverse masses w (n,) [1/s^2]."""
+        slopes = np.einsum("ckvi,vp->ckpi", self.bend_slopes(x)[1], PAIRED)
+        nodes, at = self.joint_nodes[0][:, 1], self.nodes[self.joints].reshape(-1, 8)
+        # What both edges do to their common point adds up.
+        common = at == nodes[:, None]
+        both = np.einsum("cp,ckpi->cki", common, slopes)
+        squares = np.einsum("cp,ckpi,ckpi->ck", np.where(common, 0.0, w[at]), slopes, slopes)
+        squares += w[nodes, None] * np.einsum("cki,cki->ck", both, both)
+        return self.stiffness * squares
+
     def turned(self, of_edges: Floats) -> list[Floats]:
         """(j, 3, 3, ...) the vectors, by rows, of both frames at every joint turned to their middle, or their
         derivatives."""
         rows = np.swapaxes(of_edges, 1, 2)
         return [np.einsum("ck...,cki->ci...", rows[self.joints[:, k]], self.turns[:, k]) for k in (0, 1)]
+
+    def rows_of(self, vertices: slice) -> NDArray[np.bool_]:
+        """(e,) the edges of one rod, whose vertices these are."""
+        return (self.nodes[:, 0] >= vertices.start) & (self.nodes[:, 0] < vertices.stop)
 
     def energy(self, x: Floats) -> float:
         """[J], zero at rest."""
@@ -116,6 +208,17 @@ def forms_of(a: Floats, b: Floats) -> Floats:
     forms = np.einsum("fij,cik,cjk->cf", FORMS, a, b, optimize=True)
     forms[:, 3] += 1.0
     return forms
+
+
+def on_nodes(of_ways: Floats) -> Floats:
+    """(j, 8, k) for the nodes of two edges, of values (j, 4, k) for e and u of both."""
+    return np.einsum("vp,cvk->cpk", PAIRED, of_ways)
+
+
+def scatter(out: Floats, nodes: Ints, values: Floats) -> None:
+    """Add values (k, p, 3) of nodes (k, p) to `out` (n, 3)."""
+    for i in range(3):
+        out[:, i] += np.bincount(nodes.ravel(), values[:, :, i].ravel(), len(out))
 
 
 def bends_of(forms: Floats) -> Floats:

@@ -16,8 +16,8 @@ from supple.model.system import System
 
 
 def response_rates(system: System) -> NDArray[np.float64]:
-    """(n,) k / m of every vertex [1/s^2], with k = sum (lam + 2 mu) V |b|^2 over its tets, and triangles
-    of shells with the modulus of plane stress; inf without an energy.
+    """(n,) k / m of every vertex [1/s^2], with k = sum (lam + 2 mu) V |b|^2 over its tets, triangles
+    of shells with the modulus of plane stress, and edges of rods; inf without an energy.
 
     Those of rigid bodies are zero: nothing yields between their points and their masses.
     """
@@ -34,4 +34,7 @@ def response_rates(system: System) -> NDArray[np.float64]:
     if system.shells is not None:
         shells = system.shells
         sums = sums + np.bincount(shells.triangles.ravel(), weights=shells.stiffness.ravel(), minlength=len(sums))
+    if system.rods is not None:
+        each = np.repeat(system.rods.section, 4)
+        sums = sums + np.bincount(system.rods.nodes.ravel(), weights=each, minlength=len(sums))
     return np.where(system.inverse_masses > 0.0, sums, 0.0) * system.inverse_masses

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from supple.model.system import System
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 from supple.solvers.xpbd.assessment.softening import MeasuredWork, Softening
 from supple.solvers.xpbd.moment import Moment
@@ -72,6 +73,8 @@ class SubstepChoice:
             if shells is not None and isinstance(part.body, Shell):
                 own = shells.gradients[shells.rows_of(part.vertices)]
                 of_bodies[k] = float((1.0 / np.linalg.norm(own, axis=2).max(axis=1)).mean())
+            elif system.rods is not None and isinstance(part.body, Rod):
+                of_bodies[k] = float(system.rods.lengths[system.rods.rows_of(part.vertices)].mean())
             else:
                 of_bodies[k] = float(heights[part.tets].mean())
         self.height = min(of_bodies)

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.rods.elements import FORMS, RodElements, bends_of, forms_of
+from supple.materials.rods.elements import FORMS, PAIRED, SHARES, RodElements, forms_of
 from supple.materials.rods.frames import frame_jets
 from supple.numerics.sparse.couplings import Couplings
 from supple.solvers.implicit.energies.damping import StrainRate
 from supple.solvers.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
 
 Floats = NDArray[np.float64]
-
-# e, u and m of an edge as sums of its four nodes, see `RodElements.ways`.
-_SHARES = np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.5, -0.5], [-0.5, -0.5, 0.5, 0.5]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,34 +43,27 @@ class RodEnergy(JointlyEvaluated):
 
     def add_model(self, x: Floats, gradient: Floats, hessian: HessianBlocks | None, project: bool) -> float:
         """See `Potential.add_model`; with `project`, forces and moments do not change with directions."""
-        rods = self.rods
-        e, u, m = rods.ways(x)
-        self._add_edges(e, u, m, gradient, hessian, project)
-        self._add_joints(e, u, gradient, hessian, project)
+        rods, (free, stretching, section), (unbent, stiffness) = self.rods, self._edges(), self._joints()
+        tensions, moments = stretching * (rods.stretches(x) - free), stiffness * (rods.bends(x) - unbent)
+        rods.add_gradient(x, tensions, section, moments, gradient)
+        if hessian is not None:
+            hessian.patches.append(self._of_edges(x, tensions, project))
+            if len(rods.joints):
+                hessian.patches.append(self._of_joints(x, moments, project))
         return self.value(x)
 
-    def _add_edges(
-        self, e: Floats, u: Floats, m: Floats, gradient: Floats, hessian: HessianBlocks | None, project: bool
-    ) -> None:
-        rods, (free, stretching, section) = self.rods, self._edges()
+    def _of_edges(self, x: Floats, tensions: Floats, project: bool) -> Couplings:
+        rods, (_, stretching, section) = self.rods, self._edges()
+        e, u, _ = rods.ways(x)
         length = np.linalg.norm(e, axis=1)
         t = e / length[:, None]
-        tension = stretching * (length / rods.lengths - 1.0 - free)
-        along, grown = np.einsum("ei,ei->e", u, t), (np.einsum("ei,ei->e", u, u) - rods.radius**2) / (2.0 * rods.radius)
-        slopes = np.zeros((len(e), 2, 2, 3))  # of u . t and of the radius, by e and u
-        slopes[:, 0, 0], slopes[:, 0, 1] = (u - along[:, None] * t) / length[:, None], t
-        slopes[:, 1, 1] = u / rods.radius[:, None]
-        forces = section[:, None, None] * np.einsum("ek,ekvi->evi", np.stack([along, grown], axis=1), slopes)
-        forces[:, 0] += tension[:, None] * t
-        forces = np.concatenate([forces, section[:, None, None] * m[:, None]], axis=1)
-        _scatter(gradient, rods.nodes, np.einsum("vp,evi->epi", _SHARES, forces))
-        if hessian is None:
-            return
+        values, slopes = rods.section_slopes(x)
+        along, grown = values.T
         H = np.zeros((len(e), 3, 3, 3, 3))  # by e, u, m and their components
         H[:, :2, :, :2] = np.einsum("e,ekvi,ekwj->eviwj", section, slopes, slopes)
         pairs, identity = np.einsum("ei,ej->eij", t, t), np.eye(3)
         H[:, 0, :, 0] += (stretching / rods.lengths)[:, None, None] * pairs
-        turned = np.maximum(tension, 0.0) if project else tension
+        turned = np.maximum(tensions, 0.0) if project else tensions
         H[:, 0, :, 0] += (turned / length)[:, None, None] * (identity - pairs)
         H[:, 2, :, 2] += section[:, None, None] * identity
         widened = np.maximum(grown, 0.0) if project else grown
@@ -83,60 +73,34 @@ class RodEnergy(JointlyEvaluated):
             mixed = bent * (identity - pairs)
             H[:, 0, :, 1] += mixed
             H[:, 1, :, 0] += mixed
-            across = u - along[:, None] * t
-            turning = np.einsum("ei,ej->eij", across, t)
+            turning = np.einsum("ei,ej->eij", u - along[:, None] * t, t)
             rest = turning + np.swapaxes(turning, 1, 2) + along[:, None, None] * (identity - pairs)
             H[:, 0, :, 0] -= bent / length[:, None, None] * rest
-        hessian.patches.append(_couplings(rods.nodes, np.einsum("vp,eviwj,wq->epqij", _SHARES, H, _SHARES)))
+        return _couplings(rods.nodes, np.einsum("vp,eviwj,wq->epqij", SHARES, H, SHARES))
 
-    def _add_joints(self, e: Floats, u: Floats, gradient: Floats, hessian: HessianBlocks | None, project: bool) -> None:
-        rods, (unbent, stiffness) = self.rods, self._joints()
-        if not len(rods.joints):
-            return
-        values, firsts, seconds = frame_jets(e, u)
-        (a, b), (da, db) = rods.turned(values), rods.turned(firsts)
-        forms = forms_of(a, b)
-        q, bends = forms[:, 3], bends_of(forms)
-        of_forms = np.concatenate(
-            [np.einsum("fij,cjk,cikv->cfv", FORMS, b, da), np.einsum("fij,cik,cjkv->cfv", FORMS, a, db)], axis=2
-        )
-        of_q = of_forms[:, 3]
-        of_bends = (2.0 * of_forms[:, :3] - bends[:, :, None] * of_q[:, None]) / q[:, None, None]
-        moments = stiffness * (bends - unbent)
-        slopes = np.einsum("ck,ckv->cv", moments, of_bends)
-        nodes = rods.nodes[rods.joints].reshape(-1, 8)
-        _scatter(gradient, nodes, _on_nodes(slopes.reshape(-1, 4, 3)))
-        if hessian is None:
-            return
+    def _of_joints(self, x: Floats, moments: Floats, project: bool) -> Couplings:
+        rods, (_, stiffness) = self.rods, self._joints()
+        bends, slopes = rods.bend_slopes(x)
+        of_bends = slopes.reshape(-1, 3, 12)
         H = np.einsum("ck,ckv,ckw->cvw", stiffness, of_bends, of_bends, optimize=True)
         if not project:
+            e, u, _ = rods.ways(x)
+            (a, b), (da, db), (dda, ddb) = (rods.turned(part) for part in frame_jets(e, u))
+            q = forms_of(a, b)[:, 3, None]
+            of_q = np.concatenate([np.einsum("cik,cikv->cv", b, da), np.einsum("cik,cikv->cv", a, db)], axis=1) / q
             weights = np.concatenate([2.0 * moments, -np.einsum("ck,ck->c", moments, bends)[:, None]], axis=1)
-            N = np.einsum("cf,fij->cij", weights / q[:, None], FORMS)
-            dda, ddb = rods.turned(seconds)
+            N = np.einsum("cf,fij->cij", weights / q, FORMS)
             H[:, :6, :6] += np.einsum("cik,cikvw->cvw", np.einsum("cij,cjk->cik", N, b), dda)
             H[:, 6:, 6:] += np.einsum("cjk,cjkvw->cvw", np.einsum("cij,cik->cjk", N, a), ddb)
             mixed = np.einsum("cij,cikv,cjkw->cvw", N, da, db, optimize=True)
             H[:, :6, 6:] += mixed
             H[:, 6:, :6] += np.swapaxes(mixed, 1, 2)
-            pairs = np.einsum("cv,cw->cvw", slopes / q[:, None], of_q)
+            pairs = np.einsum("cv,cw->cvw", np.einsum("ck,ckv->cv", moments, of_bends), of_q)
             H -= pairs + np.swapaxes(pairs, 1, 2)
-        of_ways = H.reshape(-1, 4, 3, 4, 3)
-        halves = _on_nodes(of_ways.reshape(len(H), 4, 36)).reshape(-1, 8, 3, 4, 3).transpose(0, 3, 1, 2, 4)
-        both = _on_nodes(halves.reshape(len(H), 4, 72)).reshape(-1, 8, 8, 3, 3).swapaxes(1, 2)
-        hessian.patches.append(_couplings(nodes, both))
-
-
-def _on_nodes(of_ways: Floats) -> Floats:
-    """(j, 8, k) for the nodes of two edges, of values (j, 4, k) for e and u of both."""
-    shares = np.zeros((4, 8))
-    shares[:2, :4], shares[2:, 4:] = _SHARES[:2], _SHARES[:2]
-    return np.einsum("vp,cvk->cpk", shares, of_ways)
-
-
-def _scatter(gradient: Floats, nodes: NDArray[np.int32], forces: Floats) -> None:
-    """Add forces (k, p, 3) of nodes (k, p)."""
-    for i in range(3):
-        gradient[:, i] += np.bincount(nodes.ravel(), forces[:, :, i].ravel(), len(gradient))
+        return _couplings(
+            rods.nodes[rods.joints].reshape(-1, 8),
+            np.einsum("vp,cviwj,wq->cpqij", PAIRED, H.reshape(-1, 4, 3, 4, 3), PAIRED, optimize=True),
+        )
 
 
 def _couplings(nodes: NDArray[np.int32], blocks: Floats) -> Couplings:

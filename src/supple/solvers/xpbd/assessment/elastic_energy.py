@@ -77,6 +77,12 @@ class ElasticEnergy:
                 for elements in (self._shells.triangles, self._shells.hinges)
             ]
 
+        self._rods = system.rods if vertices is None else None
+        if self._rods is not None:
+            first = [part.vertices.start for part in system.bodies]
+            edges = np.searchsorted(first, self._rods.nodes[:, 0], side="right") - 1
+            self._of_rods = edges, edges[self._rods.joints[:, 0]]
+
     def grow(self, Dm_inv: NDArray[np.float64], volumes: NDArray[np.float64]) -> None:
         """Take other stress-free shapes of all tets of the system: (m, 3, 3) [1/m], (m,) [m^3]."""
         shapes = Dm_inv[self._rows].reshape(-1, 9)
@@ -93,6 +99,14 @@ class ElasticEnergy:
         total = _sums(self._of_tets, self._tet_starts) + _sums(self._of_edges, self._edge_starts)
         if self._shells is not None:
             for own, energies in zip(self._bodies, energies_of_shells(self._shells, points), strict=True):
+                total += np.bincount(own, energies, len(total))
+        if self._rods is not None:
+            x = points[:, :3]
+            stored = (
+                self._rods.edge_energies(x, self._rods.stretches(x)),
+                self._rods.joint_energies(self._rods.bends(x)),
+            )
+            for own, energies in zip(self._of_rods, stored, strict=True):
                 total += np.bincount(own, energies, len(total))
         return total
 

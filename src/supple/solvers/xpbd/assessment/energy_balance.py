@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from supple.model.energy_balance import NUMERICAL
 from supple.model.system import System
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 from supple.scene.stitches.measures import stitch_energy
 from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
@@ -97,7 +98,7 @@ def _stiffness(system: System) -> float:
     """The sum of shear modulus times volume, or of edge stiffness times squared length [J]."""
     total = 0.0
     for part in system.bodies:
-        if part.rigid or isinstance(part.body, Shell):
+        if part.rigid or isinstance(part.body, (Shell, Rod)):
             continue
         material, volumes = part.body.material, system.rest_volumes[part.tets]
         compliance = getattr(material, "edge_compliance", None)
@@ -108,4 +109,6 @@ def _stiffness(system: System) -> float:
     if system.shells is not None:
         shells = system.shells
         total += float((shells.areas * shells.thickness) @ shells.mu)
+    if system.rods is not None:
+        total += float(system.rods.stretching @ system.rods.lengths)
     return total

@@ -15,7 +15,7 @@ from supple.solvers.xpbd.assessment.elastic_energy import ElasticEnergy
 
 
 class HeldElements(ElasticEnergy):
-    """Tets and springs of bodies and stitches, and elements of shells, with a node among `held` (n + a,).
+    """Tets and springs of bodies and stitches, and elements of shells and rods, with a node among `held` (n + a,).
 
     These are vertices, then anchors.
     """
@@ -35,6 +35,7 @@ class HeldElements(ElasticEnergy):
             near = self._sheets
             self._sheet_triangles, self._hinges = shells.triangles[near], shells.hinges[self._turning]
             self._membranes = shells.gradients[near], shells.laws[near]
+        self._rods = system.rods if system.rods is not None and held[system.rods.nodes].any() else None
         near = held[springs.vertices].any(axis=1)
         laws = np.column_stack([springs.rest_lengths, springs.stiffness, np.zeros(len(springs))])
         # An edge is a spring to a vertex: to the place 0 of an edge of length zero.
@@ -52,6 +53,8 @@ class HeldElements(ElasticEnergy):
         np.add.at(out, ends, springs[:, 1, None])
         if self._own is not None:
             np.add.at(out, self._sheet_triangles, self._own.stiffness[self._sheets])
+        if self._rods is not None:
+            np.add.at(out, self._rods.nodes, self._rods.section[:, None])
         return out
 
     def grow(self, Dm_inv: NDArray[np.float64], volumes: NDArray[np.float64]) -> None:
@@ -72,6 +75,10 @@ class HeldElements(ElasticEnergy):
             add_membrane_forces(points, self._sheet_triangles, *self._membranes, factor, out)
             turns = turns_of(points, self._hinges)
             add_hinge_forces(turns, self._hinges, -factor * moments[self._turning], out)
+        if self._rods is not None:
+            x, pushes = points[:, :3], np.zeros((len(points), 3))
+            self._rods.add_elastic_gradient(x, pushes)
+            out -= factor * pushes
 
 
 @njit(cache=True)

@@ -17,8 +17,10 @@ from supple.materials.elastic import EdgesAndVolume, StableNeoHookean
 from supple.materials.elastic_tets.regions import Regions
 from supple.materials.material import Elastic, Material
 from supple.model.system import BodyRange, System
+from supple.scene.rod import Rod
 from supple.scene.shell import Shell
 from supple.solvers.xpbd.constraints.edges_and_volume import EdgeConstraints, VolumeConstraints
+from supple.solvers.xpbd.constraints.rods import rod_constraints
 from supple.solvers.xpbd.constraints.shells import shell_constraints
 from supple.solvers.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.solvers.xpbd.sweeps.ordering import Layout
@@ -84,7 +86,7 @@ def refuse_materials(system: System) -> None:
         material = part.body.material
         if (
             not part.rigid
-            and not isinstance(part.body, Shell)
+            and not isinstance(part.body, (Shell, Rod))
             and not any(entry.takes(material) for entry in CONSTRAINT_SETS)
         ):
             raise SolverError(f"XPBD: {_why_not(part.name, material)}, or simulate with Implicit")
@@ -109,7 +111,9 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
         parts = [part for part in soft if entry.takes(part.body.material)]
         if parts:
             sets += [build(system, parts, layout) for build in entry.sets]
-    return [made for made in [*sets, *shell_constraints(system, layout)] if made.count > 0]
+    return [
+        made for made in [*sets, *shell_constraints(system, layout), *rod_constraints(system, layout)] if made.count > 0
+    ]
 
 
 def _why_not(body: str, material: Material) -> str:

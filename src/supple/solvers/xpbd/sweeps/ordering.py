@@ -61,7 +61,11 @@ class Layout:
 def make_layout(system: System) -> Layout:
     """Number the vertices of a system and divide it into chunks."""
     n = len(system.masses)
-    joined = [system.edges] if system.shells is None else [system.edges, system.shells.hinges]
+    joined = [system.edges]
+    if system.shells is not None:
+        joined.append(system.shells.hinges)
+    if system.rods is not None:
+        joined += [system.rods.nodes, system.rods.joint_nodes[0]]
     order, level_of_old = breadth_first_order(joined, n)
     rank_of_old = np.empty(n, dtype=np.int32)
     rank_of_old[order] = np.arange(n, dtype=np.int32)
@@ -119,6 +123,7 @@ def reordered(system: System, layout: Layout) -> System:
         tets=np.ascontiguousarray(new[system.tets]),
         edges=np.ascontiguousarray(new[system.edges]),
         shells=None if system.shells is None else system.shells.renumbered(new),
+        rods=None if system.rods is None else system.rods.renumbered(new),
         triangles=np.ascontiguousarray(new_points[system.triangles]),
         points=replace(points, vertices=new[points.vertices]),
         components=np.ascontiguousarray(system.components[old]),

@@ -205,7 +205,9 @@ def _gaps(
 def mean_edge_length(system: System) -> float:
     """Mean edge length of all the bodies' surfaces at rest [m]."""
     a, b, c = system.rest_points[system.triangles].transpose(1, 0, 2)
-    return float(np.mean([np.linalg.norm(a - b, axis=1), np.linalg.norm(b - c, axis=1), np.linalg.norm(c - a, axis=1)]))
+    lengths = np.array([np.linalg.norm(one - other, axis=1) for one, other in ((a, b), (b, c), (c, a))])
+    # An edge of a rod is a triangle with one corner twice.
+    return float(np.mean(lengths if lengths.all() else lengths[lengths > 0.0]))
 
 
 def _is_first(mesh: ContactMesh) -> NDArray[np.bool_]:
