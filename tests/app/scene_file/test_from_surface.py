@@ -116,6 +116,13 @@ def test_an_open_surface_is_a_shell_above_a_floor(caplog, factor):
     assert body.material.density * 9.81 * 0.4 / body.material.youngs < 0.011
 
 
+def test_a_fine_shell_is_thinner_than_its_edges():
+    sp.shapes.sheet(0.4, 0.1, 0.002).transformed(1000.0).save("fine.obj")
+    (body,) = load_run("fine.obj", shell=True).scene.bodies
+    assert isinstance(body, sp.Shell)
+    assert body.material.thickness == 0.001
+
+
 def _broken(name):
     x, triangles = CLOTH.vertices, CLOTH.triangles
     if name == "turned":

@@ -88,7 +88,8 @@ output: {{page: true, plot: true}}
 
 # The sag of a body under its own weight, as a part of its size, is about density * gravity * size / youngs.
 _SOFTEST, _LARGEST_SAG, _WEIGHT = 5e4, 0.05, 1000.0 * 9.81
-# A shell stretches less: 1 % where it hangs. Its thickness, as a share of its size, is that of felt on a table.
+# A shell stretches less: 1 % where it hangs. Its thickness, as a share of its size, is that of felt on a table; it is
+# at most half of an edge, so that contact limits how sharply it folds.
 _SHELL_SOFTEST, _SHELL_SAG, _SHELL_WEIGHT, _SHELL_THICKNESS = 1e5, 0.01, 400.0 * 9.81, 1 / 250
 
 
@@ -110,7 +111,7 @@ def new_scene_of(
     volume: float,
     tets: int,
     meshing: str,
-    triangles: int | None = None,
+    sheet: SurfaceMesh | None = None,
 ) -> str:
     """The text of a scene with the mesh in `file`, multiplied by `scale`, above the middle of a floor.
 
@@ -121,7 +122,7 @@ def new_scene_of(
     scale : factor of coordinates; box : lowest and highest coordinates (3,), (3,) of the mesh after scaling [m]
     volume : that it encloses, after scaling [m^3]
     tets : about how many it has, or is filled with; meshing : further keys of the mesh, each after a comma
-    triangles : of a shell, how many it has; the three before say nothing of it
+    sheet : of a shell, the surface before scaling; the three before say nothing of it
     """
     low, high = box
     size, middle = float((high - low).max()), 0.5 * (low + high)
@@ -135,9 +136,14 @@ def new_scene_of(
         "radius": f"{size / 2:.4g}",
         "body": json.dumps(body),
     }
-    if triangles is not None:
+    if sheet is not None:
         youngs = _modulus(max(_SHELL_SOFTEST, _SHELL_WEIGHT * size / _SHELL_SAG))
-        choice, thickness = f"About {triangles:,} triangles.", f"{_SHELL_THICKNESS * size:.1g}"
+        ends = sheet.vertices[sheet.edges]
+        edge = scale * float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
+        choice, thickness = (
+            f"About {len(sheet.triangles):,} triangles.",
+            f"{min(_SHELL_THICKNESS * size, 0.5 * edge):.1g}",
+        )
         return _text(name, _MESH + _SHELL, **values, youngs=youngs, thickness=thickness, choice=choice)
     choice = _choice(volume, tets, body, _youngs(size))
     return _text(name, _MESH + _SOFT, youngs=_youngs(size), choice=choice, **values)
@@ -220,11 +226,11 @@ def scene_of_surface(
     unit = f", taken to be in millimetres (scale: {used:g})" if scale is None and used != 1.0 else ""
     if shell:
         try:
-            triangles = len(_sheet(mesh).triangles)
+            sheet = _sheet(mesh)
         except MeshError as error:
             raise MeshError(f"{surface}: as a shell, {error}") from None
-        text = new_scene_of(name, file, body, used, (low, high), volume=0, tets=0, meshing="", triangles=triangles)
-        return text, f"{surface}: {size} m{unit}, a shell of {triangles:,} triangles"
+        text = new_scene_of(name, file, body, used, (low, high), volume=0, tets=0, meshing="", sheet=sheet)
+        return text, f"{surface}: {size} m{unit}, a shell of {len(sheet.triangles):,} triangles"
     report = loaded.check()
     meshing = "" if mesh is not loaded else f", tets: {tets}" + (not report.ok) * ", repair: true"
     volume = max(abs(mesh.volume) * used**3, _THINNEST * float((high - low).max()) ** 3)
