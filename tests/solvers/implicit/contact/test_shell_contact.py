@@ -1,5 +1,7 @@
 """Contact of shells in `Implicit`: they keep the distance of their thickness, and pass through nothing."""
 
+from dataclasses import replace
+
 import ipctk
 import numpy as np
 import pytest
@@ -71,20 +73,47 @@ def test_layers_rest_at_their_thickness():
     assert last.report.min_distance == pytest.approx(min((lower - 0.5 * T).min(), last.report.min_distance))
 
 
+@pytest.mark.parametrize(("cells", "thickness"), [(8, T), pytest.param(70, 5e-4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("friction", "rests"), [(0.5, True), (0.05, False)])
-def test_cloth_on_a_ball_rests_or_slides_off(friction, rests):
-    radius, eccentric = 0.06, 0.02
-    cloth = sp.Shell(
-        "cloth", sheet((8, 8), (0.16, 0.16)), CLOTH, position=(eccentric, radius + 0.6 * T, 0.0), friction=friction
-    )
+def test_cloth_on_a_ball_rests_or_slides_off(cells, thickness, friction, rests, tmp_path):
+    radius, eccentric, path = 0.06, 0.02, tmp_path / "drape.vtkhdf"
+    surface, place = sheet((cells, cells), (0.16, 0.16)), (eccentric, radius + 0.6 * thickness + 2e-4, 0.0)
+    cloth = sp.Shell("cloth", surface, replace(CLOTH, thickness=thickness), position=place, friction=friction)
     ball = sp.Sphere(center=(0.0, 0.0, 0.0), radius=radius, friction=friction)
-    last = run(sp.Scene([cloth], obstacles=[ball]), 45)
+    *_, last = sp.simulate(sp.Scene([cloth], obstacles=[ball]), sp.Implicit(), 1 / 60, 45, sinks=[sp.Recorder(path)])
+    assert not sp.check_recording(path).failures
     x = last.positions["cloth"]
     assert (x.mean(axis=0)[1] > 0.0) == rests
     if rests:
         assert np.linalg.norm(last.velocities["cloth"], axis=1).max() < 0.05
         # The ball consists of triangles; those of the cloth are chords, which touch it between the vertices.
-        assert 0.99 * radius + 0.5 * T < np.linalg.norm(x, axis=1).min() < radius + 1.2 * T
+        assert 0.99 * radius + 0.5 * thickness < np.linalg.norm(x, axis=1).min() < radius + 1.2 * thickness
+
+
+@pytest.mark.parametrize(("friction", "holds"), [(0.8, True), (0.02, False)])
+def test_plates_of_two_grippers_stretch_a_cloth_or_slip_off_it(friction, holds, tmp_path):
+    thickness, path, plates = 1e-3, tmp_path / "grippers.vtkhdf", []
+    gap = 0.5 * thickness + 3e-4
+
+    def plate(along, above):
+        def motion(time):  # closes, then pulls by 15 mm
+            return (along * 0.015 * min(max(time - 0.1, 0.0) / 0.2, 1.0), -above * 2.6e-4 * min(time / 0.08, 1.0), 0.0)
+
+        return sp.Box(
+            center=(0.045 * along, above * (gap + 0.005), 0.0),
+            size=(0.02, 0.01, 0.06),
+            motion=motion,
+            friction=friction,
+        )
+
+    plates = [plate(along, above) for along in (-1, 1) for above in (-1, 1)]
+    material = sp.ShellMaterial(youngs=1e6, poisson=0.3, thickness=thickness, density=400.0, damping=0.01)
+    cloth = sp.Shell("cloth", sheet((10, 3), (0.1, 0.03)), material, friction=friction)
+    scene = sp.Scene([cloth], obstacles=plates)
+    *_, last = sp.simulate(scene, sp.Implicit(), dt=1 / 60, steps=20, sinks=[sp.Recorder(path)])
+    assert not sp.check_recording(path).failures
+    stretch = np.ptp(last.positions["cloth"][:, 0]) - 0.1
+    assert stretch > 0.028 if holds else stretch < 0.01
 
 
 def test_folded_strip_keeps_its_thickness():
@@ -149,6 +178,10 @@ def test_shells_that_start_within_their_thickness_are_an_error():
         run(sp.Scene(layers), 1)
     with pytest.raises(SolverError, match=r"body 'lower' and obstacle.*nearer at the start.*by 0.0002 m"):
         run(sp.Scene(layers[:1], obstacles=[sp.HalfSpace(point=(0.0, -0.4 * T, 0.0))]), 1)
+    # What is stitched touches beside its stitches, too.
+    stitch = sp.SoftVertexTriangleStitch("upper", "lower", max_distance=T, youngs=1e5, poisson=0.3)
+    with pytest.raises(SolverError, match=text):
+        run(sp.Scene(layers, stitches=[stitch]), 1)
 
 
 def test_closed_shell_contains_a_body():

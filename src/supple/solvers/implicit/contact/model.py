@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from supple.contact.barrier.barrier_energy import barrier_forces
 from supple.contact.barrier.friction_energy import lagged_slips, sides
+from supple.contact.candidates import distances
+from supple.contact.features.pair_geometry import EDGE_EDGE, VERTEX_TRIANGLE
 from supple.contact.mesh.contact_mesh import ContactMesh, contact_mesh
 from supple.contact.mesh.obstacles import ObstacleRange, obstacle_positions, with_obstacles
 from supple.contact.passing import Passing
@@ -137,13 +139,18 @@ class ContactModel:
 
     def nearest(self, x: NDArray[np.float64]) -> str:
         """The names of the two things that are nearest to each other."""
-        on_planes, _ = self.collisions.half_spaces.contacts(self.collisions.points(x), np.inf)
-        pairs = [c for c in (self.collisions.at(x), on_planes) if len(c.distances)]
-        if not pairs:
-            return "two surfaces"
-        contacts = min(pairs, key=lambda c: c.gaps.min())
-        k = int(contacts.gaps.argmin())
-        return self.names([int(side[k]) for side in sides(contacts.kinds, contacts.points)])
+        points, mesh = self.collisions.points(x), self.mesh
+        near = self.collisions.finder.at(points[: len(mesh.points)])
+        on_planes, _ = self.collisions.half_spaces.contacts(points, np.inf)
+        gaps, ends = [on_planes.gaps], [np.column_stack(sides(on_planes.kinds, on_planes.points))]
+        for kind, pairs in ((VERTEX_TRIANGLE, near.vertex_triangle), (EDGE_EDGE, near.edge_edge)):
+            first = pairs[:, 0] if kind == VERTEX_TRIANGLE else mesh.edges[pairs[:, 0], 0]
+            both = (mesh.triangles if kind == VERTEX_TRIANGLE else mesh.edges)[pairs[:, 1], 0]
+            apart = distances(points, kind, mesh.triangles, mesh.edges, pairs)
+            gaps.append(apart - mesh.offsets[first] - mesh.offsets[both])
+            ends.append(np.column_stack([first, both]))
+        least = np.concatenate(gaps)
+        return self.names(np.concatenate(ends)[int(least.argmin())].tolist()) if len(least) else "two surfaces"
 
     def names(self, points: Sequence[int]) -> str:
         """Of the owners of two points."""

@@ -24,9 +24,7 @@ from supple.solvers.implicit.timings import Clock
 
 # The relative tolerance of linear systems: 1e-2 at first, since a better solution of a poor model does not help; below
 # 1e-8 round-off in the gradient makes up the rest of it.
-LOOSEST = 1e-2
-# Where surfaces wrinkle, the model is poorer still: this takes two thirds of the time (docs/theory/shells.md).
-_LOOSEST_OF_SHELLS = 1e-1
+_LOOSEST = 1e-2
 _TIGHTEST = 1e-8
 
 # The tolerance of the last system where surfaces touch, below `Implicit.force_tolerance`: its error times the stiffness
@@ -118,14 +116,13 @@ class DirectionFinder:
     short: float
     longest: float
     policy: ProjectionPolicy = field(default_factory=ProjectionPolicy)
-    forcing: float = 1.0
+    forcing: float = _LOOSEST
     last_norm: float = 0.0
 
     def find(self, here: Model) -> Direction | None:
         """The direction from a point whose Hessian is in `tools.hessian`; None where no system could be solved."""
         tools = self.tools
         gradient = tools.freed(here.gradient)
-        self.forcing = min(self.forcing, self._loosest)
         vector, report = self._solve(gradient)
         while vector is None and self.policy.now is not ProjectedTerms.ALL:
             self.policy.step_back(bool(tools.hessian.couplings))
@@ -157,13 +154,9 @@ class DirectionFinder:
             touching=touching,
         )
         if self.last_norm > 0.0 and report.first_norm > 0.0:
-            self.forcing = min(self._loosest, max(_TIGHTEST, 0.5 * (report.first_norm / self.last_norm) ** 2))
+            self.forcing = min(_LOOSEST, max(_TIGHTEST, 0.5 * (report.first_norm / self.last_norm) ** 2))
         self.last_norm = report.first_norm
         return found
-
-    @property
-    def _loosest(self) -> float:
-        return _LOOSEST_OF_SHELLS if self.tools.hessian.corrections else LOOSEST
 
     @property
     def _convex(self) -> bool:

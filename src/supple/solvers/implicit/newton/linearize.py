@@ -19,7 +19,7 @@ from supple.solvers.implicit.contact.approach import Approach
 from supple.solvers.implicit.contact.collisions import Barrier
 from supple.solvers.implicit.contact.friction import Friction
 from supple.solvers.implicit.contact.sliding import Sliding
-from supple.solvers.implicit.newton.direction import LOOSEST, Direction, DirectionFinder, Tools, newton_row
+from supple.solvers.implicit.newton.direction import Direction, DirectionFinder, Tools, newton_row
 from supple.solvers.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
 from supple.solvers.implicit.newton.line_search import Jumps, search
 from supple.solvers.implicit.newton.minimize import Outcome, Problem, free_norm, is_converged
@@ -45,7 +45,7 @@ def linearize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tool
     hessian = tools.hessian
     objective = problem.objective if problem.renewed is None else problem.renewed(x)
     policy = ProjectionPolicy(ProjectedTerms.RELEASED_LAST)
-    directions = DirectionFinder(objective, tools, problem.scale, 0.0, problem.longest, policy=policy, forcing=LOOSEST)
+    directions = DirectionFinder(objective, tools, problem.scale, 0.0, problem.longest, policy=policy)
     here, jumps = objective.model(x, hessian, policy.now), Jumps()
     barrier = next((term for term in objective.terms if isinstance(term, Barrier)), None)
     approach = None if barrier is None else Approach.of(barrier.collisions, _row_stiffness(tools))
