@@ -22,8 +22,8 @@ def refuse(system: System, solver: Implicit) -> None:
         )
     if any(tets.points > 1 for tets, _ in system.laws.material.flowing_laws):
         raise SolverError("gradient: materials that flow are not differentiated in quadratic tets; use linear ones")
-    if system.shells is not None:
-        raise SolverError("gradient: shells are not differentiated yet; fit them with a method without gradients")
+    if system.shells is not None or system.rods is not None:
+        raise SolverError("gradient: shells and rods are not differentiated; fit them with a method without gradients")
     for actuator in system.actuators:
         if actuator.friction > 0.0:
             raise SolverError("gradient: cables with friction in their eyelets are not differentiated")

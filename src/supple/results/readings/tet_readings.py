@@ -28,7 +28,6 @@ from supple.numerics.svd3 import principal_stretches
 from supple.results.readings.by_body import TetField
 from supple.runtime.displayed import DisplayedFrame
 from supple.scene.rigid.pose import Pose, pose_of
-from supple.scene.shell import Shell
 
 QUANTITIES = ("J", "von_mises", "energy")
 
@@ -53,7 +52,7 @@ def tet_values(
 
 
 _OF_RIGID = "is rigid: it does not have strains and stresses"
-_OF_SHELL = "is a shell: fields on tets are not those of its triangles"
+_THIN = "is a {}, which has no tets: fields are those of tets"
 _NO_LAW = "has no known elastic law, so it has no {}; give it an elastic material such as StableNeoHookean"
 _RIGID = "has rigid edges or volumes, whose forces do not follow from positions; give both a compliance above 0"
 
@@ -169,7 +168,8 @@ class TetReadings(DisplayedFrame):
     @property
     def _without_tets(self) -> dict[str, str]:
         rigid = {body.name: _OF_RIGID for body in self.system.bodies if body.rigid}
-        return rigid | {body.name: _OF_SHELL for body in self.system.bodies if isinstance(body.body, Shell)}
+        thin = {body.name: _THIN.format(body.body.kind) for body in self.system.bodies if body.body.offset > 0.0}
+        return rigid | thin
 
     def _names_where(self, chosen: NDArray[np.bool_]) -> list[str]:
         return [body.name for body in self.system.bodies if chosen[body.tets].any()]
