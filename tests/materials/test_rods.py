@@ -118,3 +118,17 @@ def test_it_turns_about_its_axis_as_a_solid_cylinder():
 def test_wrong_lines_are_refused_in_the_words_of_the_caller(points, edges, text):
     with pytest.raises(sp.SceneError, match=f"rod 'rope'.*{text}"):
         sp.Rod("rope", points, MATERIAL, edges=edges)
+
+
+def test_what_rods_do_not_have_is_refused_by_its_name():
+    scene = sp.Scene([sp.Rod("rope", [[0, 0, 0], [1, 0, 0], [2, 0, 0]], MATERIAL)], pins=[sp.Pin("rope", [0, 1])])
+    loss = sp.Misfit("positions", "rope", np.zeros((7, 3)))
+    with pytest.raises(sp.SolverError, match="rods are not differentiated"):
+        sp.Sensitivity(lambda p: scene, loss, sp.Implicit(), 1 / 60, 1).value_and_gradient([1.0])
+    with pytest.raises(sp.SolverError, match="modes: those of shells and rods"):
+        sp.modes(scene, 2)
+    with pytest.raises(sp.SolverError, match="newmark"):
+        list(sp.simulate(scene, sp.Implicit(integrator="newmark"), 1 / 60, 1))
+    *_, frame = sp.simulate(scene, sp.Implicit(), 1 / 60, 1)
+    with pytest.raises(sp.SceneError, match="body 'rope' is a rod, which has no tets"):
+        _ = frame.stress["rope"]
