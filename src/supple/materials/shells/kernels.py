@@ -1,7 +1,4 @@
-"""Angles of hinges, and energies and forces of triangles, one by one: what `XPBD` needs in each substep.
-
-The formulas are those of `hinges` and `membrane`.
-"""
+"""Strains, energies and forces of triangles, one by one; the formulas are those of `membrane`."""
 
 from __future__ import annotations
 
@@ -9,25 +6,8 @@ import math
 
 import numpy as np
 
-from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.numerics.mat3 import dot, row, subtract
 from supple.runtime.kernel_cache import njit
-
-
-@njit(inline="always")
-def hinge(i, j, k, l):  # noqa: E741
-    """The angle of a hinge with these four places, and its gradients by each of them; see `hinges`."""
-    edge, arm, other = subtract(j, i), subtract(k, i), subtract(l, i)
-    n, m = cross(edge, arm), cross(other, edge)
-    square = dot(edge, edge)
-    length = math.sqrt(square)
-    angle = math.atan2(dot(cross(n, m), edge), length * dot(n, m))
-    f, g = -length / max(dot(n, n), 1e-300), -length / max(dot(m, m), 1e-300)
-    c, d = (f * n[0], f * n[1], f * n[2]), (g * m[0], g * m[1], g * m[2])
-    s, t = dot(arm, edge) / square, dot(other, edge) / square
-    u, v = s - 1.0, t - 1.0
-    a = (u * c[0] + v * d[0], u * c[1] + v * d[1], u * c[2] + v * d[2])
-    b = (-s * c[0] - t * d[0], -s * c[1] - t * d[1], -s * c[2] - t * d[2])
-    return angle, a, b, c, d
 
 
 @njit(inline="always")

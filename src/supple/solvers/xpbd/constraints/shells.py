@@ -7,7 +7,7 @@ unknowns of Newton's method, from what a linear law would give, so that no stiff
 
 Bending. The moments m of hinges solve W m = turned, see `supple.materials.shells.elements`: all hinges are coupled, and
 one sweep over them from zero would not deliver W^-1, however short a substep is. So W^-1, whose factorization is known,
-acts on the angles theta_n that the projections of the substep before have left, and each hinge alone resists the rest:
+acts every few substeps on the angles theta_n that projections have left then, and each hinge alone resists the rest:
 
     m = W^-1 (theta_n - theta_0) + D (theta - theta_n),    D diagonal, D >= W^-1: `ShellElements.hinge_stiffness`.
 
@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from supple.materials.shells.elements import ShellElements
 from supple.materials.shells.hinges import angles_of, hinge_products, turns_of
-from supple.materials.shells.kernels import hinge, strains_of
+from supple.materials.shells.kernels import strains_of
 from supple.model.system import System
 from supple.runtime.kernel_cache import njit
 from supple.solvers.xpbd.sweeps.groups import FLAGS, WIDTH, make_groups, nine, put_nine, put_twelve, twelve
@@ -43,6 +43,8 @@ Floats = NDArray[np.float64]
 
 # Of Newton's method in the two stretches. From the linear guess, stretches of .05 to 3 are within 1 % with two of them.
 STEPS = 2
+# Substeps from one look at all angles to the next.
+CYCLE = 4
 # Of a stretch: what a Newton step leaves of it at least, so that the area of a triangle stays positive.
 LEAST_LEFT = 0.2
 
@@ -74,8 +76,10 @@ class MembraneConstraints:
 
     def begin_frame(self, x: Floats, known: Floats | None) -> None:
         """See `ElementStage`; (t, 3) strains 11, 22, 12."""
-        fits = known is not None and known.shape == (self.count, 3)
-        self.sweep.write(13, known if fits else strains_of(x, self._triangles, self._gradients))
+        if known is None or known.shape != (self.count, 3):
+            self.sweep.write(13, strains_of(x, self._triangles, self._gradients))
+        else:
+            self.sweep.write(13, known)
 
     def begin(self, x: Floats, v: Floats, h: float) -> None:
         """See `ElementStage`."""
@@ -103,41 +107,47 @@ class HingeConstraints:
         if self.count:
             self._stiffness = shells.hinge_stiffness
             self._ratios = shells.ratios(system.rest_positions, system.inverse_masses[shells.hinges])
-            constants = np.column_stack([w, self._stiffness[self._rows], np.zeros((self.count, 2))])
+            constants = np.column_stack([w, self._stiffness[self._rows], np.zeros((self.count, 5))])
             self.sweep = Sweep(_project_hinges, hinges, constants, make_groups(layout, hinges))
             self._angles, self._is_damped = np.zeros(len(shells.hinges)), bool(shells.hinge_damping.any())
+            self._substep = 0
 
     def begin_frame(self, x: Floats, known: Floats | None) -> None:
         """See `ElementStage`; (e,) angles."""
         if known is None or known.shape != (len(self._shells.hinges),):
             known = angles_of(x, self._shells.hinges)
-        self._angles = known.copy()
-        self.sweep.write(6, known[self._rows, None])
+        self._angles, self._substep = known.copy(), 0
 
     def begin(self, x: Floats, v: Floats, h: float) -> None:
         """See `ElementStage`."""
+        self._substep += 1
+        if self._substep % CYCLE != 1:
+            return
+        if self._substep > 1:
+            self._angles = self.memory()
         shells, D = self._shells, self._stiffness
         if len(self._held):
             self._angles[self._held] = angles_of(x, self._held_hinges)
-        turned = self._angles - shells.rest_angles
+        turned, viscosity, more = self._angles - shells.rest_angles, np.zeros(len(D)), 0.0
         if self._is_damped:
             tau = np.maximum(shells.hinge_damping - h, 0.0) / (1.0 + h * h * self._ratios) ** 2
             changes = np.empty(len(D))
             hinge_products(turns_of(x, shells.hinges), shells.hinges, v, changes)
             changes *= tau
-            moments = shells.moments(turned + changes) - D * changes
-            self.sweep.write(4, np.column_stack([D * (1.0 + tau / h), moments])[self._rows])
-        else:
-            self.sweep.write(5, shells.moments(turned)[self._rows, None])
+            turned, viscosity, more = turned + changes, D * tau / h, D * changes
+        moments = shells.moments(turned) - more
+        columns = moments, np.sin(self._angles), np.cos(self._angles), np.zeros(len(D)), viscosity
+        self.sweep.write(5, np.column_stack(columns)[self._rows])
 
     def memory(self) -> Floats:
         """See `ElementStage`."""
-        return self._angles.copy()
+        out = self._angles.copy()
+        out[self._rows] += self.sweep.read(8, 1)[:, 0]
+        return out
 
     def project(self, points: Floats, h: float) -> None:
         """See `ConstraintSet.project`."""
         self.sweep.run(points, h)
-        self._angles[self._rows] = self.sweep.read(6, 1)[:, 0]
 
 
 def shell_constraints(system: System, layout: Layout) -> list[MembraneConstraints | HingeConstraints]:
@@ -146,6 +156,21 @@ def shell_constraints(system: System, layout: Layout) -> list[MembraneConstraint
         return []
     made = [kind(system, system.shells, layout) for kind in (MembraneConstraints, HingeConstraints)]
     return [constraints for constraints in made if constraints.count]
+
+
+@njit(fastmath=FLAGS, forceinline=True)
+def _power(x, a):
+    """x^-a, for vector units: the sixteenth power of Padé's approximant [2/2] of y^-a at y = x^(1/16).
+
+    Its relative error is below 5e-9 for x from .5 to 2, and below 4e-7 for x from .2 to 5.
+    """
+    r = math.sqrt(math.sqrt(math.sqrt(math.sqrt(x)))) - 1.0
+    over = 1.0 + (1.0 - 0.5 * a) * r + (2.0 - a) * (1.0 - a) / 12.0 * r * r
+    y = over / (1.0 + (1.0 + 0.5 * a) * r + (2.0 + a) * (1.0 + a) / 12.0 * r * r)
+    y *= y
+    y *= y
+    y *= y
+    return y * y
 
 
 @njit(fastmath=FLAGS, forceinline=True)
@@ -160,7 +185,7 @@ def _newton_step(p, q, s1, s2, d1, d2, law, beta, e1, e2):
     mu, a, neo_hookean = law
     c1, c2 = p * p, q * q
     if neo_hookean > 0.0:
-        power = mu * math.exp(-a * math.log(c1 * c2))
+        power = mu * _power(c1 * c2, a)
         t1, t2 = mu - power / c1, mu - power / c2
         h11, h22, h12 = 2.0 * (1.0 + a) * power / c1, 2.0 * (1.0 + a) * power / c2, 2.0 * a * power / (p * q)
     else:
@@ -258,35 +283,74 @@ def _project_membranes(X, data, g, h):
 
 
 @njit(fastmath=FLAGS, forceinline=True)
+def _angle(sine, cosine):
+    """The angle of (cosine, sine), of any length, for vector units: eight times the arc tangent of its eighth."""
+    t = sine / max(math.sqrt(sine * sine + cosine * cosine) + cosine, 1e-300)
+    t = t / (1.0 + math.sqrt(1.0 + t * t))
+    t = t / (1.0 + math.sqrt(1.0 + t * t))
+    u = t * t  # at most .04
+    series = 1.0 / 9.0 - u * (1.0 / 11.0 - u * (1.0 / 13.0 - u * (1.0 / 15.0 - u / 17.0)))
+    return 8.0 * t * (1.0 - u * (1.0 / 3.0 - u * (1.0 / 5.0 - u * (1.0 / 7.0 - u * series))))
+
+
+@njit(fastmath=FLAGS, forceinline=True)
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(fastmath=FLAGS, forceinline=True)
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(fastmath=FLAGS, forceinline=True)
+def project_hinge(x, w, D, moment, sine, cosine, before, viscosity, h2):
+    """The 12 coordinates of a hinge after its projection, and what it has been turned from an angle then.
+
+    Parameters
+    ----------
+    w : inverse masses [1/kg]; D : see the module; moment : at the angle of `sine` and `cosine` [N m]
+    before : what it had been turned by the projection before; viscosity : D tau / h
+    """
+    x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
+    e, u, v = (x1 - x0, y1 - y0, z1 - z0), (x2 - x0, y2 - y0, z2 - z0), (x3 - x0, y3 - y0, z3 - z0)
+    n, m = _cross(e, u), _cross(v, e)
+    square, nn, mm = _dot(e, e), max(_dot(n, n), 1e-300), max(_dot(m, m), 1e-300)
+    length = math.sqrt(square)
+    s, c = _dot(_cross(n, m), e), length * _dot(n, m)
+    change = _angle(s * cosine - c * sine, c * cosine + s * sine)
+    # The gradients by the wings, and the places of these along the edge; see `supple.materials.shells.hinges`.
+    f, g, p, q = -length / nn, -length / mm, _dot(u, e) / square, _dot(v, e) / square
+    kx, ky, kz, lx, ly, lz = f * n[0], f * n[1], f * n[2], g * m[0], g * m[1], g * m[2]
+    ax, ay, az = (p - 1.0) * kx + (q - 1.0) * lx, (p - 1.0) * ky + (q - 1.0) * ly, (p - 1.0) * kz + (q - 1.0) * lz
+    bx, by, bz = -p * kx - q * lx, -p * ky - q * ly, -p * kz - q * lz
+    G = w[0] * (ax * ax + ay * ay + az * az) + w[1] * (bx * bx + by * by + bz * bz)
+    G += w[2] * square / nn + w[3] * square / mm
+    t = -h2 * (moment + D * change + viscosity * (change - before)) / (1.0 + h2 * (D + viscosity) * G)
+    a, b, k, l = t * w[0], t * w[1], t * w[2], t * w[3]  # noqa: E741
+    return (
+        x0 + a * ax,
+        y0 + a * ay,
+        z0 + a * az,
+        x1 + b * bx,
+        y1 + b * by,
+        z1 + b * bz,
+        x2 + k * kx,
+        y2 + k * ky,
+        z2 + k * kz,
+        x3 + l * lx,
+        y3 + l * ly,
+        z3 + l * lz,
+        change + t * G,
+    )
+
+
+@njit(fastmath=FLAGS, forceinline=True)
 def _project_hinges(X, data, g, h):
-    """The rows of `data`: 4 inverse masses, D, the moment at the angle that follows, and that angle: a new one then."""
+    """The rows of `data`: 4 inverse masses, and D, moment, sine, cosine, before and viscosity of `project_hinge`."""
     for i in range(WIDTH):
-        x = twelve(X, i)
-        angle, a, b, k, l = hinge((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), (x[9], x[10], x[11]))  # noqa: E741
-        w = (data[g, 0, i], data[g, 1, i], data[g, 2, i], data[g, 3, i])
-        D, change = data[g, 4, i], angle - data[g, 6, i]
-        # An angle jumps from pi to -pi where a hinge is folded flat.
-        change -= 2.0 * math.pi * round(change / (2.0 * math.pi))
-        G = w[0] * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) + w[1] * (b[0] * b[0] + b[1] * b[1] + b[2] * b[2])
-        G += w[2] * (k[0] * k[0] + k[1] * k[1] + k[2] * k[2]) + w[3] * (l[0] * l[0] + l[1] * l[1] + l[2] * l[2])
-        m = -h * h * (data[g, 5, i] + D * change) / (1.0 + h * h * D * G)
-        data[g, 6, i] += change + m * G
-        p, q, r, s = m * w[0], m * w[1], m * w[2], m * w[3]
-        put_twelve(
-            X,
-            i,
-            (
-                x[0] + p * a[0],
-                x[1] + p * a[1],
-                x[2] + p * a[2],
-                x[3] + q * b[0],
-                x[4] + q * b[1],
-                x[5] + q * b[2],
-                x[6] + r * k[0],
-                x[7] + r * k[1],
-                x[8] + r * k[2],
-                x[9] + s * l[0],
-                x[10] + s * l[1],
-                x[11] + s * l[2],
-            ),
-        )
+        w, D = (data[g, 0, i], data[g, 1, i], data[g, 2, i], data[g, 3, i]), data[g, 4, i]
+        at = data[g, 5, i], data[g, 6, i], data[g, 7, i], data[g, 8, i], data[g, 9, i]
+        x = project_hinge(twelve(X, i), w, D, at[0], at[1], at[2], at[3], at[4], h * h)
+        put_twelve(X, i, x)
+        data[g, 8, i] = x[12]
