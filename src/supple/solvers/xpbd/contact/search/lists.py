@@ -42,6 +42,10 @@ SOON, TOGETHER = 0.7, 0.5
 # list by the present velocities would be valid: where falling boxes meet boxes that lie, a tenth of the list remains.
 WAY, LARGEST, STEPS, LATER = 0.35, 3.0, 6, 2.0
 
+# Of the speed of a node seen from its body: that seen from what is near it, in a sheet, whose neighbours move alike. A
+# cloth of 10,000 triangles that falls beside a ball is searched 5 times a frame, and 8 times with .5.
+ALIKE = 0.3
+
 
 class Lists:
     """The lists of a scene. `pairs` have the impulses that are kept.
@@ -57,8 +61,17 @@ class Lists:
 
     def __init__(self, surface: RowSurface, shapes: RowShapes) -> None:
         self._surface, self._shapes, self._edge = surface, shapes, surface.edge_length
-        nodes, gaps, offsets = surface.simplices.nodes, surface.simplices.gaps, surface.simplices.offsets
-        self._widest = float(gaps[nodes].max(initial=0.0) + 2.0 * offsets[nodes].max(initial=0.0))
+        s = surface.simplices
+        nodes, offsets = s.nodes, s.offsets[s.nodes]
+        self._compact, self._sheets = nodes[offsets == 0.0], nodes[offsets > 0.0]
+        self._widest = float(s.gaps[nodes].max(initial=0.0))
+        if offsets.any():
+            # Of two things, the smaller gap counts.
+            widest, added = np.zeros((2, len(s.collide)))
+            np.maximum.at(widest, s.owner[nodes], s.gaps[nodes])
+            np.maximum.at(added, s.owner[nodes], offsets)
+            reach = np.minimum(widest[:, None], widest) + added[:, None] + added
+            self._widest = float(reach[s.collide].max(initial=0.0))
         self._search = PatchSearch(surface.parts, surface.patches)
         excluded = surface.parts.excluded_triangles, surface.parts.excluded_edges
         self._excluded = sum(len(lists.items) for lists in excluded)
@@ -252,7 +265,10 @@ class Lists:
     def _time(self, v: NDArray[np.float64], h: float) -> float:
         """For how long to search ahead: while the fastest node, seen from its body, goes `WAY` edges or more."""
         s, way = self._surface.simplices, WAY * self._scale() * self._edge
-        fastest = math.sqrt(max(fastest_square(v, s.nodes, s.owner, len(s.collide)), mean_square_speed(v, self.pairs)))
+        fastest = max(fastest_square(v, self._compact, s.owner, len(s.collide)), mean_square_speed(v, self.pairs))
+        if len(self._sheets):
+            fastest = max(fastest, ALIKE * ALIKE * fastest_square(v, self._sheets, s.owner, len(s.collide)))
+        fastest = math.sqrt(fastest)
         return max(h, way / max(fastest, way / (200.0 * h)))
 
     def _scale(self) -> float:
