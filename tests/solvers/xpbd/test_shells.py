@@ -6,6 +6,7 @@ from tests.solvers.implicit.contact.test_shell_contact import CLOTH, T, crossing
 from tests.solvers.implicit.test_shells import sheet
 
 import supple as sp
+from supple.errors import SceneError
 
 STATIC = sp.Implicit(integrator="static", contact=None)
 
@@ -164,6 +165,20 @@ def test_pin_carries_the_weight_of_a_hanging_sheet_and_the_recording_passes_all_
     np.testing.assert_allclose(force, (-weight, 0.0, 0.0), rtol=0.0, atol=0.03 * weight)
     report = sp.read_recording(path).check()
     assert report.ok, str(report)
+
+
+def test_shells_that_start_within_their_thickness_are_an_error():
+    layers = [
+        sp.Shell("lower", sheet((4, 4), (0.2, 0.2)), CLOTH),
+        sp.Shell("upper", sheet((4, 4), (0.2, 0.2)), CLOTH, position=(0.0, 0.75 * T, 0.0)),
+    ]
+    text = "body 'lower' and body 'upper' are nearer at the start than the thickness of shells, by 0.0005 m; move them"
+    with pytest.raises(SceneError, match=text):
+        run(sp.Scene(layers), 1)
+    floor = sp.Scene(layers[:1], obstacles=[sp.HalfSpace(point=(0.0, -0.4 * T, 0.0))])
+    with pytest.raises(SceneError, match=r"body 'lower' and obstacle.*nearer at the start.*by 0.0002 m"):
+        run(floor, 1)
+    assert run(floor, 2, sp.XPBD(start="push_out")).positions["lower"][:, 1].min() > -1e-9
 
 
 def test_continued_run_has_the_bits_of_one_run():

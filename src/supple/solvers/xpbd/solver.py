@@ -42,7 +42,7 @@ from supple.solvers.xpbd.momentum import MomentumRestore
 from supple.solvers.xpbd.rigid.bodies import RigidBodies
 from supple.solvers.xpbd.rigid.joints import JointProjection
 from supple.solvers.xpbd.sleep import Sleep
-from supple.solvers.xpbd.start import raise_if_inside
+from supple.solvers.xpbd.start import raise_if_inside, raise_if_within_thickness
 from supple.solvers.xpbd.substeps import SubstepChoice, Substeps
 from supple.solvers.xpbd.sweeps.ordering import Layout, make_layout, reordered
 from supple.solvers.xpbd.welded_masses import WeldedMasses
@@ -206,6 +206,8 @@ class XPBD(Solver):
             edge_length = workspace.contact.edge_length
             with numba_threads(workspace.threads):
                 raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
+                if system.shells is not None:
+                    raise_if_within_thickness(system, state.positions, state.time, self.contact)
 
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
         """Advance by `dt` [s]. The returned state has its own arrays.

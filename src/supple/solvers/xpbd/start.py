@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.mesh.contact_mesh import contact_mesh
+from supple.contact.mesh.obstacles import ObstaclePoses, placed_with_obstacles, with_obstacles
+from supple.contact.search.distances import edge_edge_square, point_triangle_square
+from supple.contact.search.patch_search import pairs_nearer
 from supple.contact.start.intersections import intersections_of
 from supple.contact.start.separation import Mover, default_gap
 from supple.contact.start.surfaces import start_surfaces
@@ -14,6 +20,8 @@ from supple.scene.contact_pairs import PairTable, pair_table
 from supple.solvers.xpbd.assessment.surfaces import TOLERATED_DEPTH, SurfaceCheck
 from supple.solvers.xpbd.contact.settings import XPBDContact, colliding_pairs
 
+# Of the thickness of shells: by how much less things may be apart. At rest they may be.
+TOLERATED = 0.05
 _REMEDY = "run `supple run --separate`, which moves it, or give XPBD(start='push_out')"
 
 
@@ -47,6 +55,51 @@ def raise_if_inside(
         worst = max(found, key=lambda item: item.depth)
         text = Mover(system, table, default_gap(system)).description(worst)
         raise SceneError(f"{text}, about {worst.depth:.2g} m deep; move it out, {_REMEDY}{_more(len(found))}")
+
+
+def raise_if_within_thickness(
+    system: System, positions: NDArray[np.float64], time: float, settings: XPBDContact | None
+) -> None:
+    """Raise where a shell begins nearer to something than its thickness; the parameters are those of `raise_if_inside`.
+
+    Raises
+    ------
+    SceneError : one line: which things, by how much, and the remedy.
+    """
+    extended, ranges = with_obstacles(system)
+    solid = tuple(part for part in ranges if part.obstacle.contact_mesh is not None)
+    x = placed_with_obstacles(extended, ranges, positions, time)
+    collide = colliding_pairs(system, settings)
+    mesh = contact_mesh(extended, solid, collide, x)
+    if not mesh.offsets.any():
+        return
+    places, offsets, found = mesh.points.positions(x), mesh.offsets, [(0.0, 0, 0)]
+    points, edges = pairs_nearer(places, mesh.parts, mesh.patches, 2.0 * float(offsets.max()))
+    for k, t in points.tolist():
+        other = mesh.triangles[t, 0]
+        lack = offsets[k] + offsets[other] - math.sqrt(point_triangle_square(places, k, mesh.triangles, t))
+        found.append((lack, mesh.owner[k], mesh.owner[other]))
+    for e, f in edges.tolist():
+        one, other = mesh.edges[e, 0], mesh.edges[f, 0]
+        lack = offsets[one] + offsets[other] - math.sqrt(edge_edge_square(places, mesh.edges, e, f))
+        found.append((lack, mesh.owner[one], mesh.owner[other]))
+    R, t = ObstaclePoses(system.obstacles).at(time)
+    sheets = np.flatnonzero(offsets > 0.0)
+    for k, obstacle in enumerate(system.obstacles):
+        mine = sheets[collide[mesh.owner[sheets], len(system.bodies) + k]]
+        if obstacle.contact_mesh is None and len(mine):
+            lacks = offsets[mine] - obstacle.signed_distance((places[mine] - t[k]) @ R[k])[0]
+            worst = int(lacks.argmax())
+            found.append((lacks[worst], mesh.owner[mine[worst]], len(system.bodies) + k))
+    lack, *pair = max(found)
+    one, other = sorted(int(k) for k in pair)
+    if lack > TOLERATED * 2.0 * float(offsets.max()):
+        names = [f"body {name!r}" for name in mesh.names[: mesh.body_count]] + [o.label for o in system.obstacles]
+        things = f"{names[one]} and {'itself' if one == other else names[other]}"
+        raise SceneError(
+            f"{things} are nearer at the start than the thickness of shells, by {lack:.2g} m; move them apart, make "
+            "shells thinner, or give XPBD(start='push_out'), which keeps that distance"
+        )
 
 
 def _more(count: int) -> str:
