@@ -122,25 +122,31 @@ class Passing:
             self.searches += 1
             found = search.find(x, way, 0.0)
             for kind, pairs in zip((VERTEX_TRIANGLE, EDGE_EDGE), found, strict=True):
-                met = np.zeros((len(pairs), 5))
+                met = np.zeros((len(pairs), 8))
                 _write_meetings(x, way, end, kind, mesh.triangles, mesh.edges, pairs, met)
                 for k in np.flatnonzero(met[:, 0] > 0.0):
                     a, _, b, _ = corners(kind, mesh.triangles, mesh.edges, *pairs[k])
                     one, other = int(mesh.owner[a]), int(mesh.owner[b])
                     least = min(self._thickness[one], self._thickness[other])
                     if met[k, 0] > least:
-                        least = max(least, _BESIDE * self._beside(one, other, met[k, 1:4], x + met[k, 4] * way))
+                        beside = self._beside(one, other, met[k, 1:4], x + met[k, 4] * way, met[k, 5:])
+                        least = max(least, _BESIDE * beside)
                     if met[k, 0] > least:
                         return int(a), int(b)
         return None
 
-    def _beside(self, one: int, other: int, n: NDArray[np.float64], x: NDArray[np.float64]) -> float:
-        """How far two owners at x (s, 3) have to move across n to be beside each other [m]."""
+    def _beside(
+        self, one: int, other: int, n: NDArray[np.float64], x: NDArray[np.float64], place: NDArray[np.float64]
+    ) -> float:
+        """How far two owners at x (s, 3) have to move across n to be beside each other, or an open rod that they meet
+        at `place` has to slip over its end [m]."""
         u = np.array(any_across(tuple(n)))
         angles = 2.0 * np.pi * np.arange(_ACROSS) / _ACROSS
         across = np.outer(np.cos(angles), u) + np.outer(np.sin(angles), np.cross(n, u))
         heights, limits = x[self.mesh.owner == one] @ across.T, x[self.mesh.owner == other] @ across.T
-        return float((heights.max(axis=0) - limits.min(axis=0)).min())
+        ends = np.flatnonzero((np.diff(self.mesh.neighbors.start) == 1) & np.isin(self.mesh.owner, (one, other)))
+        tails = np.linalg.norm(x[ends] - place, axis=1)
+        return float(np.min(np.append(tails, heights.max(axis=0) - limits.min(axis=0))))
 
 
 def _path(
@@ -191,7 +197,7 @@ def _times_of_overlap(
 @njit(cache=True)
 def _write_meetings(x, way, end, kind, triangles, edges, pairs, met):
     """For each of the pairs (k, 2) that meet while points go from x along `way` (s, 3): how deep they are beyond the
-    place of the meeting at `end` (s, 3), the normal there, and the time."""
+    place of the meeting at `end` (s, 3), the normal there, the time, and the place."""
     y, w, four = np.empty((4, 3)), np.empty((4, 3)), (0, 1, 2, 3)
     for k in range(len(pairs)):
         points = corners(kind, triangles, edges, pairs[k, 0], pairs[k, 1])
@@ -215,9 +221,11 @@ def _write_meetings(x, way, end, kind, triangles, edges, pairs, met):
         if kind == VERTEX_TRIANGLE:
             u = closest_on_triangle(a, b, c, d)
             shares = (1.0, -u[0], -u[1], -u[2])
+            met[k, 5:] = y[0]
         else:
             s, t = closest_on_segments(a, b, c, d)
             shares = (1.0 - s, s, t - 1.0, -t)
+            met[k, 5:] = (1.0 - s) * y[0] + s * y[1]
         r, moved = np.zeros(3), np.zeros(3)
         for i in range(4):
             for m in range(3):

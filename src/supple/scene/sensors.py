@@ -17,7 +17,7 @@ from supple.errors import SceneError
 from supple.kinds.kind import Kind
 from supple.kinds.validators import BodyName, Counts, Direction, Name, Vector
 from supple.scene.body import PlacedBody
-from supple.scene.loads.load import TRIANGLES, Region, body_of, surface_region
+from supple.scene.loads.load import TRIANGLES, Region, body_of, raise_for_rods, surface_region
 from supple.scene.loads.points import Point, PointValidator, point_corners
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.selection import OnVertices, Selection, Vertices
@@ -121,6 +121,10 @@ class Taxels(SurfaceSensor):
             raise SceneError(f"{self.label}: first and second are parallel or zero; give two sides of a grid")
         if self.cells[0] * self.cells[1] > MOST_CELLS:
             raise SceneError(f"{self.label}: cells is {self.cells!r}; give at most {MOST_CELLS} cells")
+
+    def triangles(self, bodies: Sequence[PlacedBody]) -> NDArray[np.int64]:
+        raise_for_rods(body_of(self.body, bodies, self.label), self.label, "give a ForceSensor")
+        return super().triangles(bodies)
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,8 @@ def contact_forces(contacts: ContactPoints | None, count: int) -> NDArray[np.flo
 def contact_pressures(
     contacts: ContactPoints | None, x: NDArray[np.float64], triangles: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """(n,) normal force per area at each vertex [Pa]; zero where nothing touches, or where no triangle is pushed.
+    """(n,) normal force per area at each vertex [Pa]; zero where nothing touches, where no triangle is pushed, and on
+    rods.
 
     The area of a vertex is a third of its triangles, of those which the force pushes, projected along the force: at
     the edge of a block on a floor only the bottom counts.

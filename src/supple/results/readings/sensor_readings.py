@@ -2,7 +2,8 @@
 
 The contact force of a vertex acts on those of its triangles that it pushes, in proportion to their areas projected
 along the normal force (`contact_pressures` divides by these areas). Where it pushes none of them, as the mean over a
-frame in which the body turned far may, it acts on all, in proportion to their areas. Each corner of each triangle so
+frame in which the body turned far may, it acts on all, in proportion to their areas; on edges of rods, to their
+lengths. Each corner of each triangle so
 has a part of the force. The parts of all triangles add up to the whole force, and a part of a surface has those of its
 triangles.
 """
@@ -140,13 +141,18 @@ def _touched(triangles: NDArray[np.int32], x: NDArray[np.float64], contacts: Con
     normals = areas / np.where(lengths > 0.0, lengths, 1.0)
     if contacts is None or not len(contacts):
         return Touched(triangles, np.zeros((len(triangles), 3, 3)), normals)
+    of_rod = triangles[:, 1] == triangles[:, 2]
+    edges = np.linalg.norm(b - a, axis=1)[:, None] * np.array([1.0, 0.5, 0.5])  # their second end is two corners
     pushes = contacts.on_vertices(contacts.forces, len(x))
     total = contacts.on_vertices(contacts.forces + contacts.friction, len(x))
     facing = np.maximum(-np.einsum("ti,tci->tc", areas, pushes[triangles]), 0.0)
     pushed = np.bincount(triangles.ravel(), facing.ravel(), len(x)) > 0.0
-    facing = np.where(pushed[triangles], facing, lengths)
+    facing = np.where(pushed[triangles], facing, np.where(of_rod[:, None], edges, lengths))
     sums = np.bincount(triangles.ravel(), facing.ravel(), len(x))
     shares = facing / np.where(sums > 0.0, sums, 1.0)[triangles]
+    if of_rod.any():  # they are pushed from where they are pushed
+        along = np.einsum("tc,tci->ti", shares, pushes[triangles])[of_rod]
+        normals[of_rod] = -along / np.maximum(np.linalg.norm(along, axis=1), np.finfo(np.float64).tiny)[:, None]
     return Touched(triangles, shares[:, :, None] * total[triangles], normals)
 
 

@@ -14,7 +14,7 @@ from supple.kinds.kind import Kind
 from supple.kinds.validators import NON_NEGATIVE, POSITIVE, BodyName, Integer, Name, OneOf
 from supple.mesh.closed_surfaces import enclosed_voids, is_closed, signed_volumes
 from supple.scene.body import PlacedBody
-from supple.scene.loads.load import Rows, body_of
+from supple.scene.loads.load import Rows, body_of, raise_for_rods
 from supple.scene.loads.over_time import OverTime, OverTimeOf
 from supple.scene.shell import Shell
 
@@ -104,6 +104,7 @@ class Cavity(Kind):
         SceneError : where the body does not exist, or no such closed surface exists.
         """
         body = body_of(self.body, bodies, self.label)
+        raise_for_rods(body, self.label, "give a body of tets or a closed shell")
         points, triangles = body.points, body.triangles
         two_sided = isinstance(body, Shell)
         if self.triangles is None:

@@ -15,6 +15,7 @@ from supple.kinds.kind import Kind
 from supple.kinds.suggestion import suggestion
 from supple.kinds.validators import Validator
 from supple.scene.body import PlacedBody
+from supple.scene.rod import Rod
 from supple.scene.selection import InBox, distinct_numbers
 
 
@@ -72,7 +73,14 @@ class OnSurface(OnBody):
         ------
         SceneError : where none exists, or a row does not exist.
         """
+        raise_for_rods(body, self.label, "give it a Force or a BodyForce")
         return surface_region(self.region, body, self.label)
+
+
+def raise_for_rods(body: PlacedBody, label: str, remedy: str) -> None:
+    """Raise `SceneError` for a rod, whose surface is edges without area."""
+    if isinstance(body, Rod):
+        raise SceneError(f"{label}: {body.label} is edges, which have no triangles; {remedy}")
 
 
 def surface_region(region: Region, body: PlacedBody, label: str) -> NDArray[np.int64]:

@@ -26,7 +26,7 @@ def tets_in(tets: TetRegion, body: PlacedBody, label: str) -> NDArray[np.int64]:
     """
     count = len(body.mesh.tets)
     if not count:
-        raise SceneError(f"{label}: body {body.name!r} is a shell, which has no tets; give a body of tets")
+        raise SceneError(f"{label}: {body.label} has no tets; give a body of tets")
     if tets is None:
         return np.arange(count)
     if isinstance(tets, InBox):

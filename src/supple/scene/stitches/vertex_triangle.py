@@ -134,10 +134,12 @@ class SoftVertexTriangleStitch(Stitch):
         edges = np.linalg.norm([x2 - x1, x3 - x2, x1 - x3], axis=2)
         flat = np.flatnonzero(~(length > 1e-12 * edges.max(axis=0) ** 2))
         if len(flat):
-            raise SceneError(
-                f"{self.label}: triangle {pairs.rows[flat[0]]} of {second.label} has no area, so that nothing can be "
-                "stitched to it; repair the mesh"
-            )
+            row = pairs.rows[flat[0]]
+            if second.triangles[row, 1] == second.triangles[row, 2]:
+                text = f"{second.label} is edges without triangles; give a VertexEdgeStitch or a VertexVertexStitch"
+            else:
+                text = f"triangle {row} of {second.label} has no area, so that nothing can be stitched to it; repair it"
+            raise SceneError(f"{self.label}: {text}")
         n /= length[:, None]
         chosen = self.min_separate_distance
         if chosen is None:

@@ -173,7 +173,7 @@ def test_shells_that_start_within_their_thickness_are_an_error():
         sp.Shell("lower", sheet((4, 4), (0.2, 0.2)), CLOTH),
         sp.Shell("upper", sheet((4, 4), (0.2, 0.2)), CLOTH, position=(0.0, 0.75 * T, 0.0)),
     ]
-    text = "body 'lower' and body 'upper' are nearer at the start than the thickness of shells, by 0.0005 m; move them"
+    text = "'lower' and body 'upper' are nearer at the start than the thickness of shells and rods, by 0.0005 m; move"
     with pytest.raises(SolverError, match=text):
         run(sp.Scene(layers), 1)
     with pytest.raises(SolverError, match=r"body 'lower' and obstacle.*nearer at the start.*by 0.0002 m"):

@@ -125,10 +125,10 @@ class ContactModel:
             return
         raise_if_intersecting(self.system, x, time, self.table)
         if not apart and self.mesh.offsets.any() and not self.collisions.intersect(x):
-            missing = f"{-self.collisions.smallest_distance(x):.2g} m"
+            missing = f"{max(-self.collisions.smallest_distance(x), 0.0):.2g} m"
             raise SolverError(
-                f"{self.nearest(x)} are nearer at the start than the thickness of shells, by {missing}; move them "
-                "apart, make shells thinner, or give contact=None"
+                f"{self.nearest(x)} are nearer at the start than the thickness of shells and rods, by {missing}; move "
+                "them apart, make shells and rods thinner, or give contact=None"
             )
         if not apart:
             raise SolverError("the scene starts with surfaces that touch; move them apart, or give contact=None")
