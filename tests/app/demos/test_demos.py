@@ -14,6 +14,8 @@ from supple.app.demos.registry import DEMOS, find_demo
 from supple.errors import SceneError, SolverError
 from supple.model.state import Status
 from supple.model.system import build_system, initial_state
+from supple.results.check.checker import check_recording
+from supple.results.recording.recorder import Recorder
 from supple.simulate import first_frame, simulate
 from supple.solvers.implicit.solver import Implicit
 from supple.solvers.solver import Solver
@@ -70,6 +72,15 @@ def test_the_gripper_holds_its_box_and_not_a_slippery_one(monkeypatch):
     monkeypatch.setattr(gripper, "FRICTION", 0.1)
     lifted, *_ = run(DEMOS["gripper"], "implicit", steps=100)[1]
     assert not lifted.holds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["balloon", "cuff"])
+def test_a_recording_of_a_demo_of_shells_passes_all_checks(name, tmp_path):
+    demo, path = DEMOS[name], tmp_path / "demo.vtkhdf"
+    list(simulate(demo.scene(), demo.solver(), demo.dt, demo.steps, sinks=[Recorder(path)]))
+    report = check_recording(path)
+    assert report.ok, str(report)
 
 
 @pytest.mark.slow

@@ -81,7 +81,8 @@ BALLOON = Demo(
         "Each frame is compared with the closed form of a neo-Hookean membrane."
     ),
     scene=scene,
-    solvers={"implicit": lambda: Implicit(contact=None)},
+    # What Newton's method leaves undone turns a body that floats: so it is within the limit of `supple check`.
+    solvers={"implicit": lambda: Implicit(contact=None, tolerance=1e-7)},
     measurement=_Measurement,
     steps=90,
 )
