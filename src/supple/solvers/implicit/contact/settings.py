@@ -26,7 +26,7 @@ class IPCContact(Kind):
     dhat : distance below which surfaces repel each other [m]. None: a thousandth of the smallest body's diagonal, or
         less where surface edges or the gaps at the start are shorter than that.
     stiffness : pressure scale of the barrier [Pa]: surfaces half of `dhat` apart press on each other with several
-        times as much. "adaptive": from the pressures that strain the bodies (their moduli; of shells, times thickness
+        times as much. "adaptive": from the bodies' moduli (of shells alone, times thickness
         over diagonal), and raised within a step where surfaces come very close.
     friction_velocity : relative velocity below which friction is static [m/s]: a sticking contact creeps with a part of
         it. None: a thousandth of the smallest body's diagonal per second.
@@ -107,8 +107,11 @@ def _modulus(system: System, part: BodyRange, shear_moduli: NDArray[np.float64])
     if isinstance(part.body, Rod):
         return part.body.material.youngs
     if isinstance(part.body, Shell):
+        modulus = 3.0 * part.body.material.mu
+        if not all(isinstance(other.body, Shell) for other in system.bodies):
+            return modulus  # solids press on each other and on shells with more than shells alone
         size = float(np.linalg.norm(np.ptp(system.rest_points[part.points], axis=0)))
-        return 3.0 * part.body.material.mu * part.body.material.thickness / size  # a balloon's tension over its radius
+        return modulus * part.body.material.thickness / size  # a balloon's tension over its radius
     return 3.0 * float(np.mean(shear_moduli))
 
 
