@@ -7,6 +7,7 @@ from tests.solvers.implicit.test_shells import sheet
 
 import supple as sp
 from supple.errors import SceneError
+from supple.numerics.geometry.triangle_crossings import crossing_triangles
 
 STATIC = sp.Implicit(integrator="static", contact=None)
 
@@ -188,3 +189,44 @@ def test_continued_run_has_the_bits_of_one_run():
     one = list(sp.simulate(scene, sp.XPBD(), dt=1 / 60, steps=12))
     other = list(sp.simulate(scene, sp.XPBD(), dt=1 / 60, steps=6, start=one[5]))
     np.testing.assert_array_equal(other[-1].positions["cloth"], one[-1].positions["cloth"])
+
+
+def dropped(seed):
+    """Sheets, a balloon, a soft and a rigid body with random materials and rotations, one above the other."""
+    rng = np.random.default_rng(seed)
+    box = sp.shapes.box(size=(0.08, 0.06, 0.05), divisions=(2, 2, 2))
+    ball = sp.shapes.sphere(radius=0.05, edge_length=0.03).surface.compact()
+    bodies = []
+    for k, kind in enumerate(["sheet", *rng.permutation(["sheet", "balloon", "soft", "rigid"])]):
+        thickness = 10.0 ** rng.uniform(-3.3, -2.3)
+        material = sp.ShellMaterial(youngs=10.0 ** rng.uniform(4, 7), poisson=0.3, thickness=thickness, density=400.0)
+        place = {
+            "position": (*rng.uniform(-0.05, 0.05, 1), 0.2 + 0.25 * k, 0.0),
+            "rotation": tuple(rng.uniform(-3, 3, 3)),
+        }
+        place["velocity"] = (*rng.uniform(-1.0, 1.0, 1), -3.0, 0.0)
+        if kind == "soft":
+            soft = sp.StableNeoHookean(youngs=10.0 ** rng.uniform(4, 6), poisson=0.4)
+            bodies.append(sp.Body(f"{k}", box, soft, **place))
+        elif kind == "rigid":
+            bodies.append(sp.RigidBody(f"{k}", box.surface, density=800.0, **place))
+        else:
+            n = int(rng.integers(3, 8))
+            flat = sheet((n, n), (0.2, 0.2), "random", seed).transformed(translation=(-0.1, 0.0, -0.1))
+            bodies.append(sp.Shell(f"{k}", ball if kind == "balloon" else flat, material, **place))
+    return sp.Scene(bodies, obstacles=[sp.HalfSpace(friction=0.4)])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_crosses_in_random_drops_with_the_defaults(seed):
+    scene = dropped(seed)
+    table = np.ones((len(scene.bodies), len(scene.bodies)), dtype=np.bool_)
+    for frame in sp.simulate(scene, sp.XPBD(), dt=1 / 60, steps=36):
+        points, triangles, owner = [], [], []
+        for k, body in enumerate(scene.bodies):
+            triangles.append(body.triangles + sum(map(len, points)))
+            points.append(frame.positions[body.name])
+            owner.append(np.full(len(body.triangles), k))
+        surfaces = np.concatenate(triangles).astype(np.int32), np.concatenate(owner).astype(np.int32)
+        assert len(crossing_triangles(np.concatenate(points), *surfaces, table, 1)[0]) == 0
+        assert min(x[:, 1].min() for x in points) > -1e-3

@@ -141,6 +141,13 @@ class ShellElements:
         shares = np.linalg.eigvalsh(scaled)[:, :1] * diagonal
         return 1.0 / np.bincount(self.hinge_of[has], shares[has], len(self.hinges))
 
+    def stretching_ratios(self, w: Floats) -> Floats:
+        """(t,) 2 mu (1 + a) V k of triangles, k the largest eigenvalue of sum w b b^T with the inverse masses w (n,)
+        [1/s^2]."""
+        b = self.gradients
+        curvatures = np.linalg.eigvalsh(np.einsum("tp,tpi,tpj->tij", w[self.triangles], b, b))[:, 1]
+        return 2.0 * self.mu * (1.0 + self.a) * self.thickness * self.areas * curvatures
+
     def ratios(self, x: Floats, w: Floats) -> Floats:
         """(e,) D sum w |grad theta|^2 at places x (n, 3), with the inverse masses w (e, 4) of hinges [1/s^2]."""
         turns = turns_of(x, self.hinges)

@@ -73,16 +73,17 @@ def raise_if_within_thickness(
     mesh = contact_mesh(extended, solid, collide, x)
     if not mesh.offsets.any():
         return
-    places, offsets, found = mesh.points.positions(x), mesh.offsets, [(0.0, 0, 0)]
+    places, offsets = mesh.points.positions(x), mesh.offsets
+    found: list[tuple[float, int, int]] = [(0.0, 0, 0)]
     points, edges = pairs_nearer(places, mesh.parts, mesh.patches, 2.0 * float(offsets.max()))
     for k, t in points.tolist():
         other = mesh.triangles[t, 0]
         lack = offsets[k] + offsets[other] - math.sqrt(point_triangle_square(places, k, mesh.triangles, t))
-        found.append((lack, mesh.owner[k], mesh.owner[other]))
+        found.append((float(lack), int(mesh.owner[k]), int(mesh.owner[other])))
     for e, f in edges.tolist():
         one, other = mesh.edges[e, 0], mesh.edges[f, 0]
         lack = offsets[one] + offsets[other] - math.sqrt(edge_edge_square(places, mesh.edges, e, f))
-        found.append((lack, mesh.owner[one], mesh.owner[other]))
+        found.append((float(lack), int(mesh.owner[one]), int(mesh.owner[other])))
     R, t = ObstaclePoses(system.obstacles).at(time)
     sheets = np.flatnonzero(offsets > 0.0)
     for k, obstacle in enumerate(system.obstacles):
@@ -90,9 +91,9 @@ def raise_if_within_thickness(
         if obstacle.contact_mesh is None and len(mine):
             lacks = offsets[mine] - obstacle.signed_distance((places[mine] - t[k]) @ R[k])[0]
             worst = int(lacks.argmax())
-            found.append((lacks[worst], mesh.owner[mine[worst]], len(system.bodies) + k))
+            found.append((float(lacks[worst]), int(mesh.owner[mine[worst]]), len(system.bodies) + k))
     lack, *pair = max(found)
-    one, other = sorted(int(k) for k in pair)
+    one, other = sorted(pair)
     if lack > TOLERATED * 2.0 * float(offsets.max()):
         names = [f"body {name!r}" for name in mesh.names[: mesh.body_count]] + [o.label for o in system.obstacles]
         things = f"{names[one]} and {'itself' if one == other else names[other]}"

@@ -135,12 +135,13 @@ def test_the_sag_of_a_stretched_beam_is_within_the_accuracy_although_stretching_
 
 
 def test_what_sleeps_keeps_its_measurement_and_other_bodies_have_none():
-    estimate = Softening(build_system(beam((4, 2, 2), 0.4)))
-    first = estimate.after(None, np.array([[1e-3, 1.0, 2e-3]]), 1e-3, np.zeros(1, dtype=bool))
-    slept = estimate.after(first, np.zeros((1, 3)), 5e-4, np.ones(1, dtype=bool))
+    system = build_system(beam((4, 2, 2), 0.4))
+    estimate, x = Softening(system), system.rest_positions
+    first = estimate.after(None, np.array([[1e-3, 1.0, 2e-3]]), 1e-3, np.zeros(1, dtype=bool), x)
+    slept = estimate.after(first, np.zeros((1, 3)), 5e-4, np.ones(1, dtype=bool), x)
     # Errors fall with the square of the substep.
     np.testing.assert_allclose(slept.sums, [[2.5e-4, 1.0, 5e-4]], rtol=1e-12)
-    awake = estimate.after(slept, np.array([[1e-3, 1.0, 2e-3]]), 5e-4, np.zeros(1, dtype=bool))
+    awake = estimate.after(slept, np.array([[1e-3, 1.0, 2e-3]]), 5e-4, np.zeros(1, dtype=bool), x)
     np.testing.assert_allclose(awake.sums, [[1.2e-3, 1.8, 2.4e-3]], rtol=1e-12)
     assert estimate.own(awake) is awake
     assert Softening(build_system(beam((4, 2, 2), 0.4, youngs=1e6))).own(awake) is None

@@ -90,7 +90,8 @@ class Softening:
             if shells is not None and isinstance(part.body, Shell):
                 rows = shells.rows_of(part.vertices)
                 self._shells.append((k, np.flatnonzero(rows)))
-                self.stretching[k] = STRETCHING * _of_membrane(shells, rows, system.inverse_masses)
+                ratios, areas = shells.stretching_ratios(system.inverse_masses)[rows], shells.areas[rows]
+                self.stretching[k] = STRETCHING * float(ratios @ areas / areas.sum())
                 self.rates[k] = BENDING * _of_hinges(shells, system, part)
             elif system.rods is not None and isinstance(part.body, Rod):
                 own = system.rods.rows_of(part.vertices)[system.rods.joints[:, 0]]
@@ -198,14 +199,6 @@ def _mean_square_frequency(system: System, part: BodyRange) -> float:
     # lam of the stable Neo-Hookean energy is lam_L + mu.
     squares = 2.0 * volumes * np.maximum(curvatures, 0.0) * (each.lam - 0.5 * each.mu)
     return float(squares @ volumes) / float(volumes.sum())
-
-
-def _of_membrane(shells: ShellElements, rows: NDArray[np.bool_], w: NDArray[np.float64]) -> float:
-    """The mean over the area of 2 mu (1 + a) V k, k the largest eigenvalue of sum w b b^T."""
-    b, areas = shells.gradients[rows], shells.areas[rows]
-    curvatures = np.linalg.eigvalsh(np.einsum("tp,tpi,tpj->tij", w[shells.triangles[rows]], b, b))[:, 1]
-    stiffness = 2.0 * (shells.mu * (1.0 + shells.a) * shells.thickness)[rows] * areas
-    return float((stiffness * curvatures) @ areas / areas.sum())
 
 
 def _of_hinges(shells: ShellElements, system: System, part: BodyRange) -> float:
