@@ -162,7 +162,8 @@ def is_loaded(impulses, k):
 def describe_pairs(pairs, s, shape_friction, old, is_kept):
     """Fill in what pairs are, and what was known of those of them that are among `old` pairs.
 
-    Pairs of one body push that are farther from each other at rest than twice their gap without offsets.
+    Pairs of one body push that are farther from each other at rest than twice their gap without offsets,
+    and than one and a half times these, as in `contact.mesh.near_at_rest`.
 
     Parameters
     ----------
@@ -204,7 +205,7 @@ def describe_pairs(pairs, s, shape_friction, old, is_kept):
             pairs.near[k], pairs.pushes[k] = old.near[o], old.pushes[o]
         elif kind != SHAPE and one == other:
             _, r = weights_of(s.rest, pairs.nodes, k, kind)
-            pairs.pushes[k] = dot(r, r) > (2.0 * gap) ** 2
+            pairs.pushes[k] = dot(r, r) > max(2.0 * gap, 1.5 * pairs.offsets[k]) ** 2
 
 
 @njit

@@ -7,7 +7,7 @@ held or follow a script have the inverse mass zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -145,9 +145,11 @@ def row_surface(
     closed = np.ones(len(collide), dtype=np.bool_)
     closed[mesh.owner[mesh.edges[np.diff(mesh.edge_triangles.start) != 2, 0]]] = False
     closed[: len(system.bodies)] &= [not isinstance(part.body, Shell) for part in system.bodies]  # no inside
+    # What is near along a shell is kept apart here without a push, see `describe_pairs`.
+    excluded = replace(mesh, near_at_rest=None).excluded
     return RowSurface(
         simplices,
-        Parts(nodes, simplices.triangles, simplices.edges, simplices.collide, *mesh.excluded),
+        Parts(nodes, simplices.triangles, simplices.edges, simplices.collide, *excluded),
         _without_flat(mesh, rest[nodes], system),
         closed,
         count,
