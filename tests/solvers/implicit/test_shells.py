@@ -187,7 +187,7 @@ def test_solvers_refuse_what_they_do_not_simulate_of_shells(solver, text):
 
 
 def test_readings_and_loads_of_tets_are_refused():
-    with pytest.raises(SceneError, match="body 'cloth' is a shell"):
+    with pytest.raises(SceneError, match="shell 'cloth' has no tets"):
         cloth(loads=[sp.Growth("cloth", 1.1)])
     *_, last = sp.simulate(cloth(), sp.Implicit(contact=None), dt=1 / 60, steps=1)
     with pytest.raises(SceneError, match="body 'cloth' is a shell"):
