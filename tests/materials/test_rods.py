@@ -125,8 +125,6 @@ def test_what_rods_do_not_have_is_refused_by_its_name():
     loss = sp.Misfit("positions", "rope", np.zeros((7, 3)))
     with pytest.raises(sp.SolverError, match="rods are not differentiated"):
         sp.Sensitivity(lambda p: scene, loss, sp.Implicit(), 1 / 60, 1).value_and_gradient([1.0])
-    with pytest.raises(sp.SolverError, match="modes: those of shells and rods"):
-        sp.modes(scene, 2)
     with pytest.raises(sp.SolverError, match="newmark"):
         list(sp.simulate(scene, sp.Implicit(integrator="newmark"), 1 / 60, 1))
     *_, frame = sp.simulate(scene, sp.Implicit(), 1 / 60, 1)

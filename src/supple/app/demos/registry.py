@@ -10,6 +10,7 @@ from supple.app.demos.cuff import CUFF
 from supple.app.demos.demo import Demo
 from supple.app.demos.drape import DRAPE
 from supple.app.demos.gripper import GRIPPER
+from supple.app.demos.knot import KNOT
 from supple.app.demos.pneunet import PNEUNET
 from supple.app.demos.squash import SQUASH
 from supple.app.demos.stitch import STITCH
@@ -17,7 +18,7 @@ from supple.app.demos.stretch import STRETCH
 from supple.app.demos.twist import TWIST
 from supple.errors import SceneError
 
-_ALL = (SQUASH, STRETCH, COMPLIANCE, BEARS, STITCH, TWIST, PNEUNET, GRIPPER, DRAPE, BAG, BALLOON, CUFF)
+_ALL = (SQUASH, STRETCH, COMPLIANCE, BEARS, STITCH, TWIST, PNEUNET, GRIPPER, DRAPE, BAG, BALLOON, CUFF, KNOT)
 DEMOS: dict[str, Demo] = {demo.name: demo for demo in _ALL}
 
 

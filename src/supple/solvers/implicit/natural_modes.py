@@ -77,8 +77,8 @@ def natural_modes(system: System, state: State, count: int) -> tuple[NDArray[np.
     ------
     SolverError : where there are fewer modes, or they were not found; and as `Implicit.prepare` for what it refuses.
     """
-    if system.shells is not None or system.rods is not None:
-        raise SolverError("modes: those of shells and rods are not computed; take them out of the scene")
+    if system.shells is not None:
+        raise SolverError("modes: those of shells are not computed; take them out of the scene")
     pinned = np.zeros(len(system.rest_positions), dtype=bool)
     pinned[system.pinned_vertices] = True
     if pinned.all():
