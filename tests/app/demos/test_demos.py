@@ -8,7 +8,7 @@ import pytest
 
 from supple.app.cli.app import main
 from supple.app.cli.console import ExitCode
-from supple.app.demos import cuff, gripper, pneunet
+from supple.app.demos import cuff, gripper, knot, pneunet
 from supple.app.demos.demo import Claim, Demo, Measurement, body_range, meetings, stitch_lengths
 from supple.app.demos.registry import DEMOS, find_demo
 from supple.errors import SceneError, SolverError
@@ -34,7 +34,7 @@ def run(demo, kind, steps=None):
 
 
 def test_the_names_and_solvers_of_the_demos():
-    names = {"squash", "stretch", "compliance", "bears", "stitch", "twist", "pneunet", "gripper"} | SHELLS
+    names = {"squash", "stretch", "compliance", "bears", "stitch", "twist", "pneunet", "gripper", "knot"} | SHELLS
     assert {name for name, _ in EVERY} == names
     assert {kind for _, kind in EVERY} == set(SOLVERS)
     assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
@@ -88,6 +88,13 @@ def test_the_cuff_does_not_lift_a_slippery_ball(monkeypatch):
     monkeypatch.setattr(cuff, "FRICTION", 0.05)
     lifted, *_ = run(DEMOS["cuff"], "implicit", steps=90)[1]
     assert not lifted.holds
+
+
+def test_crossings_of_a_line_with_itself_have_signs():
+    points = knot.tied(knot.RADIUS, knot.ROPE, knot.EDGES)
+    assert knot.crossings(points).tolist() == [-1, -1, -1]
+    assert knot.crossings(points * [1.0, 1.0, -1.0]).tolist() == [1, 1, 1]
+    assert knot.least_distance(points) > 2.0 * knot.ROPE
 
 
 def test_what_crosses_is_counted():
