@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -236,7 +237,29 @@ class GoingOn(FrameCheck):
                 middle = x[np.unique(surfaces.triangles[rows[one]])].mean(axis=0)
                 if closed[other] and is_inside(x, middle, surfaces.triangles, rows[other]):
                     return True
-        return not any(closed)
+        return not any(closed) and self._is_away_from_rims(before, at, pair)
+
+    def _is_away_from_rims(self, before: Snapshot, at: Snapshot, pair: tuple[int, int]) -> bool:
+        """Whether two things without an inside meet on the straight path where neither can go around the other: not at
+        rims of two sheets, an edge of a rod and a rim, or the end of a rod."""
+        surfaces = self.of.surfaces
+        only = np.zeros_like(surfaces.allowed)
+        only[pair] = only[pair[::-1]] = True
+        met = surfaces.pairs(before.tree, before.points, at.points, only)[1]
+        rims, of_rod = self._rims[met], surfaces.triangles[met, 1] == surfaces.triangles[met, 2]
+        around = (rims | (of_rod & ~of_rod[:, ::-1])).all(axis=1) | (rims & of_rod).any(axis=1)
+        return bool((~around).any())
+
+    @cached_property
+    def _rims(self) -> NDArray[np.bool_]:
+        """(t,) the triangles with a corner on the rim of their sheet, and the last edges of rods."""
+        triangles = self.of.surfaces.triangles
+        of_rod = triangles[:, 1] == triangles[:, 2]
+        sides = np.sort(np.concatenate([triangles[~of_rod][:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+        different, counts = np.unique(sides, axis=0, return_counts=True)
+        points, uses = np.unique(triangles[of_rod, :2], return_counts=True)
+        ends = np.append(different[counts == 1].ravel(), points[uses == 1])
+        return np.asarray(np.isin(triangles, ends).any(axis=1))
 
     def _velocities(self, before: Snapshot, at: Snapshot, frame: Snapshot) -> Floats:
         """(n, 3) of all points in one of two frames; those of obstacles are what takes them from one to the other."""
