@@ -156,7 +156,7 @@ class ShellElements:
     @cached_property
     def laws(self) -> Floats:
         """(t, 4) volume [m^3], mu [Pa], a, and 1 where neo-Hookean."""
-        return np.column_stack([self.areas * self.thickness, self.mu, self.a, self.neo_hookean])
+        return np.column_stack([self.areas * self.thickness, self.mu, self.a, self.neo_hookean.astype(np.float64)])
 
     @cached_property
     def bounds(self) -> Floats:
