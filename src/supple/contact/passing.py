@@ -82,7 +82,9 @@ class Passing:
             return None
         center = _sums(mesh.owner, begin, p) / sizes
         for x0, x1 in _path(begin, end, mesh.owner, center, center + means):
-            boxes = [boxes_of_labels(np.concatenate([x, x], axis=1), mesh.owner, p) for x in (x0, x1)]
+            # With what is around them, as boxes of what is flat or straight would overlap for no time.
+            around = [np.concatenate([x - mesh.offsets[:, None], x + mesh.offsets[:, None]], axis=1) for x in (x0, x1)]
+            boxes = [boxes_of_labels(limits, mesh.owner, p) for limits in around]
             swept = np.concatenate(
                 [np.minimum(boxes[0], boxes[1])[:, :3], np.maximum(boxes[0], boxes[1])[:, 3:]], axis=1
             )

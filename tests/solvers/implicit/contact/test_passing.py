@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.passing import _path
+from supple.contact.mesh.contact_mesh import mesh_of_triangles
+from supple.contact.passing import Passing, _path
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 BALL = sp.shapes.sphere(0.02, 0.012)
 RUBBER = sp.StableNeoHookean(youngs=1e6, poisson=0.4, density=1000)
@@ -111,3 +113,25 @@ def test_every_owner_turns_evenly_on_the_direct_way():
         np.testing.assert_allclose(sizes, np.linalg.norm(begin[:8] - centers[0], axis=1), rtol=1e-12)
         t = (k + 1) / 8
         np.testing.assert_allclose(x[8:], (1 - t) * begin[8:] + t * end[8:], atol=1e-12)
+
+
+@pytest.mark.parametrize(("place", "passes"), [(0.09, True), (0.0, False), (-0.09, True)])
+def test_rods_do_not_slip_over_each_others_ends_within_a_step(place, passes):
+    """One falls 12 mm onto another: farther than it is to the other's end, or less than the way beside both."""
+    below = np.linspace([-0.1, 0.0, 0.0], [0.1, 0.0, 0.0], 11)
+    above = np.linspace([place, 0.004, -0.1], [place, 0.004, 0.1], 10)
+    x, lines = np.concatenate([below, above]), [np.arange(10), 11 + np.arange(9)]
+    edges = np.concatenate([np.column_stack([line, line + 1, line + 1]) for line in lines])
+    owner, every = np.repeat([0, 1], [11, 10]), np.ones((2, 2), dtype=np.bool_)
+    mesh = mesh_of_triangles(
+        EmbeddedPoints.at_vertices(np.arange(21)),
+        edges,
+        owner,
+        x,
+        body_count=2,
+        names=("below", "above"),
+        collide=every,
+        offsets=np.full(21, 0.001),
+    )
+    end = x - np.outer(owner, [0.0, 0.012, 0.0])
+    assert (Passing(mesh, x).between(x, end) is not None) == passes
