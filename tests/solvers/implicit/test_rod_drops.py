@@ -104,7 +104,7 @@ def crossings(seed, path, steps):
     return {name: text for name, text in failures.items() if name in CROSSINGS}, statuses
 
 
-@pytest.mark.parametrize("seed", [5, 9])
+@pytest.mark.parametrize("seed", [9, 10])
 def test_what_falls_does_not_cross_anything(seed, tmp_path):
     assert crossings(seed, tmp_path / "drop.h5", 6) == ({}, {"converged"})
 
