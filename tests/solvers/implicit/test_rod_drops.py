@@ -77,7 +77,7 @@ def drop(seed):
     size, things, y = 10 ** rng.uniform(-2.3, -0.3), [], 0.0
     obstacles = [sp.HalfSpace(friction=rng.uniform(0, 1))]
     if rng.random() < 0.4:
-        obstacles.append(sp.Sphere(name="ball", center=(0, 1.2 * size, 0), radius=size, friction=0.3))
+        obstacles.append(sp.obstacles.Sphere(name="ball", center=(0, 1.2 * size, 0), radius=size, friction=0.3))
         y = 2.3 * size
     for k in range(int(rng.integers(2, 5))):
         kind = [rod, rod, rod, shell, soft, rigid][int(rng.integers(6))] if k else rod
@@ -85,7 +85,7 @@ def drop(seed):
         y += 2.5 * own
         place = {
             "position": [rng.uniform(-0.3, 0.3) * size, y, rng.uniform(-0.3, 0.3) * size],
-            "rotation": Rotation.random(random_state=int(rng.integers(1 << 30))).as_rotvec(),
+            "rotation": Rotation.from_quat(np.random.default_rng(rng.integers(1 << 30)).normal(size=4)).as_rotvec(),
             "velocity": (0.0, -float(rng.choice([0.0, 1.0, 5.0, 20.0])), 0.0),
             "friction": rng.uniform(0, 1),
         }
@@ -104,7 +104,7 @@ def crossings(seed, path, steps):
     return {name: text for name, text in failures.items() if name in CROSSINGS}, statuses
 
 
-@pytest.mark.parametrize("seed", [9, 10])
+@pytest.mark.parametrize("seed", [5, 10, 14])
 def test_what_falls_does_not_cross_anything(seed, tmp_path):
     assert crossings(seed, tmp_path / "drop.h5", 6) == ({}, {"converged"})
 
