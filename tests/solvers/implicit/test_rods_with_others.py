@@ -1,5 +1,7 @@
 """Rods with what acts on them: clamps that turn, forces, springs, cables, welds, stitches, starts, senseless loads."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,8 @@ def test_clamped_ends_that_turn_twist_a_rod_and_feel_its_torque():
     free = length * (count - 2) / count  # between the clamped edges
     torque = ROPE.twisting_stiffness * 2.0 * np.tan(0.5 * angle / (count - 1)) * (count - 1) / free
     own = frame.system.pins[1]
-    forces = frame.report.details.reaction_forces_by_vertex[own.label]
+    details: Any = frame.report.details
+    forces = details.reaction_forces_by_vertex[own.label]
     assert np.cross(frame.positions["rope"][own.vertices], forces)[:, 0].sum() == pytest.approx(torque, rel=0.01)
     middle = frame.positions["rope"][: count + 1]
     np.testing.assert_allclose(middle[:, 1:], 0.0, atol=1e-9)
@@ -179,7 +182,8 @@ def test_sensors_feel_what_carries_a_rod():
     scene = sp.Scene([rod], obstacles=[sp.HalfSpace()], sensors=sensors)
     frame = last(scene, steps=25)
     weight = rod.lumped_masses().sum() * 9.81
-    whole, half = (frame.sensors[name] for name in ("all", "begin"))
+    readings: Any = frame.sensors
+    whole, half = readings["all"], readings["begin"]
     assert whole.force[1] == pytest.approx(weight, rel=0.05)
     assert whole.normal == pytest.approx(whole.force[1], rel=1e-6)
     assert half.force[1] == pytest.approx(0.5 * whole.force[1], rel=0.05)
