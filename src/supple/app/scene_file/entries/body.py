@@ -97,7 +97,8 @@ class BodyEntry(Model):
             (this.material, self._soft),
         )
         alone = next(make for given, make in kinds if given is not None)(shared, meshes)
-        copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
+        # -0.0 is what changes no number, also not the sign of zero.
+        copies = list(self.copies.placements()) if self.copies is not None else [(np.full(3, -0.0), None)]
         digits = max(2, len(str(len(copies))))
         made = []
         for i, (offset, rotation) in enumerate(copies):
