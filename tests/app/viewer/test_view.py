@@ -107,7 +107,13 @@ def test_ctrl_c_ends_the_view_of_a_script_without_a_trace_and_the_script_goes_on
     path = tmp_path / "look.py"
     path.write_text(SCRIPT + "sp.view(scene, sp.XPBD(substeps=2), open_browser=False, port=0)\nprint('after')\n")
     script = subprocess.Popen(
-        [sys.executable, str(path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, str(path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # What a shell starts in the background ignores Ctrl-C.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     try:
         assert script.stdout.readline() == "begin\n"
