@@ -31,6 +31,11 @@ def edge_keys(simplices: NDArray[np.integer], n_vertices: int) -> NDArray[np.int
     return np.minimum(first, second) * n_vertices + np.maximum(first, second)
 
 
+def are_edges(triangles: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """(t,) which triangles are edges of rods: their last two corners are the same."""
+    return np.asarray(triangles[:, 1] == triangles[:, 2])
+
+
 def unique_edges(simplices: NDArray[np.int32], n_vertices: int) -> NDArray[np.int32]:
     """Edges (e, 2) int32 of triangles or tets, each once, lower vertex first, in lexicographic order.
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from tests.derivatives import hessian_product
+from tests.ropes import line, rope
 
 import supple as sp
 from supple.solvers.implicit.energies.rods import RodEnergy
@@ -64,17 +65,6 @@ def test_a_twisted_ring_is_stable_up_to_the_twist_of_michell(share, stable):
     hessian = np.array([hessian_product(energy, NO_TETS, x, unit).ravel() for unit in units])
     lowest = np.linalg.eigvalsh(hessian)[0] / material.bending_stiffness
     assert (lowest > -1e-6) == stable
-
-
-def line(count, length, axis=0):
-    points = np.zeros((count + 1, 3))
-    points[:, axis] = np.linspace(-0.5 * length, 0.5 * length, count + 1)
-    return points
-
-
-def rope(name, points, **more):
-    material = sp.RodMaterial(youngs=1e6, poisson=0.4, radius=0.005, damping=0.001)
-    return sp.Rod(name, points, material, friction=0.5, **more)
 
 
 def run(scene, path, steps=25, **more):

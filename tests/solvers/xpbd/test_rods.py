@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.ropes import line, rope
 
 import supple as sp
 from supple.materials.rods.elements import PAIRED
@@ -56,21 +57,14 @@ def test_free_rods_keep_their_momentum_and_spin(tmp_path):
         np.testing.assert_allclose(series[-1], series[0], atol=1e-3 * np.linalg.norm(series[0]))
 
 
-def line(count, length, axis=0):
-    points = np.zeros((count + 1, 3))
-    points[:, axis] = np.linspace(-0.5 * length, 0.5 * length, count + 1)
-    return points
-
-
-def rope(name, points, **more):
-    material = sp.RodMaterial(youngs=1e5, poisson=0.4, radius=0.005, damping=0.01)
-    return sp.Rod(name, points, material, friction=0.5, **more)
+def soft_rope(name, points, **more):
+    return rope(name, points, 1e5, 0.01, **more)
 
 
 def test_rods_lie_on_a_floor_and_on_each_other_at_their_radius(tmp_path):
     bodies = [
-        rope("below", line(8, 0.2), position=(0, 0.006, 0)),
-        rope("above", line(8, 0.2, 2), position=(0, 0.017, 0)),
+        soft_rope("below", line(8, 0.2), position=(0, 0.006, 0)),
+        soft_rope("above", line(8, 0.2, 2), position=(0, 0.017, 0)),
     ]
     path = tmp_path / "rods.h5"
     scene = sp.Scene(bodies, obstacles=[sp.obstacles.HalfSpace(friction=0.5)])
@@ -84,8 +78,8 @@ def test_rods_lie_on_a_floor_and_on_each_other_at_their_radius(tmp_path):
 
 def test_a_fast_rod_does_not_pass_another(tmp_path):
     bodies = [
-        rope("held", line(10, 0.2)),
-        rope("fast", line(11, 0.2, 2), position=(0.003, 0.1, 0), velocity=(0, -20.0, 0)),
+        soft_rope("held", line(10, 0.2)),
+        soft_rope("fast", line(11, 0.2, 2), position=(0.003, 0.1, 0), velocity=(0, -20.0, 0)),
     ]
     path = tmp_path / "rods.h5"
     scene = sp.Scene(bodies, pins=[sp.Pin("held", [0, 1, 9, 10])])

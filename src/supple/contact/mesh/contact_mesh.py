@@ -11,7 +11,7 @@ from supple.contact.mesh.near_at_rest import near_at_rest
 from supple.contact.mesh.obstacles import ObstacleRange
 from supple.contact.mesh.stitch_filter import StitchFilter, WeldedPoints, stitch_filter
 from supple.contact.search.patches import Parts, Patches, patches_of
-from supple.mesh.topology import edge_keys
+from supple.mesh.topology import are_edges, edge_keys
 from supple.model.system import System
 from supple.numerics.adjacency import Adjacency, adjacency, joined_lists, no_lists
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -191,7 +191,7 @@ def mesh_of_triangles(
     s = len(points)
     triangles = np.ascontiguousarray(triangles, dtype=np.int32)
     owner = np.ascontiguousarray(owner, dtype=np.int32)
-    of_rod = triangles[:, 1] == triangles[:, 2]
+    of_rod = are_edges(triangles)
     keys = edge_keys(triangles, s)
     keys[of_rod] = keys[of_rod, :1]
     keys, side = np.unique(keys, return_inverse=True)

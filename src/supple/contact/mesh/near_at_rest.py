@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from supple.contact.search.patch_search import PatchSearch
 from supple.contact.search.patches import Parts, Patches
+from supple.mesh.topology import are_edges
 from supple.numerics.adjacency import Adjacency, adjacency, no_lists
 
 # Of the thickness: pairs that are a little farther apart at rest would press on each other as soon as a shell bends.
@@ -50,7 +51,7 @@ def near_at_rest(
             out.append(found.astype(np.int64))
     points, pairs = np.concatenate(of_points), np.concatenate(of_edges)
     # Triangles join at edges, edges of rods at points.
-    joints = np.where((triangles[:, 1] == triangles[:, 2])[:, None], e + triangles, triangle_edges)
+    joints = np.where(are_edges(triangles)[:, None], e + triangles, triangle_edges)
     joined_at = adjacency(joints.ravel(), np.repeat(np.arange(f), 3), e + s)
     sides = adjacency(triangle_edges.ravel(), np.repeat(np.arange(f), 3), e)
     # What each point is near to, with the triangles that have it; of edges, the triangles of edges.

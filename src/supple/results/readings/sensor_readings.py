@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
+from supple.mesh.topology import are_edges
 from supple.model.state import ContactPoints
 from supple.model.system import BodyRange, System
 from supple.results.readings.reading import (
@@ -141,7 +142,7 @@ def _touched(triangles: NDArray[np.int32], x: NDArray[np.float64], contacts: Con
     normals = areas / np.where(lengths > 0.0, lengths, 1.0)
     if contacts is None or not len(contacts):
         return Touched(triangles, np.zeros((len(triangles), 3, 3)), normals)
-    of_rod = triangles[:, 1] == triangles[:, 2]
+    of_rod = are_edges(triangles)
     edges = np.linalg.norm(b - a, axis=1)[:, None] * np.array([1.0, 0.5, 0.5])  # their second end is two corners
     pushes = contacts.on_vertices(contacts.forces, len(x))
     total = contacts.on_vertices(contacts.forces + contacts.friction, len(x))

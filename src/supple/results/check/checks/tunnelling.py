@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.mesh.topology import are_edges
 from supple.results.check.frame_check import FrameCheck
 from supple.results.check.geometry.containment import is_inside
 from supple.results.check.geometry.vectors import area_vectors
@@ -246,7 +247,7 @@ class GoingOn(FrameCheck):
         only = np.zeros_like(surfaces.allowed)
         only[pair] = only[pair[::-1]] = True
         met = surfaces.pairs(before.tree, before.points, at.points, only)[1]
-        rims, of_rod = self._rims[met], surfaces.triangles[met, 1] == surfaces.triangles[met, 2]
+        rims, of_rod = self._rims[met], are_edges(surfaces.triangles)[met]
         around = (rims | (of_rod & ~of_rod[:, ::-1])).all(axis=1) | (rims & of_rod).any(axis=1)
         return bool((~around).any())
 
@@ -254,7 +255,7 @@ class GoingOn(FrameCheck):
     def _rims(self) -> NDArray[np.bool_]:
         """(t,) the triangles with a corner on the rim of their sheet, and the last edges of rods."""
         triangles = self.of.surfaces.triangles
-        of_rod = triangles[:, 1] == triangles[:, 2]
+        of_rod = are_edges(triangles)
         sides = np.sort(np.concatenate([triangles[~of_rod][:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
         different, counts = np.unique(sides, axis=0, return_counts=True)
         points, uses = np.unique(triangles[of_rod, :2], return_counts=True)

@@ -34,23 +34,26 @@ class RodEnergy(JointlyEvaluated):
         return np.zeros_like(self.rods.stiffness), self.rods.stiffness
 
     def value(self, x: Floats) -> float:
-        rods, (free, stretching, section), (unbent, stiffness) = self.rods, self._edges(), self._joints()
-        total = 0.5 * float((stretching * rods.lengths) @ (rods.stretches(x) - free) ** 2)
-        total += 0.5 * float(section @ rods.shears(x))
+        return self._energy(x, self.rods.stretches(x) - self._edges()[0], self.rods.bends(x) - self._joints()[0])
+
+    def _energy(self, x: Floats, stretched: Floats, bent: Floats) -> float:
+        rods, (_, stretching, section) = self.rods, self._edges()
+        total = 0.5 * float((stretching * rods.lengths) @ stretched**2 + section @ rods.shears(x))
         with np.errstate(invalid="ignore"):
-            total += 0.5 * float(np.einsum("ck,ck->", stiffness, (rods.bends(x) - unbent) ** 2))
+            total += 0.5 * float(np.einsum("ck,ck->", self._joints()[1], bent**2))
         return total if np.isfinite(total) else np.inf
 
     def add_model(self, x: Floats, gradient: Floats, hessian: HessianBlocks | None, project: bool) -> float:
         """See `Potential.add_model`; with `project`, forces and moments do not change with directions."""
         rods, (free, stretching, section), (unbent, stiffness) = self.rods, self._edges(), self._joints()
-        tensions, moments = stretching * (rods.stretches(x) - free), stiffness * (rods.bends(x) - unbent)
+        stretched, bent = rods.stretches(x) - free, rods.bends(x) - unbent
+        tensions, moments = stretching * stretched, stiffness * bent
         rods.add_gradient(x, tensions, section, moments, gradient)
         if hessian is not None:
             hessian.patches.append(self._of_edges(x, tensions, project))
             if len(rods.joints):
                 hessian.patches.append(self._of_joints(x, moments, project))
-        return self.value(x)
+        return self._energy(x, stretched, bent)
 
     def _of_edges(self, x: Floats, tensions: Floats, project: bool) -> Couplings:
         rods, (_, stretching, section) = self.rods, self._edges()

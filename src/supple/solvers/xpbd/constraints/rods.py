@@ -19,6 +19,7 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016), sections 3.4 and 3.5.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,16 +38,16 @@ Floats = NDArray[np.float64]
 LEAST_TRACE = 1e-2
 
 
-class RodConstraints:
+class RodConstraints(ABC):
     """What both kinds of constraints share: strains that the next substep must know, from row `known` on."""
 
     sweep: Sweep
     count: int
     known: tuple[int, int]
 
+    @abstractmethod
     def strains(self, x: Floats) -> Floats:
-        """(m, k) at places x (n, >= 3)."""
-        raise NotImplementedError
+        """(m, k) at places x (n, 3)."""
 
     def begin_frame(self, x: Floats, known: Floats | None) -> None:
         """See `ElementStage`; (m, k) strains."""
@@ -57,6 +58,7 @@ class RodConstraints:
 
     def begin(self, x: Floats, v: Floats, h: float) -> None:
         """See `ElementStage`."""
+        return
 
     def memory(self) -> Floats:
         """See `ElementStage`."""
